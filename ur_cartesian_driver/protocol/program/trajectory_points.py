@@ -4,7 +4,9 @@
 The trajectory point interface: motion primitives to the robot program, one result back.
 
 A point is 21 big-endian int32, 84 bytes: the numbers of
-:mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled.
+:mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
+:func:`decode_point` convert primitives, :func:`encode_fields` and :func:`decode_fields` bare
+numbers; :func:`encode_points` is the faster one for a whole trajectory.
 
 The sender must
 
@@ -46,6 +48,7 @@ from ur_cartesian_driver.protocol.program.point_fields import (
     field_names,
     from_fields,
     MotionType,
+    PointField,
     PointFields,
     to_fields,
 )
@@ -56,48 +59,20 @@ MAX_PENDING_OUTPUTS = 64
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 
-_POINT = struct.Struct('>21i')
+_POINT = struct.Struct(f'>{POINT_FIELDS}i')
+#: Points encoded at once: large enough for numpy, small enough for the cache.
+_CHUNK = 4096
+#: Factors of words 0 to 17.
+_MOVE_SCALES = (FIXED_POINT,) * 18
 
 
-def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
+def encode_point(instruction: Instruction, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the 84 bytes of 21 numbers.
-
-    :raises LocalProtocolError: a number cannot be sent.
-    """
-    check_fields(fields, dialect)
-    spline = fields[20] == MotionType.SPLINE
-    names = field_names(fields[20], dialect)
-    words = [to_fixed(value, name) for value, name in zip(fields[:18], names[:18], strict=True)]
-    word18 = to_fixed(fields[18], names[18], dialect.time_scale)
-    word19 = int(fields[19]) if spline else to_fixed(fields[19], names[19], dialect.time_scale)
-    return _POINT.pack(*words, word18, word19, int(fields[20]))
-
-
-def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
-    """
-    Return the 21 numbers of 84 bytes, in SI units.
-
-    :raises RemoteProtocolError: the size is wrong.
-    """
-    words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
-    scale = dialect.time_scale
-    word19 = words[19] if words[20] == MotionType.SPLINE else from_fixed(words[19], scale)
-    return (
-        *(from_fixed(word) for word in words[:18]),
-        from_fixed(words[18], scale),
-        word19,
-        words[20],
-    )
-
-
-def encode_point(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> bytes:
-    """
-    Return the 84 bytes of a primitive.
+    Return the 84 bytes of a primitive or output.
 
     :raises LocalProtocolError: a value cannot be sent; the text names the field and the bound.
     """
-    return encode_fields(to_fields(primitive, dialect), dialect)
+    return encode_fields(to_fields(instruction, dialect), dialect)
 
 
 def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
@@ -112,18 +87,14 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
         raise RemoteProtocolError(f'{error} Bytes: {hex_text(data)}') from None
 
 
-#: Points encoded at once: large enough for numpy, small enough for the cache.
-_CHUNK = 4096
-
-
-def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
+def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of many primitives, as :func:`encode_point` does one by one, but faster.
+    Return the bytes of many primitives and outputs: those of :func:`encode_point`, but faster.
 
     :raises LocalProtocolError: names the point (from 0), the field and the bound.
     """
     chunks = []
-    iterator = iter(primitives)
+    iterator = iter(instructions)
     first = 0
     while chunk := list(islice(iterator, _CHUNK)):
         chunks.append(_encode_chunk(chunk, first, dialect))
@@ -131,40 +102,30 @@ def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST_D
     return b''.join(chunks)
 
 
-def _encode_chunk(primitives: list[Instruction], first: int, dialect: Dialect) -> bytes:
-    rows = []
-    for index, primitive in enumerate(primitives, first):
-        try:
-            fields = to_fields(primitive, dialect)
-            check_fields(fields, dialect)
-        except LocalProtocolError as error:
-            raise LocalProtocolError(f'Point {index}: {error}') from None
-        rows.append(fields)
-    return _encode_rows(np.array(rows, dtype=np.float64), first, dialect)
+def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
+    """
+    Return the 84 bytes of 21 numbers in SI units.
+
+    :raises LocalProtocolError: a number cannot be sent.
+    """
+    check_fields(fields, dialect)
+    motion_type = fields[PointField.TYPE]
+    names, scales = field_names(motion_type, dialect), _scales(motion_type, dialect)
+    return _POINT.pack(*map(to_fixed, fields, names, scales))
 
 
-def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> bytes:
-    """Return the bytes of rows of fields (n, 21), and check their range."""
-    scales = np.array([FIXED_POINT] * 18 + [dialect.time_scale] * 2 + [1], dtype=np.float64)
-    with np.errstate(over='ignore'):  # infinite values are refused below
-        scaled = fields * scales
-    spline = fields[:, 20] == MotionType.SPLINE
-    scaled[spline, 19] = fields[spline, 19]
-    bad = ~((scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5))
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
-        error = range_error(
-            float(fields[row, column]),
-            field_names(fields[row, 20], dialect)[column],
-            int(scales[column]),
-        )
-        raise LocalProtocolError(f'Point {first + row}: {error}')
-    # Ties away from zero, as in to_fixed().
-    size = np.abs(scaled)
-    whole = np.floor(size)
-    whole += size - whole >= 0.5
-    words = np.copysign(whole, scaled)
-    return words.astype('>i4').tobytes()
+def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
+    """
+    Return the 21 numbers of 84 bytes, in SI units.
+
+    :raises RemoteProtocolError: the size is wrong.
+    """
+    words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
+    scales = _scales(words[PointField.TYPE], dialect)
+    return tuple(
+        word if scale == 1 else from_fixed(word, scale)  # kinds and types stay integers
+        for word, scale in zip(words, scales, strict=True)
+    )
 
 
 class TrajectoryResultDecoder(ResultDecoder[TrajectoryResult]):
@@ -173,3 +134,55 @@ class TrajectoryResultDecoder(ResultDecoder[TrajectoryResult]):
     def __init__(self) -> None:
         """Start empty."""
         super().__init__(TrajectoryResult, 'trajectory result')
+
+
+def _encode_chunk(instructions: list[Instruction], first: int, dialect: Dialect) -> bytes:
+    """Return the bytes of primitives, the first of which is point ``first``."""
+    rows = []
+    for index, instruction in enumerate(instructions, first):
+        try:
+            fields = to_fields(instruction, dialect)
+            check_fields(fields, dialect)
+        except LocalProtocolError as error:
+            raise LocalProtocolError(f'Point {index}: {error}') from None
+        rows.append(fields)
+    return _encode_rows(np.array(rows, dtype=np.float64), first, dialect)
+
+
+def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> bytes:
+    """
+    Return the bytes of the rows of an array of shape (n, 21).
+
+    :raises LocalProtocolError: names the first number that does not fit.
+    """
+    scales = np.where(
+        fields[:, [PointField.TYPE]] == MotionType.SPLINE,
+        _scales(MotionType.SPLINE, dialect),
+        _scales(MotionType.MOVEJ, dialect),
+    )
+    with np.errstate(over='ignore'):  # infinite values are refused below
+        scaled = fields * scales
+    fits = (scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5)  # NaN fits nowhere
+    if not fits.all():
+        row, column = (int(i) for i in np.argwhere(~fits)[0])
+        name = field_names(fields[row, PointField.TYPE], dialect)[column]
+        error = range_error(float(fields[row, column]), name, int(scales[row, column]))
+        raise LocalProtocolError(f'Point {first + row}: {error}')
+    return _round_half_away(scaled).astype('>i4').tobytes()
+
+
+def _scales(motion_type: float, dialect: Dialect) -> tuple[int, ...]:
+    """Return the wire's factor of each of the 21 numbers."""
+    time = dialect.time_scale
+    # Word 19 of a spline is its kind, of all others the blend radius.
+    word19 = 1 if motion_type == MotionType.SPLINE else time
+    return (*_MOVE_SCALES, time, word19, 1)
+
+
+def _round_half_away(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return whole numbers, ties rounded away from zero as by :func:`to_fixed`."""
+    size = np.abs(values)
+    whole = np.floor(size)
+    # The difference is exact; adding 0.5 first would round 0.49999999999999994 up.
+    whole += size - whole >= 0.5
+    return np.copysign(whole, values)
