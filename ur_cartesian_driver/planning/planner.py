@@ -3,14 +3,18 @@
 """
 From a goal to a plan: choose the primitives, and refuse what the arm cannot do.
 
-The stages: :func:`~.request.validate.check` (no robot needed), the curve of every segment with the
-configuration in which it arrives, blends, speeds, and then the primitives, the reference path and
-the report. The first reason for a refusal is raised.
+:func:`plan` checks a goal as far as that needs no robot (:func:`~.request.validate.check`),
+expresses it for the TCP with which it runs, and gives it to the planner of its execution mode:
+:func:`plan_moves` or :func:`plan_spline_goal`.
+
+The stages of :func:`plan_moves`: the curve of every segment with the configuration in which it
+arrives, and the blends between them; clearance; times and speeds; primitives, outputs, reference
+path and report. The first reason for a refusal is raised.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
@@ -40,6 +44,7 @@ from ur_cartesian_driver.motion.primitive import (
 )
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import segment_line, tightest_remark
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
@@ -91,8 +96,8 @@ _UNTIMED_MOVES: dict[SegmentType, type[MoveP] | type[OptimoveJ] | type[OptimoveL
 }
 
 
-#: A planner of the registry of execution modes. It gets a checked goal about the TCP, where that
-#: came from, and the TCP that the robot has.
+#: A planner in the registry of execution modes. It gets a checked goal for the TCP with which it
+#: runs, how the goal was retargeted, and the TCP that the robot has now.
 PlanGoal: TypeAlias = Callable[['GoalPlanner', RetargetedGoal, Pose], Plan]
 
 
@@ -104,56 +109,28 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     :param arm: the kinematics, the robot's own calibrated one where it is known.
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
-    with _no_collections():
+    with _garbage_collection_paused():
         return _plan(goal, state, arm, options)
-
-
-@contextmanager
-def _no_collections() -> Iterator[None]:
-    """
-    Switch the garbage collector off.
-
-    A plan of ten thousand points is hundreds of thousands of objects, none of which is garbage
-    before the plan is made, and the collector would scan them again and again.
-    """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     check(goal, options)
-    goal = apply_default_tolerances(goal, options)
-    T_flange_active = state.T_flange_tcp
-    retargeted = retarget_to_tcp(goal, state, options)
-    goal, state = retargeted.goal, retargeted.state
-    planner = GoalPlanner(goal, state, arm, options)
+    retargeted = retarget_to_tcp(apply_default_tolerances(goal, options), state, options)
+    planner = GoalPlanner(retargeted.goal, retargeted.state, arm, options)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
-    return plan_goal(planner, retargeted, T_flange_active)
+    return plan_goal(planner, retargeted, state.T_flange_tcp)
 
 
 def plan_moves(planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
-    """Return the plan of a goal whose points are joined by motions of the robot."""
+    """
+    Return the plan of a goal whose points are joined by motion commands of the robot.
+
+    :param T_flange_active: the TCP that the robot has now.
+    """
     goal, state, options = planner.goal, planner.state, planner.options
-    arm = planner.kinematics.arm
     geometries = planner.geometries()
-    samples = planner.joint_path_planner.path_margins.samples()
-    clearance_lines = list(
-        dict.fromkeys(
-            line
-            for T_flange_tcp in tool_tips(goal, T_flange_active)
-            for line in clearance_remarks(
-                Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
-                samples.segment,
-                samples.fraction,
-            )
-        )
-    )
-    timings = schedule(geometries, options, arm.model)
+    clearance_lines = _clearance_lines(planner, tool_tips(goal, T_flange_active))
+    timings = schedule(geometries, options, planner.kinematics.arm.model)
     reference = reference_path(state.actual_tcp_pose, geometries, timings)
     segments = place_outputs(
         [
@@ -185,24 +162,34 @@ def plan_moves(planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active
     )
 
 
+def _clearance_lines(planner: GoalPlanner, tips: Iterable[Pose]) -> list[str]:
+    """
+    Return the report lines about the clearance with each of some tool tips.
+
+    :raises CollisionPredicted: the arm comes too close to itself or to the workspace.
+    """
+    samples = planner.samples
+    lines = []
+    for T_flange_tip in tips:
+        clearance = Clearance(planner.kinematics.arm, T_flange_tip, planner.options)
+        result = clearance.check(samples.q, planner.state.actual_q)
+        lines += clearance_remarks(result, samples.segment, samples.fraction)
+    return list(dict.fromkeys(lines))  # two tips often have the same line
+
+
 def plan_spline_goal(
     planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose
 ) -> Plan:
     """Return the plan of a SPLINE or SERVO goal."""
     goal, state, options = planner.goal, planner.state, planner.options
-    begin = planner.begin()
-    part = (
-        goal
-        if not begin
-        else replace(goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
-    )
+    first = planner.first_target()
     found = plan_spline(
         SplineState(q=state.actual_q),
-        part,
+        replace(goal, waypoints=goal.waypoints[first:], segments=goal.segments[first:]),
         planner.kinematics.arm,
         state.T_flange_tcp,
         options,
-        first=begin,
+        first=first,
         tool_tips=tool_tips(goal, T_flange_active),
     )
     return Plan(
@@ -219,16 +206,17 @@ def plan_spline_goal(
 
 
 class GoalPlanner:
-    """The data that the stages of one goal share."""
+    """Makes the segments of one goal, and collects the remarks of its report."""
 
     def __init__(self, goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> None:
         self.goal, self.state, self.options = goal, state, options
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks: list[str] = []
-        #: By point: reasons for a primitive other than the plain one.
+        #: By point: why its primitive is not the plain one of its segment type.
         self.reasons: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
-        self.timed, self.mode = is_timed(goal), resolve_execution_mode(goal)
+        self.timed = is_timed(goal)
+        self.mode = resolve_execution_mode(goal)
         if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
             self.remarks.append(
                 'all points: sent with speeds instead of times, because robot programs of wire '
@@ -237,92 +225,37 @@ class GoalPlanner:
         self.joint_path_planner = JointPathPlanner(
             goal, self.targets, self.kinematics, options, self.remarks, self.reasons
         )
+        #: The whole joint path, sampled; set by :meth:`geometries`.
+        self.samples: PathSamples
         self._check_robot()
-
-    # -- before the first segment ----------------------------------------------------------------
-
-    def _check_robot(self) -> None:
-        """Refuse a robot whose TCP is not where the kinematics puts it, or a far first point."""
-        state = self.state
-        predicted = self.kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
-        distance = predicted.distance_to(state.actual_tcp_pose)
-        angle = predicted.angle_to(state.actual_tcp_pose)
-        if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
-            raise RobotNotReady(
-                f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
-                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; check '
-                'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
-                'field tcp_offset), the TCP has to be the flange.'
-            )
         self._check_approach()
 
-    def _check_approach(self) -> None:
-        distance = self.state.actual_tcp_pose.distance_to(self.targets[0])
-        bound = self.options.max_approach_distance
-        if 0.0 < bound < distance:
-            raise InvalidGoal(
-                point_field(0, 'pose.position'),
-                f'is {distance:.3f} m away from the tool, more '
-                f'than max_approach_distance = {bound:g} m',
-                'move closer first, add points in between, or raise the parameter',
-            )
-
-    def _is_at_first_point(self) -> bool:
+    def first_target(self) -> int:
         """
-        Tell whether the first point is at time 0, which needs no motion.
+        Return the number of the first point to which there is a motion.
 
-        :raises InvalidGoal: it is at time 0, but the robot is not there.
+        That is 1 where point 0 is at time 0, because the robot is there already.
+
+        :raises InvalidGoal: point 0 is at time 0, but the robot is elsewhere.
+        :raises InvalidPosture: point 0 is at time 0, but the arm has another posture.
         """
         if not self.timed or self.goal.waypoints[0].time != 0.0:
-            return False
-        actual, target = self.state.actual_tcp_pose, self.targets[0]
-        distance, angle = actual.distance_to(target), actual.angle_to(target)
-        options = self.options
-        if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
-            raise InvalidGoal(
-                point_field(0, 'time_from_start'),
-                f'is 0, but the tool is {distance:.4f} m and '
-                f'{angle:.4f} rad away from the point (allowed are '
-                f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
-                'rad)',
-                'give the first point a time greater than 0',
-            )
+            return 0
+        self._check_start_pose()
         self._check_start_posture()
         self.remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
-        return True
-
-    def _check_start_posture(self) -> None:
-        posture = self.goal.waypoints[0].posture
-        if posture:
-            named = named_joints(posture, self.options.tf_prefix)
-            q = self.state.actual_q
-            chosen = self.kinematics.solve_posture(
-                self.targets[0], named, q, point_field(0, 'pose')
-            )
-            # The robot is within the tolerance of the start, not exactly there.
-            near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
-            if clause := describe_miss(near, chosen, named):
-                raise InvalidPosture(
-                    f'{point_field(0, "posture")} is not the one in which the robot stands: '
-                    f'{clause}; give the first point a time greater than 0.'
-                )
-
-    def begin(self) -> int:
-        """Return the number of the first point to which there is a motion."""
-        return 1 if self._is_at_first_point() else 0
+        return 1
 
     def geometries(self) -> list[SegmentGeometry]:
         """Return the curve of every segment and the configuration in which it arrives."""
-        begin = self.begin()
-        stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
+        first = self.first_target()
+        stops = [0.0, *(point.time for point in self.goal.waypoints)][first:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
         geometries = self.joint_path_planner.geometries(
-            begin, self.state.actual_tcp_pose, self.state.actual_q, times
+            first, self.state.actual_tcp_pose, self.state.actual_q, times
         )
         self.samples = self.joint_path_planner.path_margins.samples()
         return geometries
-
-    # -- primitives ------------------------------------------------------------------------------
 
     def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
         """Return the primitive of a segment and what is expected of it."""
@@ -342,6 +275,68 @@ class GoalPlanner:
                 geometry, timing, primitive, self.reasons.get(geometry.index, ())
             ),
         )
+
+    # -- checks of the start ---------------------------------------------------------------------
+
+    def _check_robot(self) -> None:
+        """Refuse a robot whose TCP is not where the kinematics puts it."""
+        state = self.state
+        predicted = self.kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
+        distance = predicted.distance_to(state.actual_tcp_pose)
+        angle = predicted.angle_to(state.actual_tcp_pose)
+        if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
+            raise RobotNotReady(
+                f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
+                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; check '
+                'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
+                'field tcp_offset), the TCP has to be the flange.'
+            )
+
+    def _check_approach(self) -> None:
+        """Refuse a first point that is too far away."""
+        distance = self.state.actual_tcp_pose.distance_to(self.targets[0])
+        bound = self.options.max_approach_distance
+        if 0.0 < bound < distance:
+            raise InvalidGoal(
+                point_field(0, 'pose.position'),
+                f'is {distance:.3f} m away from the tool, more '
+                f'than max_approach_distance = {bound:g} m',
+                'move closer first, add points in between, or raise the parameter',
+            )
+
+    def _check_start_pose(self) -> None:
+        """Refuse a first point at time 0 at which the robot is not."""
+        actual, target = self.state.actual_tcp_pose, self.targets[0]
+        distance, angle = actual.distance_to(target), actual.angle_to(target)
+        options = self.options
+        if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
+            raise InvalidGoal(
+                point_field(0, 'time_from_start'),
+                f'is 0, but the tool is {distance:.4f} m and '
+                f'{angle:.4f} rad away from the point (allowed are '
+                f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
+                'rad)',
+                'give the first point a time greater than 0',
+            )
+
+    def _check_start_posture(self) -> None:
+        """Refuse a first point at time 0 with another posture than that of the robot."""
+        posture = self.goal.waypoints[0].posture
+        if posture:
+            named = named_joints(posture, self.options.tf_prefix)
+            q = self.state.actual_q
+            chosen = self.kinematics.solve_posture(
+                self.targets[0], named, q, point_field(0, 'pose')
+            )
+            # The robot is within the tolerance of the start, not exactly there.
+            near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
+            if clause := describe_miss(near, chosen, named):
+                raise InvalidPosture(
+                    f'{point_field(0, "posture")} is not the one in which the robot stands: '
+                    f'{clause}; give the first point a time greater than 0.'
+                )
+
+    # -- primitives ------------------------------------------------------------------------------
 
     def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
         blend = geometry.blend_after.radius if geometry.blend_after else 0.0
@@ -439,3 +434,20 @@ class GoalPlanner:
                 'configuration.'
             )
         return chosen
+
+
+@contextmanager
+def _garbage_collection_paused() -> Iterator[None]:
+    """
+    Keep the garbage collector from running.
+
+    A plan of ten thousand points is hundreds of thousands of objects. None of them becomes garbage
+    before the plan is made, but the collector would scan them again and again.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()

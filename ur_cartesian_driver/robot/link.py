@@ -17,7 +17,7 @@ the end of a goal never arrives while a lost robot still seems ready.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 import logging
 from typing import NoReturn
 
@@ -77,6 +77,7 @@ class RobotLink:
 
         :param on_state: the robot's newest state, before any status or event that follows from
             it: at READY the state is known.
+        :param on_event: what happened to the robot, for the running goal.
         :param on_status: the status changed.
         :param on_geometry: the robot reported its calibrated geometry.
         :param on_log: a line for the log, with its level.
@@ -98,16 +99,16 @@ class RobotLink:
         self.robot: RobotState | None = None
         #: Its inputs, outputs and tool; None = not reported yet.
         self.signals: Signals | None = None
-        #: The TCP that a goal had set is still to be put back.
+        #: Whether the TCP from before the last goal is still to be restored.
         self.tcp_restore_pending = False
         self._explain_timer: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(
             PrimaryCallbacks(
                 configuration=self._on_configuration,
                 geometry=self._on_kinematics,
-                error=self._robot_error,
+                error=self._on_robot_error,
                 connection_error=self._status.error,
-                text=self._robot_text,
+                text=self._on_robot_text,
             )
         )
         self.program = ProgramSockets(
@@ -139,8 +140,20 @@ class RobotLink:
         """How far the connection is."""
         return self._status.current
 
+    async def run(self) -> None:
+        """Connect, and reconnect after every loss, until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.program.keep_alive())
+            tasks.create_task(self._stay_connected())
+
+    def close(self) -> None:
+        """Close everything; the robot program stops the arm, at the latest when we hang up."""
+        if self._explain_timer is not None:
+            self._explain_timer.cancel()
+        self.program.close()
+
     def explain(self, text: str) -> None:
-        """Set the last error of the status: what has ended, and the events that led to it."""
+        """Set the last error of the status: a sentence, and the events that led to it."""
         if self._explain_timer is not None:
             self._explain_timer.cancel()
             self._explain_timer = None
@@ -170,7 +183,7 @@ class RobotLink:
         return self._primary.send(primary.encode_command(command))
 
     def set_executing(self, busy: bool) -> None:
-        """Set whether a goal runs: its keepalives are another message."""
+        """Set whether a goal runs: that changes the status and the kind of keepalive."""
         self.program.is_executing = busy
         if busy:
             self._status.apply(ConnectionEvent.GOAL_STARTED)
@@ -238,19 +251,7 @@ class RobotLink:
         """Return why no goal can run now; empty when one can."""
         return self.status.not_ready()
 
-    def close(self) -> None:
-        """Close everything; the robot program stops the arm, at the latest when we hang up."""
-        if self._explain_timer is not None:
-            self._explain_timer.cancel()
-        self.program.close()
-
-    # ---- life ---------------------------------------------------------------------------------
-
-    async def run(self) -> None:
-        """Connect, and connect again, until cancelled."""
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.program.keep_alive())
-            tasks.create_task(self._stay_connected())
+    # ---- connection ---------------------------------------------------------------------------
 
     async def _stay_connected(self) -> NoReturn:
         retry = Backoff()
@@ -271,30 +272,29 @@ class RobotLink:
         :raises OSError: the robot cannot be reached, or one of our ports is taken.
         :raises DriverError: the robot program cannot be made from the settings.
         """
-        s = self._settings
-        stream = StateStream(s.rtde_frequency, self._on_state)
+        settings = self._settings
+        stream = StateStream(settings.rtde_frequency, self._on_state)
         try:
-            self.version = await stream.open(s.robot_ip, s.rtde_port)
+            self.version = await stream.open(settings.robot_ip, settings.rtde_port)
             self._status.apply(ConnectionEvent.ROBOT_ANSWERED)
             await self._listen(stream, self.version)
             async with asyncio.TaskGroup() as tasks:
-                others = [
-                    tasks.create_task(self._primary.stay_connected(s.robot_ip, s.primary_port))
-                ]
-                if s.io_publish_rate > 0.0:
-                    others.append(
-                        tasks.create_task(
-                            SignalStream(self._on_signals, self._warn).stay_connected(
-                                s.robot_ip, s.rtde_port, s.io_publish_rate
-                            )
-                        )
-                    )
+                others = [tasks.create_task(other) for other in self._other_connections()]
                 reason = await stream.ended()
                 for task in others:
                     task.cancel()
             return reason
         finally:
             stream.close()
+
+    def _other_connections(self) -> list[Coroutine[None, None, NoReturn]]:
+        """Return the connections that last as long as the one to RTDE: primary, and signals."""
+        s = self._settings
+        connections = [self._primary.stay_connected(s.robot_ip, s.primary_port)]
+        if s.io_publish_rate > 0.0:
+            signals = SignalStream(self._on_signals, self._warn)
+            connections.append(signals.stay_connected(s.robot_ip, s.rtde_port, s.io_publish_rate))
+        return connections
 
     async def _listen(self, stream: StateStream, version: ControllerVersion) -> None:
         """Open our ports (once), and render the program with them."""
@@ -307,23 +307,24 @@ class RobotLink:
             self.program.render(s.reverse_ip or host, version)
         self._status.update(ports=self.program.ports)
 
-    # ---- what comes in ------------------------------------------------------------------------
+    # ---- callbacks of the interfaces ----------------------------------------------------------
 
     def _on_state(self, robot: RobotState) -> None:
         before, self.robot = self.robot, robot
         self._state_callback(robot)
-        if before is not None and _modes(before) == _modes(robot):
-            # The status stays as it is, so the reaction to the event, maybe a CANCEL, goes first.
+        changes = () if before is None else mode_changes(before, robot)
+        # Unless a mode changes, no status follows from the packet: then the reaction of the goal,
+        # maybe a CANCEL, goes first.
+        status_may_change = before is None or bool(changes)
+        if not status_may_change:
             self._on_event(StateReceived(state=robot))
-            self.event_log.note_report(robot)
-            self._tracker.observe(robot)
-            return
         self.event_log.note_report(robot)
-        for change in () if before is None else mode_changes(before, robot):
+        for change in changes:
             self.event_log.note(change)
         self._tracker.observe(robot)
-        self._review_state()
-        self._on_event(StateReceived(state=robot))
+        if status_may_change:
+            self._review_state()
+            self._on_event(StateReceived(state=robot))
 
     def _on_signals(self, signals: Signals) -> None:
         self.signals = signals
@@ -357,6 +358,18 @@ class RobotLink:
             self._on_geometry(geometry)
             self._status.update(calibration_known=True)
 
+    def _on_robot_error(self, text: str) -> None:
+        """Log an error that the robot reports."""
+        self.event_log.note(text, is_robot_error=True)
+        self._status.error(text)
+
+    def _on_robot_text(self, text: str) -> None:
+        """Log a line of the robot's log; lines of our program may explain an end."""
+        self._on_log(logging.INFO, f'robot: {text}')
+        program, _, said = text.partition(': ')
+        if program == PROGRAM_NAME and said:
+            self.event_log.note(f'the robot program says: {said}')
+
     def _on_program_connected(self) -> None:
         self.event_log.note('the robot program has connected')
         self._tracker.is_ending = False
@@ -379,11 +392,11 @@ class RobotLink:
         """
         Handle the loss of the robot, or a failed attempt to connect.
 
-        :param reason: of the loss, for the running goal.
-        :param status_text: the same for the status, with the interface.
+        :param reason: of the loss, for the outcome of the running goal.
+        :param status_text: the reason with the interface, for the status.
         """
         self.event_log.note(status_text)
-        changes = (
+        last_error = (
             timestamped(status_text, self.status.last_error)
             if self.robot is None
             else timestamped(f'The robot is gone. {"; ".join(self.event_log.event_chain())}.')
@@ -393,7 +406,7 @@ class RobotLink:
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
             calibration_known=False,
-            last_error=changes,
+            last_error=last_error,
             message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )
         if before is not None:
@@ -402,7 +415,7 @@ class RobotLink:
     # ---- status -------------------------------------------------------------------------------
 
     def _review_state(self) -> None:
-        """Bring the state of the connection in line with robot and program."""
+        """Derive the state of the connection from what robot and program report."""
         robot = self.robot
         if robot is None:
             return
@@ -415,7 +428,7 @@ class RobotLink:
             self._status.apply(ConnectionEvent.PROGRAM_PAUSED)
         elif not self.tcp_restore_pending:
             self._status.apply(ConnectionEvent.PROGRAM_CONNECTED)
-            if self.program.is_executing:  # after a stop that the goal has outlived
+            if self.program.is_executing:  # a stop that did not end the goal is over
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
 
     def _required_action(self, state: ConnectionState) -> str:
@@ -429,31 +442,15 @@ class RobotLink:
             foreign_program=self._tracker.foreign_program_runs(self.robot),
         )
 
-    def _robot_error(self, text: str) -> None:
-        """Log an error that the robot reports."""
-        self.event_log.note(text, is_robot_error=True)
-        self._status.error(text)
-
-    def _robot_text(self, text: str) -> None:
-        """Log a line of the robot's log; lines of our program may explain an end."""
-        self._on_log(logging.INFO, f'robot: {text}')
-        program, _, said = text.partition(': ')
-        if program == PROGRAM_NAME and said:
-            self.event_log.note(f'the robot program says: {said}')
-
     def _warn(self, text: str) -> None:
         self._on_log(logging.WARNING, text)
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
-    """Return the models that report this type: a UR7e says that it is a UR5."""
+    """Return the models that report this type; a UR7e reports that of a UR5."""
     names = [
         name
         for name, model in MODELS.items()
         if model.wire_type == robot_type and (model.series == 'CB3') == (software_major < 5)
     ]
     return names or [f'robot of the unknown type {robot_type}']
-
-
-def _modes(robot: RobotState) -> tuple[int, int, int]:
-    return robot.robot_mode, robot.safety_mode, robot.runtime_state

@@ -3,8 +3,9 @@
 """
 The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
-It never waits, and owns neither clock nor network, so it runs on a virtual clock as well. Its
-methods are called between two steps.
+:func:`~.assembly.assemble` makes one; its owner calls :meth:`Controller.step` once per cycle, and
+any other method between two steps. It never waits, and owns neither clock nor network, so it
+runs on a virtual clock as well.
 """
 
 from __future__ import annotations
@@ -48,21 +49,25 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Time from full speed to zero [s]: by the slider or a pause, and by a protective stop. Those of
-#: a real robot are not published.
-SLIDER_TIME, PROTECTIVE_STOP_TIME = 0.25, 0.1
+#: Time from full speed to zero by the slider or a pause, and by a protective stop [s]. Those of a
+#: real robot are not published.
+SLIDER_TIME = 0.25
+PROTECTIVE_STOP_TIME = 0.1
+#: How many cycles back programs can ask for joint positions.
 _MAX_HISTORY = 100
 _MAX_POPUPS = 100
+#: Error code of a protective stop (C209).
+_PROTECTIVE_STOP_CODE = 209
 
 
 class CycleFaults(Protocol):
-    """The faults of a controller, as its cycle sees them."""
+    """The faults of a controller, as far as its cycle needs them."""
 
     #: Whether there is anything to do in a cycle.
     active: bool
 
     def step(self) -> None:
-        """Let happen what is due in this cycle."""
+        """Apply what is due in this cycle."""
 
 
 class Controller:
@@ -81,6 +86,7 @@ class Controller:
         :param sockets: the sockets of programs; None = in memory, for tests.
         """
         self.config = config
+        #: Duration of a cycle [s], and how many have passed.
         self.cycle = config.cycle
         self.cycles = 0
         self.arm = Arm(config.robot_model, config.geometry)
@@ -100,6 +106,7 @@ class Controller:
         self.watchdogs = Watchdogs()
         self.popups: list[Popup] = []
         self.payload = Payload()
+        #: Acceleration that counters gravity, in the base [m/s^2].
         self.gravity: Vector3 = (0.0, 0.0, 9.82)
         self.freedrive = FreedriveState.OFF
         self.process = ProcessState()
@@ -110,17 +117,19 @@ class Controller:
         #: What `tool_contact` returns: steps back to the contact, 0 = none.
         self.contact_steps = 0
         self.remote_control = config.remote_control
-        #: The speed slider, 0..1, and the scaling at which motion runs.
+        #: The speed slider, 0..1.
         self.speed_slider = 1.0
+        #: The speed scaling at which motion runs now, 0..1; it follows slider, pauses and stops.
         self.scale = 1.0
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(make_builtins(self), self.messages, self)
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         self.messages.on_error = self._pause_if_wanted
+        #: Set by the assembly; None = nothing goes wrong.
         self.faults: CycleFaults | None = None
 
-    # State
+    # ---- state --------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -154,7 +163,7 @@ class Controller:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{_MAX_HISTORY - 1}')
         return self._joint_history[-1 - steps]
 
-    # The cycle
+    # ---- one cycle ----------------------------------------------------------------------------
 
     def step(self) -> None:
         """Compute one cycle."""
@@ -175,9 +184,9 @@ class Controller:
 
     def _change_scale(self, was_at_rest: bool) -> None:
         """
-        Move the scale towards its target, slowly enough for an arm.
+        Ramp the speed scaling towards its target, as fast as an arm can follow.
 
-        :param was_at_rest: the arm stood before this cycle, so any scale is possible at once.
+        :param was_at_rest: the arm stood before this cycle, so it needs no ramp.
         """
         paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         target = 0.0 if paused else self.speed_slider
@@ -185,14 +194,11 @@ class Controller:
             self.scale = target
             return
         stopped = self.safety.mode not in OPERATIONAL
-        change = self.cycle / (PROTECTIVE_STOP_TIME if stopped else SLIDER_TIME)
-        self.scale = (
-            max(target, self.scale - change)
-            if self.scale > target
-            else (min(target, self.scale + change))
-        )
+        step = self.cycle / (PROTECTIVE_STOP_TIME if stopped else SLIDER_TIME)
+        self.scale = min(max(target, self.scale - step), self.scale + step)
 
     def _report_motion_events(self) -> None:
+        """Send the warnings of the motion; a fault stops the robot."""
         for warning in self.motion.warnings:
             self.messages.error(warning.code, warning.argument, warning.text)
         self.motion.warnings.clear()
@@ -207,7 +213,7 @@ class Controller:
             self.programs.pause()
 
     def _watch_inputs(self) -> None:
-        """Act on inputs that an RTDE client has stopped writing."""
+        """Stop or pause the program whose RTDE client has stopped writing an input."""
         for variable, action in self.watchdogs.expired(self.time):
             self.messages.text(f'RTDE watchdog: {variable} was not written in time.')
             if action == 'stop':
@@ -215,7 +221,7 @@ class Controller:
             elif action == 'pause':
                 self.programs.pause()
 
-    # Called by the program runner
+    # ---- called by the program runner ---------------------------------------------------------
 
     def brake(self) -> None:
         """Stop hard; an arm that stands on its path, paused or at a fault, drops the path."""
@@ -240,28 +246,28 @@ class Controller:
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:
-        """Return why no program can run now, or an empty string."""
+        """Return why no program can run now; empty if one can."""
         if self.safety.mode not in OPERATIONAL:
             return f'the safety mode is {self.safety.mode.name}'
         if self.power.mode is not RobotMode.RUNNING:
             return f'the robot mode is {self.power.mode.name}, not RUNNING'
         return ''
 
-    # Commands from outside and from programs
+    # ---- commands of clients and programs -----------------------------------------------------
 
     def set_slider(self, fraction: float) -> None:
         """Set the speed slider, cut to 0..1."""
         self.speed_slider = min(1.0, max(0.0, fraction))
 
     def power_on(self) -> str:
-        """Power up to IDLE; return why not, or an empty string."""
+        """Power up to IDLE; return the reason of a refusal, else an empty string."""
         if self.safety.mode in POWERLESS:
             return f'the safety mode is {self.safety.mode.name}'
         self.power.on(self.time)
         return ''
 
     def release_brakes(self) -> str:
-        """Power up to RUNNING; return why not, or an empty string."""
+        """Power up to RUNNING; return the reason of a refusal, else an empty string."""
         if self.safety.mode in POWERLESS:
             return f'the safety mode is {self.safety.mode.name}'
         self.power.release_brakes(self.time)
@@ -275,7 +281,7 @@ class Controller:
 
     def safety_event(self, event: SafetyEvent, reported: bool = False) -> str:
         """
-        Pass an event to the safety system; return why it is refused, or an empty string.
+        Pass an event to the safety system; return the reason of a refusal, else an empty string.
 
         :param reported: the error code of the protective stop has been sent already.
         """
@@ -284,7 +290,7 @@ class Controller:
         if refusal or self.safety.mode is before:
             return refusal
         if event is SafetyEvent.PROTECTIVE_STOP and not reported:
-            self.messages.error(209, 0, 'A protective stop was triggered')
+            self.messages.error(_PROTECTIVE_STOP_CODE, 0, 'A protective stop was triggered')
         self.messages.safety_mode(self.safety.mode)
         if self.safety.mode in OPERATIONAL:
             self.motion.clear_fault()
@@ -296,8 +302,10 @@ class Controller:
 
     def watch_input(self, variable: str, frequency: float, action: str) -> None:
         """
-        Watch that an RTDE input is written at least at a rate [1/s].
+        Watch that an RTDE input is written often enough.
 
+        :param frequency: lowest rate at which it has to be written [Hz].
+        :param action: what happens to the program otherwise: pause, stop or ignore.
         :raises RuntimeException: the action does not exist.
         """
         if action not in ('pause', 'stop', 'ignore'):
@@ -305,7 +313,7 @@ class Controller:
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window; one that no program waits for is not kept when there are many."""
+        """Show a window; when there are many, one that no program waits for is not kept."""
         if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
         self.messages.popup(popup)

@@ -3,10 +3,13 @@
 """
 The state machine that takes one goal through the robot program.
 
-It gets events and the time and answers with commands; it sends nothing itself. :mod:`~.states`
-holds the table of its states and what they mean, :mod:`~.monitor` compares the packets of the
-robot with the plan, and a :class:`~.feeder.Feeder` knows what to send to the robot and what its
-answers mean.
+It sends nothing and reads no clock. The owner of the sockets calls :meth:`GoalMachine.start` once
+and then :meth:`GoalMachine.step` with every event, and carries out the commands that they return,
+until one of them is :class:`~.goal_commands.Finish`.
+
+Each event becomes a signal, the signal chooses a transition in the table of :mod:`~.states`, and
+the state that is entered gives commands. :mod:`~.monitor` compares the packets of the robot with
+the plan; a :class:`~.feeder.Feeder` knows what to send to the robot and what its answers mean.
 """
 
 from __future__ import annotations
@@ -64,7 +67,7 @@ from ur_cartesian_driver.motion.state import RobotState
 
 
 class GoalMachine:
-    """One goal on its way through the table of the states."""
+    """Takes one goal through the table of states."""
 
     def __init__(
         self, feeder: Feeder, *, feedback_period: float = 0.04, resume_after_stop: bool = False
@@ -72,38 +75,39 @@ class GoalMachine:
         """
         Prepare; nothing happens before :meth:`start`.
 
-        :param feeder: that of the goal.
+        :param feeder: sends the motion of this goal.
         :param feedback_period: time between two progress reports [s].
-        :param resume_after_stop: a protective or safeguard stop holds the goal, as a pause does,
-            until somebody unlocks the robot and plays its program.
+        :param resume_after_stop: a protective or safeguard stop pauses the goal, until somebody
+            unlocks the robot and plays its program; otherwise it ends the goal.
         """
         self.state = INITIAL_STATE
         self.feeder = feeder
-        #: The TCP that was set for this goal. Where it is not ``is_restored`` at the end, whoever
-        #: carries out the commands restores it.
+        #: The TCP that was set for this goal, if any. The owner of the sockets restores it if it
+        #: is not ``is_restored`` when the goal ends.
         self.temporary_tcp: TemporaryTcp | None = None
         self._monitor = feeder.monitor
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self._feedback_period = feedback_period
         self._next_report = -inf
         self._deadline = inf
-        #: When the controller's target has to be at the end, once the program reports that.
+        #: In SETTLING: when the controller's target has to be at the last point [s].
         self._arrival_due = inf
+        #: The outcome, as far as it is decided.
         self._code: ErrorCode | None = None
         self._text = ''
-        #: Whether the motion was begun, and whether its end was decided.
-        self._started = self._is_decided = False
+        self._has_moved = False
+        self._is_decided = False
 
     @property
     def job(self) -> MotionJob:
-        """The motion, with what was appended last."""
+        """The motion that was appended last, or the first one."""
         return self._monitor.job
 
     def start(self, packet: RobotState) -> list[GoalCommand]:
         """
-        Return the commands that start the motion, or what has to be set before it.
+        Return the commands that start the motion, or those that prepare it.
 
-        :param packet: the robot's newest one.
+        :param packet: the newest packet of the robot.
         """
         self._packet = packet
         commands = self.feeder.prepare()
@@ -112,12 +116,13 @@ class GoalMachine:
             self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, T_flange_tcp)
             commands.append(SetTemporaryTcp(T_flange_tcp=T_flange_tcp))
         elif not self.feeder.explain_not_ready(packet):
-            commands += self._apply(GoalSignal.ARMED, '', -inf)  # MOVING has no deadline
+            # No time is needed: MOVING has no deadline.
+            commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
 
     def step(self, event: Event | AppendJob, now: float) -> list[GoalCommand]:
         """
-        Return what to do after an event, or after points that were appended.
+        Return the commands that answer an event, or points that were appended.
 
         :param now: time of a steady clock [s].
         """
@@ -133,22 +138,24 @@ class GoalMachine:
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
-        brakes = signal is not None and self.state is GoalState.CANCELLING
-        if isinstance(event, StateReceived) and not brakes:
-            # A CANCEL does not wait until a report is made: that comes with the next packet.
+        # A CANCEL does not wait for a progress report: the next packet brings one.
+        sends_cancel = signal is not None and self.state is GoalState.CANCELLING
+        if isinstance(event, StateReceived) and not sends_cancel:
             commands += self._after_packet(now)
         return commands
 
     def motion_status(self) -> tuple[int, float, float]:
         """
-        Return the point that the arm is on its way to, and two times [s].
+        Return waypoint, buffered time and lag, for the recording.
 
-        Motion that the robot has yet, and how far the arm is behind; NaN = unknown.
+        :returns: the number of the point to which the arm moves; the motion time that the robot
+            has received and not yet run [s]; how far the arm is behind the newest set-point [s].
+            NaN = unknown.
         """
         return self._monitor.waypoint(), self.feeder.buffered, self.feeder.lag
 
     def end_time_of(self, records: int) -> float:
-        """Return when the first so many records are planned to end [s]."""
+        """Return when the first ``records`` records are planned to end [s]."""
         return self._monitor.records.end_time(records)
 
     def _observe(self, packet: RobotState, now: float) -> None:
@@ -194,7 +201,7 @@ class GoalMachine:
         raise TypeError(f'unknown event {event!r}')
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return what a packet of a robot that runs means in the present state."""
+        """Return what a packet means in the present state, when nothing stops the robot."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(packet, may_stand_still=self.feeder.confirms(now))
             return fault or self.feeder.supply(self.state)
@@ -220,7 +227,7 @@ class GoalMachine:
         return self.temporary_tcp is None or self.temporary_tcp.is_restored
 
     def _arrival(self, packet: RobotState, now: float) -> Meaning:
-        """Return what it means that the arm rests after the program's SUCCESS."""
+        """Return the meaning of an arm at rest after the program's SUCCESS."""
         missed = self._monitor.missed_end(packet)
         if missed and now >= self._arrival_due:
             return GoalSignal.DEVIATION, missed
@@ -230,32 +237,35 @@ class GoalMachine:
 
     def _has_not_begun(self) -> bool:
         """
-        Tell whether the program has not reported a point of this goal yet.
+        Tell whether the program runs the goal, but has not reported a point of it yet.
 
-        A CANCELED that comes then most likely answers a goal whose end was never awaited, because
-        RTDE was lost; it names no goal. It counts only if nothing begins after it.
+        A CANCELED names no goal. One that comes so early most likely answers an earlier goal,
+        whose end was never seen because RTDE was lost. So it counts only if no point begins
+        within ``EARLY_CANCELED_TIMEOUT``.
         """
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
 
     def _check_deadline(self, now: float) -> Meaning:
-        """Return what it means that the time in the present state is up."""
+        """Return the meaning of a deadline that has passed."""
         if now < self._deadline:
             return NO_MEANING
         if self.state not in RUNNING_STATES:
             return missed_deadline(self.state, self.feeder, self.temporary_tcp)
+        # Only an early CANCELED sets a deadline in these states; it counts if nothing has begun.
         self._deadline = inf
-        no_start = self._has_not_begun()
-        return RESULT_SIGNALS[TrajectoryResult.CANCELED] if no_start else NO_MEANING
+        if self._has_not_begun():
+            return RESULT_SIGNALS[TrajectoryResult.CANCELED]
+        return NO_MEANING
 
     # ---- from signals to commands -------------------------------------------------------------
 
     def _apply(self, signal: GoalSignal, text: str, now: float) -> list[GoalCommand]:
-        """Go to the state that the table names; nothing else changes it."""
+        """Take the transition of the table; nothing else changes the state."""
         transition = TRANSITIONS[self.state][signal]
         before, self.state = self.state, transition.state
         if transition.code is not None:
-            if before is GoalState.PROGRAM_LOST:  # the end of the program came of it
-                text = f'{text}; before that was heard of, {self._text}'
+            if before is GoalState.PROGRAM_LOST:  # this is why the program ended
+                text = f'{text}; before that, {self._text}'
             self._code, self._text = transition.code, text
         if self.state is before:
             return []
@@ -267,10 +277,10 @@ class GoalMachine:
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
-        """Return what is done when a state is entered, beside what the feeder sends."""
+        """Set the deadline of a state, and return the commands that are not the feeder's."""
         match state:
             case GoalState.MOVING:
-                self._deadline, self._started = inf, True
+                self._deadline, self._has_moved = inf, True
             case GoalState.AWAITING_POINTS:
                 timeout = self.feeder.append_timeout
                 self._deadline = now + timeout if timeout > 0.0 else inf
@@ -292,20 +302,29 @@ class GoalMachine:
         tolerance = self.job.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
         self._deadline = inf if tolerance < 0.0 else now + tolerance
         self._arrival_due = min(self._deadline, now + DEFAULT_GOAL_TIME_TOLERANCE)
+        if late := self._explain_late(tolerance):
+            return self._apply(GoalSignal.TIMEOUT, late, now)
+        return []
+
+    def _explain_late(self, tolerance: float) -> str:
+        """
+        Return how late the last point was reached, as a clause; empty if in time.
+
+        :param tolerance: allowed delay [s]; negative = any.
+        """
         if self.job.due is None or tolerance < 0.0:
-            return []
+            return ''
         due = self.job.due + self.feeder.start_delay
         late = self._monitor.scaled_time - due
         if late <= tolerance:
-            return []
-        text = (
+            return ''
+        return (
             f'the last point was reached {late:.3f} s after its time {due:.3f} s, '
             f'goal_time_tolerance is {tolerance:.3f} s'
         )
-        return self._apply(GoalSignal.TIMEOUT, text, now)
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
-        """Have the TCP restored; a goal that changed none is at its end."""
+        """Restore the TCP; a goal that did not change it ends at once."""
         self._is_decided = True
         if self.temporary_tcp is None:
             return self._apply(GoalSignal.RESTORED, '', now)
@@ -316,19 +335,19 @@ class GoalMachine:
         ]
 
     def _enter_ended(self, signal: GoalSignal) -> list[GoalCommand]:
-        if self._is_decided:  # nothing of the motion is left that could go on
+        if self._is_decided:  # no motion is left that could resume
             return self._finish()
         unconfirmed = signal is GoalSignal.TIMEOUT and self._code is ErrorCode.EXECUTION_FAILED
         if signal in STOP_PROGRAM_AFTER or unconfirmed:
-            # A paused program reads no socket: without this the old motion would go on when
-            # somebody unlocks the arm and plays the program.
+            # A paused program reads no socket: unless it is stopped, the old motion would resume
+            # when somebody unlocks the arm and plays the program.
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
 
     # ---- reports ------------------------------------------------------------------------------
 
     def _after_packet(self, now: float) -> list[GoalCommand]:
-        """Return what to send next and the progress to report after a packet."""
+        """Return the next points to send, and the progress report if one is due."""
         if self.state is GoalState.ENDED:
             return []
         commands = self.feeder.feed() if self.state is GoalState.MOVING else []
@@ -338,7 +357,7 @@ class GoalMachine:
         return commands
 
     def _has_progress(self) -> bool:
-        """Tell whether the newest packet is about the motion, with the TCP of the goal."""
+        """Tell whether the newest packet shows the motion, with the TCP of the goal."""
         packet, tcp = self._monitor.latest, self.temporary_tcp
         return (
             packet is not None
@@ -367,7 +386,7 @@ class GoalMachine:
         elif code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
             text = failure_text(self._text, 'at the last point')
         else:
-            text = failure_text(self._text, self.feeder.location(started=self._started))
+            text = failure_text(self._text, self.feeder.location(started=self._has_moved))
         report = (
             *tcp_report(self.temporary_tcp, self._monitor.latest),
             *self.feeder.report_lines(),
