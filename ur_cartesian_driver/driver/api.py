@@ -1,6 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The Python API: plan, execute and stop motions of one robot, with no ROS running."""
+"""
+The Python API: plan, execute and stop motions of one robot, with no ROS running.
+
+A :class:`Driver` plans in the process of its owner. A robot loop, a process or thread of its own,
+holds all sockets to the robot; the driver sends it requests and gets notifications back
+(:mod:`~.ipc.channel`).
+"""
 
 from __future__ import annotations
 
@@ -92,7 +98,16 @@ class Driver(RobotServices, InteractiveMotions):
     """
     One robot. Thread-safe; open it, or use it as a context manager.
 
-    Callbacks run on the driver's own reader thread: keep them short.
+    ::
+
+        with Driver(DriverConfig(robot_ip='192.168.56.101', ur_type='ur5e')) as driver:
+            driver.wait_ready(timeout=10.0)
+            plan = driver.plan(goal)  # raises GoalRefused; nothing moves
+            motion = driver.start(plan)  # returns at once
+            outcome = motion.result()
+
+    :meth:`execute` does the last three in one call. Callbacks run on the driver's own reader
+    thread: keep them short.
     """
 
     def __init__(
@@ -119,20 +134,21 @@ class Driver(RobotServices, InteractiveMotions):
             on_lost=self._on_loop_lost,
             reconfigure=self._reconfigure,
         )
-        #: Also guards the running motions and calls.
+        #: Guards the motions and calls that run, as well as sending.
         self._lock = self._loop.lock
         self._send = self._loop.send
-        self._status = DriverStatus()
-        self._status_listeners: list[Callable[[DriverStatus], None]] = []
-        self._ready = threading.Event()
-        self._active_motions: dict[int, ActiveMotion] = {}
-        #: The TCP that a goal has set and that is not back yet.
-        self._temporary_tcp: TemporaryTcpSet | None = None
-        self._calls: dict[int, Future[ServiceAnswer]] = {}
-        self._signals: Signals | None = None
-        self._servo_listeners: list[Callable[[ServoReport], None]] = []
-        self._gaps = LinkGaps()
+        #: Numbers of motions and calls.
         self._numbers = itertools.count(1)
+        self._active_motions: dict[int, ActiveMotion] = {}
+        self._calls: dict[int, Future[ServiceAnswer]] = {}
+        self._status = DriverStatus()
+        self._ready = threading.Event()
+        self._signals: Signals | None = None
+        self._gaps = LinkGaps()
+        self._status_listeners: list[Callable[[DriverStatus], None]] = []
+        self._servo_listeners: list[Callable[[ServoReport], None]] = []
+        #: The TCP that a goal has set, until the one before is restored.
+        self._temporary_tcp: TemporaryTcpSet | None = None
         #: Whether a loop that replaces another one may upload the robot program.
         self._may_upload = True
 
@@ -150,7 +166,7 @@ class Driver(RobotServices, InteractiveMotions):
         """Close."""
         self.close()
 
-    # ---- life ---------------------------------------------------------------------------------
+    # ---- connection ---------------------------------------------------------------------------
 
     def open(self) -> None:
         """Start the robot loop and return; it connects and reconnects by itself."""
@@ -160,15 +176,15 @@ class Driver(RobotServices, InteractiveMotions):
         """Stop a running motion and end the robot loop and all threads. May be called twice."""
         if not self._loop.close():
             return
-        # First the status, so that no motion can begin that nobody would end.
+        # The status first: it refuses new motions, which would never end.
         self._set_status(DriverStatus(message='The driver is closed; open it.'))
         self._abort_all('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Tell the robot loop that the owner is alive; see ``node_timeout``."""
+        """Tell the robot loop that the owner is alive; needed within every ``node_timeout``."""
         self._send(OwnerHeartbeat())
 
-    # ---- what is known ------------------------------------------------------------------------
+    # ---- state and status ---------------------------------------------------------------------
 
     @property
     def status(self) -> DriverStatus:
@@ -183,28 +199,24 @@ class Driver(RobotServices, InteractiveMotions):
     @property
     def rest_state(self) -> RobotState | None:
         """
-        The state in which the arm is between motions: now, or if it were stopped now.
+        The state from which the next motion starts; None as for :attr:`state`.
 
-        None as for :attr:`state`.
+        While a motion runs: the predicted state after a stop that begins now, with the TCP from
+        before that motion.
         """
         state = self.state
         if state is None:
             return None
-        with self._lock:
-            temporary_tcp = next(
-                (active.temporary_tcp for active in self._active_motions.values()),
-                self._temporary_tcp,
-            )
+        temporary_tcp = self._current_temporary_tcp()
         state = predict_stop(state, self._arm, self.config.stop_deceleration)
         if temporary_tcp is None or not same_tcp(
             state.T_flange_tcp, temporary_tcp.T_flange_temporary
         ):
             return state
+        T_flange_original = temporary_tcp.T_flange_original
+        T_temporary_original = state.T_flange_tcp.inverse() @ T_flange_original
         return replace(
-            shift_reference_point(
-                state, state.T_flange_tcp.inverse() @ temporary_tcp.T_flange_original
-            ),
-            T_flange_tcp=temporary_tcp.T_flange_original,
+            shift_reference_point(state, T_temporary_original), T_flange_tcp=T_flange_original
         )
 
     @property
@@ -214,7 +226,7 @@ class Driver(RobotServices, InteractiveMotions):
 
     @property
     def gaps(self) -> LinkGaps:
-        """The longest pauses of the connection lately."""
+        """The longest recent pauses of the connection."""
         return self._gaps
 
     @property
@@ -223,7 +235,7 @@ class Driver(RobotServices, InteractiveMotions):
         return self._arm
 
     def add_status_listener(self, callback: Callable[[DriverStatus], None]) -> None:
-        """Call back with each new status, and now with the present one."""
+        """Call back with each new status, and at once with the present one."""
         self._status_listeners.append(callback)
         callback(self._status)
 
@@ -233,9 +245,9 @@ class Driver(RobotServices, InteractiveMotions):
 
     def wait_ready(self, timeout: float) -> None:
         """
-        Wait until a goal can run.
+        Wait until a goal can run; the driver connects, and reconnects, by itself.
 
-        :raises RobotNotReady: it takes longer than ``timeout`` [s]; the text says what is needed.
+        :raises RobotNotReady: not within ``timeout`` [s]; the text says what is needed.
         """
         if not self._ready.wait(timeout):
             raise RobotNotReady(self._status.not_ready())
@@ -244,34 +256,12 @@ class Driver(RobotServices, InteractiveMotions):
 
     def plan(self, goal: Goal) -> Plan:
         """
-        Check a goal and choose its primitives, from where the arm stands now; nothing moves.
+        Check a goal and choose its primitives, starting from :attr:`rest_state`; nothing moves.
 
-        While a motion runs: from where the arm would stand if it were stopped now.
-
-        :raises GoalRefused: with the reason.
+        :raises GoalRefused: the text says why; :exc:`RobotNotReady` without a robot state.
         """
-        state = self._required(self.rest_state)
-        return plan(goal, state, self.arm, self._options(state))
-
-    def _required(self, state: RobotState | None) -> RobotState:
-        if state is None:
-            raise RobotNotReady(self._status.message or NO_STATE)
-        return state
-
-    def _options(self, state: RobotState) -> PlanningOptions:
-        """Return the options for the robot that is connected."""
-        status = self._status
-        return replace(
-            self.options,
-            calibration_known=status.calibration_known,
-            dialect=self.config.dialect,
-            # Another program may skip the command, and move the TCP that is there.
-            allow_tcp_change=self.options.allow_tcp_change
-            and self.config.dialect.supports_tcp_change,
-            optimove_known=has_feature('optimove', status.software()),
-            acceleration_known=state.actual_tcp_acceleration is not None
-            and state.target_tcp_acceleration is not None,
-        )
+        state = self._require(self.rest_state)
+        return plan(goal, state, self.arm, self._options_for(state))
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
         """
@@ -281,13 +271,126 @@ class Driver(RobotServices, InteractiveMotions):
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.goal.keep_open:
-            options = self._options(self._required(self.state))
+            options = self._options_for(self._require(self.state))
             part = plan_first_part(plan, self.arm, options)
             points, job = encode_plan(part, self.config.dialect)
             return self._start_motion(plan, points, job, on_progress, part=part)
         points = encode_points(plan.instructions, self.config.dialect)
         return self._start_motion(
             plan, points, job_from_plan(plan, self.config.dialect), on_progress
+        )
+
+    def execute(
+        self,
+        goal: Goal,
+        on_progress: OnProgress | None = None,
+        timeout: float | None = None,
+        *,
+        preempt: bool = False,
+    ) -> Outcome:
+        """
+        Plan and run a goal, and wait for its outcome; a refusal is an outcome too.
+
+        :param preempt: stop a running motion for this goal, once the goal has passed all checks
+            from where the arm would come to rest; False = refuse the goal while a motion runs.
+        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
+            arm is at rest.
+        """
+        try:
+            planned = self.plan(goal)
+            if preempt and self.preempt_motion():
+                planned = self.plan(goal)
+            motion = self.start(planned, on_progress)
+        except GoalRefused as refusal:
+            return Outcome(code=refusal.code, text=str(refusal))
+        try:
+            return motion.result(timeout)
+        except BaseException:  # also Ctrl-C: nobody waits for this motion any more
+            motion.cancel()
+            with contextlib.suppress(TimeoutError):
+                motion.result(CANCEL_TIMEOUT)  # so that the next goal finds the arm free
+            raise
+
+    def preempt_motion(self, by: str = 'a newer motion') -> bool:
+        """
+        Stop the running motion for another one, and wait until it ends as PREEMPTED.
+
+        :param by: the other motion, as part of the sentence of the outcome.
+        :returns: whether a motion ran; then plans made before its end have to be made again.
+        :raises RobotNotReady: it cannot be preempted now and goes on, or it did not end.
+        """
+        with self._lock:
+            motions = [active.motion for active in self._active_motions.values()]
+        if motions:
+            self.check_can_preempt()
+        for motion in motions:
+            motion.preempt(by)
+            try:
+                motion.result(CANCEL_TIMEOUT)
+            except TimeoutError:
+                raise RobotNotReady('The previous motion did not end.') from None
+        return bool(motions)
+
+    def check_can_preempt(self) -> None:
+        """
+        Check that a running motion can be preempted.
+
+        :raises RobotNotReady: a person guides the arm; or the robot program is paused or stopped
+            and would read neither the stop nor the next motion.
+        """
+        state = self._require(self.state)
+        if self.is_freedrive_active:
+            raise RobotNotReady('A person guides the arm by hand; end freedrive first.')
+        if is_paused(state) or is_stopped(state):
+            raise RobotNotReady(
+                'A motion is running that is paused or stopped, so no other motion can preempt '
+                'it; resume or cancel it.'
+            )
+
+    def stop(self) -> None:
+        """Cancel the running motion and return at once; nothing happens if none runs."""
+        for active in list(self._active_motions.values()):
+            active.motion.cancel()
+
+    # ---- services -----------------------------------------------------------------------------
+
+    def resend_robot_program(self) -> None:
+        """Upload the robot program again, for instance after a person stopped it."""
+        self._send(ResendProgram())
+
+    def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
+        """Start a call and return at once; the future always gets an answer, never an error."""
+        future: Future[ServiceAnswer] = Future()
+        future.set_running_or_notify_cancel()
+        with self._lock:
+            if self._loop.is_open:
+                number = next(self._numbers)
+                self._calls[number] = future
+                self._send(CallRobot(number=number, call=call))
+                return future
+        future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
+        return future
+
+    # ---- starting motions ---------------------------------------------------------------------
+
+    def _require(self, state: RobotState | None) -> RobotState:
+        if state is None:
+            raise RobotNotReady(self._status.message or NO_STATE)
+        return state
+
+    def _options_for(self, state: RobotState) -> PlanningOptions:
+        """Return the planning options, with what the connected robot supports."""
+        status = self._status
+        return replace(
+            self.options,
+            calibration_known=status.calibration_known,
+            dialect=self.config.dialect,
+            # A foreign program may skip the command, and would then move the wrong TCP.
+            allow_tcp_change=self.options.allow_tcp_change
+            and self.config.dialect.supports_tcp_change,
+            optimove_known=has_feature('optimove', status.software()),
+            acceleration_known=state.actual_tcp_acceleration is not None
+            and state.target_tcp_acceleration is not None,
         )
 
     def _start_motion(
@@ -300,7 +403,11 @@ class Driver(RobotServices, InteractiveMotions):
         freedrive: bool = False,
         part: AppendPlan | None = None,
     ) -> MotionHandle:
-        """Have the robot loop start a motion, if no other runs."""
+        """
+        Have the robot loop start a motion.
+
+        :raises RobotNotReady: the robot is not ready, or another motion runs.
+        """
         with self._lock:
             if self._active_motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
@@ -311,8 +418,8 @@ class Driver(RobotServices, InteractiveMotions):
             if part is not None:
                 motion.appender = self._make_appender(motion, part)
             self._active_motions[motion.number] = active
-            # Still under the lock: whoever finds the motion may cancel it, and that has to come
-            # behind its start.
+            # Sent under the lock: another thread may find the motion and cancel it, and the
+            # cancel has to arrive after the start.
             self._send(
                 StartMotion(
                     motion=motion.number,
@@ -328,10 +435,10 @@ class Driver(RobotServices, InteractiveMotions):
         return motion
 
     def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
-        """Return the owner's side of a goal with an open end."""
+        """Return what plans and offers the points that are appended to a goal."""
 
         def planning_inputs() -> tuple[Arm, PlanningOptions]:
-            return self.arm, self._options(self._required(self.state))
+            return self.arm, self._options_for(self._require(self.state))
 
         return Appender(
             motion.number,
@@ -360,103 +467,22 @@ class Driver(RobotServices, InteractiveMotions):
             check_target(T_base_tcp, state, self.options)
             self._send(SetLiveTarget(motion=number, T_base_tcp=T_base_tcp, age=age))
 
-    def preempt_motion(self, by: str = 'a newer motion') -> bool:
-        """
-        Stop the running motion for another one; it ends PREEMPTED. Wait until its end.
-
-        :returns: whether one ran: plans made while it ran have to be made again.
-        :raises RobotNotReady: it cannot be preempted now and goes on, or it did not end.
-        """
+    def _current_temporary_tcp(self) -> TemporaryTcpSet | None:
+        """Return the TCP of the running motion, or one that is not restored yet."""
         with self._lock:
-            motions = [active.motion for active in self._active_motions.values()]
-        if motions:
-            self.check_can_preempt()
-        for motion in motions:
-            motion.preempt(by)
-            try:
-                motion.result(CANCEL_TIMEOUT)
-            except TimeoutError:
-                raise RobotNotReady('The previous motion did not end.') from None
-        return bool(motions)
+            active = next(iter(self._active_motions.values()), None)
+            return self._temporary_tcp if active is None else active.temporary_tcp
 
-    def check_can_preempt(self) -> None:
-        """
-        Check that a running motion can be preempted.
-
-        :raises RobotNotReady: a person guides the arm; or the robot program is paused or stopped
-            and would read neither the stop nor the next motion.
-        """
-        state = self._required(self.state)
-        if self.is_freedrive_active:
-            raise RobotNotReady('A person guides the arm by hand; end freedrive first.')
-        if is_paused(state) or is_stopped(state):
-            raise RobotNotReady(
-                'A motion is running that is paused or stopped, so no other motion can preempt '
-                'it; resume or cancel it.'
-            )
-
-    def execute(
-        self,
-        goal: Goal,
-        on_progress: OnProgress | None = None,
-        timeout: float | None = None,
-        *,
-        preempt: bool = False,
-    ) -> Outcome:
-        """
-        Check, plan, run and wait; a refusal is an outcome too.
-
-        :param preempt: if a motion runs stop it for this goal, once the goal has passed all checks
-            from where the arm would come to rest; else the goal is refused while one runs.
-        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
-            arm is at rest.
-        """
-        try:
-            planned = self.plan(goal)
-            if preempt and self.preempt_motion():
-                planned = self.plan(goal)
-            motion = self.start(planned, on_progress)
-        except GoalRefused as refusal:
-            return Outcome(code=refusal.code, text=str(refusal))
-        try:
-            return motion.result(timeout)
-        except BaseException:  # also Ctrl-C: nobody waits for this motion any more
-            motion.cancel()
-            with contextlib.suppress(TimeoutError):
-                motion.result(CANCEL_TIMEOUT)  # so that the next goal finds the arm free
-            raise
-
-    def stop(self) -> None:
-        """Stop whatever moves."""
-        for active in list(self._active_motions.values()):
-            active.motion.cancel()
-
-    def resend_robot_program(self) -> None:
-        """Upload the robot program again, for instance after a person stopped it."""
-        self._send(ResendProgram())
-
-    def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
-        """Start a call and return at once; the answer always comes."""
-        future: Future[ServiceAnswer] = Future()
-        future.set_running_or_notify_cancel()
-        with self._lock:
-            if self._loop.is_open:
-                number = next(self._numbers)
-                self._calls[number] = future
-                self._send(CallRobot(number=number, call=call))
-                return future
-        future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
-        return future
-
-    # ---- inside -------------------------------------------------------------------------------
+    # ---- from the robot loop ------------------------------------------------------------------
 
     def _on_loop_lost(self) -> None:
-        self._may_upload = self._status.program_running  # one that somebody stopped stays stopped
+        # A program that somebody stopped stays stopped.
+        self._may_upload = self._status.program_running
         self._set_status(DriverStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST)))
         self._abort_all(LOOP_LOST)
 
     def _reconfigure(self) -> Configure:
-        self._abort_calls(LOOP_LOST)  # those that were made since
+        self._abort_calls(LOOP_LOST)  # calls made since the loop was lost
         return Configure(
             config=self.config, may_upload=self._may_upload, temporary_tcp=self._temporary_tcp
         )
@@ -502,13 +528,11 @@ class Driver(RobotServices, InteractiveMotions):
             active.motion.appender.answer(answer)
 
     def _update_geometry(self, geometry: DhTable) -> None:
-        """Plan with the robot's own kinematics from now on; warn of one that is far off."""
+        """Plan with the robot's calibrated kinematics from now on; warn if it is far off."""
         model = self._arm.model
         self._arm = Arm(model, geometry)
-        deviation, limit = (
-            self._arm.max_flange_distance(Arm(model)),
-            self.config.max_calibration_difference,
-        )
+        deviation = self._arm.max_flange_distance(Arm(model))
+        limit = self.config.max_calibration_difference
         if 0.0 < limit < deviation:
             LOG.warning(
                 'the calibration of the robot moves the flange by up to %.1f mm from where the '
