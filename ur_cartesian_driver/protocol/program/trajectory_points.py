@@ -35,7 +35,6 @@ from ur_cartesian_driver.motion.primitive import Instruction
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,
-    from_fixed,
     hex_text,
     INT32_MAX,
     INT32_MIN,
@@ -123,7 +122,7 @@ def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields
     words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
     scales = _scales(words[PointField.TYPE], dialect)
     return tuple(
-        word if scale == 1 else from_fixed(word, scale)  # kinds and types stay integers
+        word if scale == 1 else word / scale  # kinds and types stay integers
         for word, scale in zip(words, scales, strict=True)
     )
 
