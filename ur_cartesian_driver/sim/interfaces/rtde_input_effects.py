@@ -13,12 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.state.controller_io import (
-    REGISTER_BITS,
-    REGISTER_FLOATS,
-    REGISTER_INTEGERS,
-    Registers,
-)
+from ur_cartesian_driver.sim.state.controller_io import Registers, single_registers
 
 _DIGITAL = (
     ('standard', 'standard_digital_output'),
@@ -72,31 +67,16 @@ def _write_packed(first: int) -> Write:
     return write
 
 
-def _write_item(values: Callable[[Registers], list[Any]], i: int) -> Write:
+def _write_item(values: str, i: int) -> Write:
     def write(registers: Registers, value: Any) -> None:
-        values(registers)[i] = value
+        getattr(registers, values)[i] = value
 
     return write
 
 
-def _writers() -> dict[str, Write]:
-    """Return the function that writes each input register; values have the types of the recipe."""
-    return {
-        'input_bit_registers0_to_31': _write_packed(0),
-        'input_bit_registers32_to_63': _write_packed(32),
-        **{
-            f'input_bit_register_{i}': _write_item(lambda r: r.bits, i)
-            for i in range(64, REGISTER_BITS)
-        },
-        **{
-            f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
-            for i in range(REGISTER_INTEGERS)
-        },
-        **{
-            f'input_double_register_{i}': _write_item(lambda r: r.floats, i)
-            for i in range(REGISTER_FLOATS)
-        },
-    }
-
-
-_WRITE: Mapping[str, Write] = _writers()
+#: What writes each input register; values have the types of the recipe.
+_WRITE: Mapping[str, Write] = {
+    'input_bit_registers0_to_31': _write_packed(0),
+    'input_bit_registers32_to_63': _write_packed(32),
+    **{name: _write_item(values, i) for name, values, i in single_registers('input')},
+}

@@ -26,10 +26,8 @@ from ur_cartesian_driver.sim.motion.point_motion import (
 )
 from ur_cartesian_driver.sim.state.controller_io import (
     pack_bits,
-    REGISTER_BITS,
-    REGISTER_FLOATS,
-    REGISTER_INTEGERS,
     Registers,
+    single_registers,
 )
 
 Getter = Callable[['Controller'], Any]
@@ -190,27 +188,16 @@ FIXED: Mapping[str, Any] = MappingProxyType(
 )
 
 
-def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
+def _register_getters(direction: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
     """Return the function that reads each register of one direction."""
 
-    def item(values: Callable[[Controller], list[Any]], i: int) -> Getter:
-        return lambda controller: values(controller)[i]
+    def item(values: str, i: int) -> Getter:
+        return lambda controller: getattr(of(controller), values)[i]
 
     return {
-        f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
-        f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
-        **{
-            f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i)
-            for i in range(64, REGISTER_BITS)
-        },
-        **{
-            f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
-            for i in range(REGISTER_INTEGERS)
-        },
-        **{
-            f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i)
-            for i in range(REGISTER_FLOATS)
-        },
+        f'{direction}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
+        f'{direction}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
+        **{name: item(values, i) for name, values, i in single_registers(direction)},
     }
 
 

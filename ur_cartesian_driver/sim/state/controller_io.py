@@ -9,6 +9,7 @@ the robot's manual: bit 0-127, integer and float 0-47.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from ur_cartesian_driver.motion.vectors import Vector6
@@ -17,6 +18,22 @@ REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
 #: Port addresses, which Modbus clients of a real robot share with its programs.
 PORTS = 256
+
+
+#: Registers that RTDE transfers one by one: their type there, their list, their numbers. It
+#: packs the bits before them into integers.
+_SINGLE_REGISTERS = (
+    ('bit', 'bits', range(64, REGISTER_BITS)),
+    ('int', 'integers', range(REGISTER_INTEGERS)),
+    ('double', 'floats', range(REGISTER_FLOATS)),
+)
+
+
+def single_registers(direction: str) -> Iterator[tuple[str, str, int]]:
+    """Yield RTDE name, list in :class:`Registers` and number of the single registers."""
+    for kind, values, numbers in _SINGLE_REGISTERS:
+        for i in numbers:
+            yield f'{direction}_{kind}_register_{i}', values, i
 
 
 def pack_bits(bits: list[bool]) -> int:
