@@ -17,7 +17,7 @@ from ur_cartesian_driver.protocol.framing import (
     from_fixed,
     hex_text,
     LineBuffer,
-    RecordBuffer,
+    RecordDecoder,
     to_fixed,
 )
 
@@ -70,7 +70,7 @@ def frames():
     return FrameBuffer(2, 3, 100, 'test frame')
 
 
-BUFFERS = [lambda: RecordBuffer(4, 'record'), frames, lambda: LineBuffer(50)]
+BUFFERS = [lambda: RecordDecoder(4, 'record', bytes), frames, lambda: LineBuffer(50)]
 STREAMS = [b'abcdefgh', b'\x00\x03a\x00\x05abc\x00\x03z', b'one\r\ntwo\n\n']
 
 

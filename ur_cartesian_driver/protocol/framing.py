@@ -98,36 +98,6 @@ def checked_size(data: bytes, size: int, what: str) -> bytes:
     return data
 
 
-class RecordBuffer:
-    """Cuts a stream into records of one size."""
-
-    def __init__(self, size: int, what: str) -> None:
-        """
-        Start empty.
-
-        :param size: bytes in a record.
-        :param what: what a record is, for error texts.
-        """
-        self._size = size
-        self._what = what
-        self._rest = b''
-
-    def feed(self, data: bytes) -> list[bytes]:
-        """
-        Take bytes from the stream (none at all = its end) and return the complete records.
-
-        :raises RemoteProtocolError: the stream ended inside a record.
-        """
-        if not data:
-            if self._rest:
-                raise truncated_stream(self._what, self._rest)
-            return []
-        data = self._rest + data
-        end = len(data) - len(data) % self._size
-        self._rest = data[end:]
-        return [data[i : i + self._size] for i in range(0, end, self._size)]
-
-
 class RecordDecoder(Generic[T]):
     """Decodes a stream of records of one size."""
 
@@ -139,8 +109,10 @@ class RecordDecoder(Generic[T]):
         :param what: what a record is, for error texts.
         :param decode: turns one record into a message.
         """
-        self._records = RecordBuffer(size, what)
+        self._size = size
+        self._what = what
         self._decode = decode
+        self._rest = b''
 
     def feed(self, data: bytes) -> list[T]:
         """
@@ -148,7 +120,14 @@ class RecordDecoder(Generic[T]):
 
         :raises RemoteProtocolError: a message is wrong, or the stream ended inside one.
         """
-        return [self._decode(record) for record in self._records.feed(data)]
+        if not data:
+            if self._rest:
+                raise truncated_stream(self._what, self._rest)
+            return []
+        data = self._rest + data
+        end = len(data) - len(data) % self._size
+        self._rest = data[end:]
+        return [self._decode(data[i : i + self._size]) for i in range(0, end, self._size)]
 
 
 class ResultDecoder(RecordDecoder[E]):

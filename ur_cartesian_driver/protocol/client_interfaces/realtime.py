@@ -19,7 +19,6 @@ From the manufacturer's public tables of the client interfaces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from itertools import accumulate
 import struct
@@ -27,7 +26,7 @@ from typing import cast, Final
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
-from ur_cartesian_driver.protocol.framing import hex_text
+from ur_cartesian_driver.protocol.framing import FrameBuffer, hex_text
 
 #: Size of the packet [bytes] from a version (major, minor) on, oldest first.
 _PACKET_SIZES: Final = (
@@ -155,30 +154,24 @@ def decode_packet(data: bytes) -> RealtimeData:
 
 
 class RealtimeDecoder:
-    """Cuts a stream into packets."""
+    """Decodes what the controller sends."""
 
     def __init__(self) -> None:
         """Start empty."""
-        self._rest = b''
+        self._frames = FrameBuffer(
+            size_width=_SIZE.size,
+            min_size=min(PACKET_SIZES),
+            max_size=4 * max(PACKET_SIZES),
+            what='real-time packet',
+        )
 
-    def feed(self, data: bytes) -> Iterator[RealtimeData]:
+    def feed(self, data: bytes) -> list[RealtimeData]:
         """
-        Yield the packets that are complete.
+        Take bytes from the controller (none at all = its end) and return the packets in them.
 
-        :raises RemoteProtocolError: a size is impossible.
+        :raises RemoteProtocolError: a size is impossible, or the stream ended inside a packet.
         """
-        self._rest += data
-        while len(self._rest) >= _SIZE.size:
-            size = _SIZE.unpack_from(self._rest)[0]
-            if not min(PACKET_SIZES) <= size <= 4 * max(PACKET_SIZES):
-                raise RemoteProtocolError(
-                    f'The size of a real-time packet is given as {size} bytes: '
-                    f'{hex_text(self._rest)}.'
-                )
-            if len(self._rest) < size:
-                return
-            packet, self._rest = self._rest[:size], self._rest[size:]
-            yield decode_packet(packet)
+        return [decode_packet(packet) for packet in self._frames.feed(data)]
 
 
 def _flat(value: float | tuple[float, ...]) -> tuple[float, ...]:

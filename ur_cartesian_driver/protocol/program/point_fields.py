@@ -63,7 +63,7 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
@@ -275,22 +275,22 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> I
 def _spline(fields: Sequence[float]) -> Spline:
     kind = _enum_member(SplineKind, fields[19], 'spline kind (word 19)')
     return Spline(
-        target=_vector(fields[:6]),
-        velocities=_vector(fields[6:12]),
-        accelerations=_vector(fields[12:18]) if kind is SplineKind.QUINTIC else None,
+        target=vector6(fields[:6]),
+        velocities=vector6(fields[6:12]),
+        accelerations=vector6(fields[12:18]) if kind is SplineKind.QUINTIC else None,
         duration=fields[18],
     )
 
 
 def _output(fields: Sequence[float]) -> SwitchOutput:
-    trigger_pose = Pose.from_rotation_vector(_vector(fields[:6])) if fields[16] else None
+    trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None
     return SwitchOutput(
         output=_enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
         pin=int(fields[13]),
         value=fields[14],
         domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
         trigger_pose=trigger_pose,
-        trigger_direction=_vector(fields[6:12]),
+        trigger_direction=vector6(fields[6:12]),
         starts_beyond=bool(fields[17]),
         delay=fields[18],
     )
@@ -314,7 +314,7 @@ def _move(fields: Sequence[float], kind: MotionType, dialect: Dialect) -> Primit
     duration = {'duration': fields[18]} if cls in (MoveJ, MoveL) else {}
     return cast(type[MoveJ], cls)(
         target=_target(fields[:6], bool(is_pose)),
-        q_near=_vector(fields[6:12]) if is_pose and dialect.has_q_near(fields) else None,
+        q_near=vector6(fields[6:12]) if is_pose and dialect.has_q_near(fields) else None,
         velocity=fields[velocity_word],
         acceleration=fields[acceleration_word],
         blend_radius=fields[19],
@@ -383,13 +383,8 @@ def _numbers(target: Target) -> Vector6:
 
 
 def _target(numbers: Sequence[float], is_pose: bool) -> Target:
-    vector = _vector(numbers)
+    vector = vector6(numbers)
     return Pose.from_rotation_vector(vector) if is_pose else vector
-
-
-def _vector(numbers: Sequence[float]) -> Vector6:
-    a, b, c, d, e, f = numbers
-    return (a, b, c, d, e, f)
 
 
 def _enum_member(enum: type[_E], number: float, what: str) -> _E:
