@@ -170,25 +170,20 @@ def _bytes(value: Value, interpret_escape: Value) -> bytes:
     return raw.decode('unicode_escape').encode('latin-1', 'replace') if interpret_escape else raw
 
 
-def _exactly(size: int) -> Callable[[bytearray], bytes | None]:
-    def take(received: bytearray) -> bytes | None:
-        if len(received) < size:
-            return None
-        data = bytes(received[:size])
-        del received[:size]
-        return data
+def _take(received: bytearray, size: int) -> bytes:
+    data = bytes(received[:size])
+    del received[:size]
+    return data
 
-    return take
+
+def _exactly(size: int) -> Callable[[bytearray], bytes | None]:
+    return lambda received: None if len(received) < size else _take(received, size)
 
 
 def _through(end: bytes) -> Callable[[bytearray], bytes | None]:
     def take(received: bytearray) -> bytes | None:
         at = received.find(end)
-        if at < 0:
-            return None
-        data = bytes(received[: at + len(end)])
-        del received[: at + len(end)]
-        return data
+        return None if at < 0 else _take(received, at + len(end))
 
     return take
 
@@ -200,10 +195,6 @@ def _between(before: bytes, after: bytes) -> Callable[[bytearray], bytes | None]
             return None
         start += len(before)
         end = received.find(after, start) if after else min(len(received), start + MAX_CHARACTERS)
-        if end < 0:
-            return None
-        data = bytes(received[start:end])
-        del received[: end + len(after)]
-        return data
+        return None if end < 0 else _take(received, end + len(after))[start:end]
 
     return take

@@ -111,7 +111,7 @@ class ImpairedSockets:
 
     def _pump(self, name: str, impaired: ImpairedConnection) -> None:
         arrived = self._arrived[name]
-        if impaired.incoming_size < _MAX_INCOMING and (incoming := self._sockets.received(name)):
+        if impaired.incoming.size < _MAX_INCOMING and (incoming := self._sockets.received(name)):
             impaired.queue_incoming(bytes(incoming), self._now)
             incoming.clear()
         arrived += impaired.due_incoming(self._now)

@@ -94,17 +94,8 @@ class ImpairedConnection:
         """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
-        self._incoming, self._outgoing = DelayLine(now), DelayLine(now)
-
-    @property
-    def outgoing_size(self) -> int:
-        """Bytes of the robot that have not left."""
-        return self._outgoing.size
-
-    @property
-    def incoming_size(self) -> int:
-        """Bytes of the client that have not reached the robot."""
-        return self._incoming.size
+        #: What holds back the bytes from the client, and those of the robot.
+        self.incoming, self.outgoing = DelayLine(now), DelayLine(now)
 
     @property
     def is_over(self) -> bool:
@@ -112,28 +103,28 @@ class ImpairedConnection:
         return (
             self.impairment is None
             and not self.frozen
-            and not self._incoming.size
-            and not self._outgoing.size
+            and not self.incoming.size
+            and not self.outgoing.size
         )
 
     def queue_outgoing(self, data: bytes, now: float) -> None:
         """Take bytes from the robot."""
         drops_outgoing = self.impairment is not None and self.impairment.drops_outgoing
         if not self.frozen and not drops_outgoing:
-            self._outgoing.put(data, now + self._delay)
+            self.outgoing.put(data, now + self._delay)
 
     def queue_incoming(self, data: bytes, now: float) -> None:
         """Take bytes from the client."""
         if not self.frozen:
-            self._incoming.put(data, now + self._delay)
+            self.incoming.put(data, now + self._delay)
 
     def due_incoming(self, now: float) -> bytes:
         """Return the bytes that reach the robot now."""
-        return self._incoming.take(*self._release_terms(now))
+        return self.incoming.take(*self._release_terms(now))
 
     def due_outgoing(self, now: float) -> bytes:
         """Return the bytes that leave the robot now."""
-        return self._outgoing.take(*self._release_terms(now))
+        return self.outgoing.take(*self._release_terms(now))
 
     @property
     def _delay(self) -> float:

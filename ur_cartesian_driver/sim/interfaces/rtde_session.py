@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import floor
 
-from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.protocol.rtde.rtde_server import (
@@ -27,8 +26,8 @@ class _OutputSchedule:
     def __init__(self, output: OutputStream, maximum: float) -> None:
         self._recipe: Recipe = output.recipe
         self._getters = [
-            output_getter(name, _zero(data_type))
-            for name, data_type in zip(output.recipe.names, output.recipe.types, strict=True)
+            output_getter(name, zero)
+            for name, zero in zip(output.recipe.names, output.recipe.zeros(), strict=True)
         ]
         self._ratio = output.frequency / maximum
 
@@ -81,7 +80,3 @@ class RtdeSession(ClientSession):
             for stream in self._streams:
                 if stream.is_due(self._controller.cycles):
                     yield stream.package(self._controller)
-
-
-def _zero(data_type: DataType) -> float | tuple[float, ...]:
-    return 0 if data_type.length == 1 else (0,) * data_type.length

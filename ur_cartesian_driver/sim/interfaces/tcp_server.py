@@ -83,7 +83,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._handle_incoming(data)
         else:
             self._impaired.queue_incoming(data, self._server.now)
-            self._transport_reading(self._impaired.incoming_size < MAX_UNREAD_BYTES)
+            self._transport_reading(self._impaired.incoming.size < MAX_UNREAD_BYTES)
 
     def _transport_reading(self, wanted: bool) -> None:
         """Pause reading when too much is held back, so that the client has to wait."""
@@ -105,7 +105,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._hang_up()
 
     def _hang_up(self) -> None:
-        if self._impaired is not None and self._impaired.outgoing_size:
+        if self._impaired is not None and self._impaired.outgoing.size:
             self._closing_after_send = True
         elif self._transport is not None:
             self._transport.close()
@@ -116,7 +116,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._send(data)
             return
         self._impaired.queue_outgoing(data, self._server.now)
-        if self._impaired.outgoing_size > MAX_UNREAD_BYTES:
+        if self._impaired.outgoing.size > MAX_UNREAD_BYTES:
             self._drop_unread()
 
     def _send(self, data: bytes) -> None:
@@ -152,9 +152,9 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             return False
         if data := impaired.due_incoming(now):
             self._handle_incoming(data)
-        self._transport_reading(impaired.incoming_size < MAX_UNREAD_BYTES)
+        self._transport_reading(impaired.incoming.size < MAX_UNREAD_BYTES)
         self._send(impaired.due_outgoing(now))
-        if self._closing_after_send and not impaired.outgoing_size:
+        if self._closing_after_send and not impaired.outgoing.size:
             self._closing_after_send = False
             self._hang_up()
         if impaired.is_over:
@@ -269,8 +269,7 @@ class TcpServer(Generic[S]):
             return
         self.closing = True
         self._server.close()
-        for connection in tuple(self.connections):
-            connection.abort()
+        self.drop()
         await asyncio.sleep(0)  # the loop reports an abort in its next turn
         await self._server.wait_closed()
         self._server = None
