@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From joint positions to the flange: one arm, nominal or as its calibration says.
+Forward kinematics and Jacobian of one arm, nominal or calibrated.
 
-Poses come one at a time (each control cycle, each step of an iteration) or by the ten thousand (a
-sampled path). The same formulas serve both: they are written for numbers and given floats or
-arrays, so that there is one forward kinematics and not two that may differ. No matrices: a float
-costs a few hundredths of a microsecond, a small array a hundred times that.
+Callers need one pose (each control cycle, each step of an iteration) or ten thousand (a sampled
+path). The same formulas take floats or arrays, so the two cases cannot differ. They use no
+matrices: a float operation takes a few hundredths of a microsecond, a small array a hundred times
+that.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
-#: A number: one pose's, or one for each pose of a batch.
+#: A float for one pose, or an array with one value per pose of a batch.
 N = TypeVar('N', float, NDArray[np.float64])
 
-# Controllers report pi/2 as 1.570796327. Tables that differ from the nominal one by such rounding
-# alone (here: less than a nanometre at the flange) are the nominal one.
+# Controllers report pi/2 as 1.570796327. A table that differs from the nominal one only by such
+# rounding (less than a nanometre at the flange) counts as nominal.
 _ROUNDING = 1e-9
-# Configurations in which two arms are compared.
+# Number of configurations in which two arms are compared.
 _COMPARED_SAMPLES = 500
 
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """What of a row of the DH table does not depend on the joint position."""
+    """The constant values of one DH row."""
 
     theta: float
     d: float
@@ -47,12 +47,12 @@ class _Link:
 
 @dataclass(frozen=True, slots=True)
 class ChainFramesOf(Generic[N]):
-    """Where the joints and the flange are, in base axes: of one row or of each of a batch."""
+    """Joint axes and flange frame in base, of one configuration or of a batch."""
 
     #: Origin [m] and direction of each joint's axis.
     origins: tuple[tuple[N, N, N], ...]
     axes: tuple[tuple[N, N, N], ...]
-    #: The flange: origin [m] and the directions of its axes x, y, z.
+    #: Flange origin [m] and the directions of its axes x, y, z.
     position: tuple[N, N, N]
     x: tuple[N, N, N]
     y: tuple[N, N, N]
@@ -66,9 +66,8 @@ class Arm:
     """
     The kinematics of one arm. Immutable.
 
-    :param model: which robot it is.
-    :param geometry: its own table, from the robot's kinematics information; None = the nominal
-        one.
+    :param model: the robot model.
+    :param geometry: calibrated DH table from the robot's kinematics information; None = nominal.
     """
 
     def __init__(self, model: RobotModel, geometry: DhTable | None = None) -> None:
@@ -77,13 +76,13 @@ class Arm:
             geometry = model.geometry
         self.model = model
         self.geometry = geometry
-        #: Whether the geometry is another than the model's.
+        #: Whether the geometry differs from the nominal one.
         self.calibrated = geometry is not model.geometry
         self._links = _links(geometry)
         self._links_from_flange = self._links[::-1]
 
     def __repr__(self) -> str:
-        """Name the model and tell whether it is calibrated."""
+        """Show the model and whether the arm is calibrated."""
         return f'<Arm {self.model.name}{", calibrated" if self.calibrated else ""}>'
 
     def forward(self, q: Sequence[float]) -> Pose:
@@ -102,7 +101,7 @@ class Arm:
 
     def forward_rows(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Return ``T_base_flange`` of many joint positions.
+        Return ``T_base_flange`` for rows of joint positions.
 
         :param q: (n, 6) [rad].
         :returns: (n, 7) x y z [m], unit quaternion x y z w with w >= 0.
@@ -118,10 +117,10 @@ class Arm:
 
     def max_flange_distance(self, other: Arm) -> float:
         """
-        Return the largest distance of the two flanges at the same joint positions [m].
+        Return the largest distance between the two flanges at equal joint positions [m].
 
-        Of many drawn configurations, always the same ones. The tables themselves cannot be
-        compared: lengths of a calibrated arm may be off by metres that cancel each other.
+        It is taken over a fixed set of random configurations. Comparing the tables would not do:
+        lengths of a calibrated arm may differ by metres that cancel each other.
         """
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_COMPARED_SAMPLES, 6))
         distances = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
@@ -150,7 +149,7 @@ class Arm:
         )
 
     def frames_rows(self, q: NDArray[np.float64]) -> ChainFramesOf[NDArray[np.float64]]:
-        """Return the same for many joint positions (n, 6); each number is an array (n,)."""
+        """Return the frames for joint positions (n, 6); each value is an array (n,)."""
         angles = np.ascontiguousarray(q.T) + np.array(self.geometry.theta)[:, None]
         return self._frames(
             list(zip(np.cos(angles), np.sin(angles), strict=True)),
@@ -159,7 +158,7 @@ class Arm:
         )
 
     def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> ChainFramesOf[N]:
-        """Walk along the links, from the cosine and the sine of each joint."""
+        """Chain the links, given cosine and sine of each joint angle."""
         px = py = pz = zero
         xx, xy, xz = one, zero, zero
         yx, yy, yz = zero, one, zero
@@ -186,9 +185,9 @@ class Arm:
 
 def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
     """
-    Return the Jacobian (6, 6) of a point of the last link [m], all in base axes.
+    Return the Jacobian of a point [m] fixed to the last link, in base axes.
 
-    :returns: (6, 6); of frames of n rows (n, 6, 6).
+    :returns: (6, 6), or (n, 6, 6) for frames of n rows.
     """
     x, y, z = point
     columns = []
@@ -202,7 +201,7 @@ def pinocchio_model(arm: Arm) -> Any:
     """
     Return the arm as a ``pinocchio.Model`` with the frame ``tool0`` at the flange.
 
-    The universe is ``base``, the joints are called as in :data:`JOINT_NAMES`.
+    The universe frame is ``base``; the joints have the names of :data:`JOINT_NAMES`.
 
     :raises ImportError: pinocchio is not installed.
     """
@@ -258,18 +257,18 @@ def _prepend_link(
     link: _Link, s: N, c: N, x: N, y: N, z: N, qx: N, qy: N, qz: N, qw: N
 ) -> _State[N]:
     """
-    Put a link before a pose: Rz(theta + q) Tz(d) Tx(a) Rx(alpha) * pose.
+    Return Rz(theta + q) Tz(d) Tx(a) Rx(alpha) * pose.
 
     :param s: sine of half the angle theta + q.
     :param c: its cosine.
-    :returns: the pose x y z, quaternion x y z w.
+    :returns: position x y z, quaternion x y z w.
     """
-    # Rx(alpha): the point, and the quaternion (sin, 0, 0, cos) times the pose's.
+    # Rx(alpha): rotate the position; multiply (sin, 0, 0, cos) by the pose's quaternion.
     y, z = link.cos_alpha * y - link.sin_alpha * z, link.sin_alpha * y + link.cos_alpha * z
     sa, ca = link.sin_half_alpha, link.cos_half_alpha
     qx, qy, qz, qw = ca * qx + sa * qw, ca * qy - sa * qz, ca * qz + sa * qy, ca * qw - sa * qx
     x, z = x + link.a, z + link.d
-    # Rz(theta + q): the same about z, with the double angle for the point.
+    # Rz(theta + q): the same about z; the position needs the full angle.
     sin_theta, cos_theta = 2.0 * s * c, 1.0 - 2.0 * s * s
     return (
         cos_theta * x - sin_theta * y,

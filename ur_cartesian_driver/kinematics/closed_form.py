@@ -1,15 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The inverse kinematics of an ideal arm in closed form.
+Closed-form inverse kinematics of an ideal arm.
 
-It exists because the axes 2, 3 and 4 are parallel. Along these axes one sees shoulder, elbow and
-wrist 1 as a plane triangle; from above, the wrist centre stays at the distance d4 from the
-shoulder. That leaves two shoulders, two wrists and two elbows: up to eight solutions.
+It exists because axes 2, 3 and 4 are parallel. Seen along them, shoulder, elbow and wrist 1 form a
+plane triangle; seen from above, the wrist centre is at distance d4 from the plane through axis 1
+that is parallel to the arm. This leaves two choices each for shoulder, wrist and elbow: up to
+eight solutions.
 
-All roots are of differences of squares and all angles come from atan2, so that nothing is lost
-where two solutions meet (stretched arm, upright arm, wrist centre above the shoulder); arc cosines
-would lose half of the digits there.
+All roots are of differences of squares and all angles come from atan2. This keeps full precision
+where two solutions meet (stretched arm, upright arm, wrist centre above the shoulder), where an
+arc cosine would lose half of the digits.
 """
 
 from __future__ import annotations
@@ -23,26 +24,26 @@ from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import Vector3
 
-# A square this far below zero counts as zero [m^2]: the flange lies a nanometre out of reach, as
-# the poses do that a robot rounds when it reports its own stretched arm.
+# A square this little below zero counts as zero [m^2]: the flange is a nanometre out of reach, as
+# happens when a robot rounds the pose of its own stretched arm.
 FLANGE_ROUNDING = 1e-9
-# Two roots this close are one [m^2]: their joint positions differ by about a microradian.
+# Squares below this count as a double root [m^2]: the joints differ by about a microradian.
 MERGED_ROOTS = 1e-13
-# Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
+# Sine of wrist 2 below which axes 4 and 6 are parallel and only the sum of their angles counts.
 WRIST_SINGULAR = 2e-10
-# How many times the misfit wrist 3 must be off the axis of wrist 1 for its direction to count.
+# Wrist 3 gets its angle from the pose only where s5 * d5 exceeds this many times the misfit.
 _MAX_WRIST_MISFIT = 10.0
 
 
 class WristSolution(NamedTuple):
-    """A shoulder and a wrist that fit the pose; the elbow is still open."""
+    """A shoulder and wrist solution of a pose, without the elbow."""
 
     theta1: float
     theta5: float
     theta6: float
     #: theta2 + theta3 + theta4.
     theta234: float
-    #: Where wrist 1 is from the shoulder, in the plane of the arm: outward and up [m].
+    #: Position of wrist 1 relative to the shoulder, in the plane of the arm [m].
     outward: float
     up: float
 
@@ -53,9 +54,9 @@ def closed_form(
     """
     Return every joint solution [rad], each angle within (-pi, pi].
 
-    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line.
-    :param doubt: how many times its misfit the shape may be wrong. The real arm may reach where
-        the ideal one does not; there both roots are returned, as guesses.
+    :param wrist_3: position of wrist 3 where axes 4 and 6 are parallel [rad].
+    :param misfit_factor: how many times its misfit the ideal arm may be wrong. The real arm may
+        reach poses that the ideal one does not; for these, both roots are returned as guesses.
     """
     o1, o2, o3, o4, o5, o6 = ideal.offsets
     slack = root_slack(ideal, misfit_factor)
@@ -74,13 +75,13 @@ def closed_form(
 
 
 def root_slack(ideal: IdealArm, misfit_factor: float) -> float:
-    """Return by how much a square in the roots is uncertain [m^2]."""
+    """Return the uncertainty of the squares under the roots [m^2]."""
     # (r + dr)^2 - r^2 is about 2 r dr.
     return misfit_factor * 2.0 * ideal.misfit * abs(ideal.a2 + ideal.a3)
 
 
 def wrist_centre(ideal: IdealArm, T_base_flange: Pose) -> Vector3:
-    """Return the point where the axes 5 and 6 meet, from the shoulder [m]."""
+    """Return the point where axes 5 and 6 meet, relative to the shoulder [m]."""
     x, y, z, w = T_base_flange.quaternion
     px, py, pz = T_base_flange.position
     d6 = ideal.d6
@@ -94,7 +95,7 @@ def wrist_centre(ideal: IdealArm, T_base_flange: Pose) -> Vector3:
 def wrist_solutions(
     ideal: IdealArm, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
 ) -> Iterator[WristSolution]:
-    """Solve for all but the elbow: two shoulders, each with two wrists."""
+    """Solve for two shoulders, each with two wrists; the elbow stays open."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
     px, py, pz = wrist_centre(ideal, T_base_flange)
     d4, d5 = ideal.d4, ideal.d5
@@ -103,10 +104,10 @@ def wrist_solutions(
         s1, c1 = d4 * px + outward * py, outward * px - d4 * py
         length = hypot(s1, c1)
         theta1, s1, c1 = atan2(s1, c1), s1 / length, c1 / length
-        # The axes of the flange along axis 2, which is (s1, -c1, 0).
+        # Components of the flange axes along axis 2, which is (s1, -c1, 0).
         along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
         for theta5, theta6 in _wrist_angles(ideal, along_x, along_y, c5, theta6_if_singular):
-            # The axis y of frame 5 is that of the flange before theta6; axis 5 is opposite to it.
+            # Axis y of frame 5 is the flange's y axis before theta6; axis 5 is opposite to it.
             s6, c6 = sin(theta6), cos(theta6)
             s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             c234 = s6 * r31 + c6 * r32
@@ -118,13 +119,13 @@ def wrist_solutions(
 def _wrist_angles(
     ideal: IdealArm, along_x: float, along_y: float, c5: float, theta6_if_singular: float
 ) -> list[tuple[float, float]]:
-    """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
+    """Return theta5 and theta6 from the flange axes' components along axis 2."""
     s5 = hypot(along_x, along_y)
     theta5, theta6 = atan2(s5, c5), atan2(-along_y, along_x)
     if s5 < WRIST_SINGULAR:
         return [(theta5, theta6_if_singular)]
     angles = [(theta5, theta6), (-theta5, theta6 + pi)]
-    if s5 * ideal.d5 < _MAX_WRIST_MISFIT * ideal.misfit:  # then theta6 may be anything
+    if s5 * ideal.d5 < _MAX_WRIST_MISFIT * ideal.misfit:  # theta6 is undetermined
         angles += [(theta5, theta6 + 0.5 * pi), (theta5, theta6 - 0.5 * pi)]
     return angles
 
@@ -132,11 +133,11 @@ def _wrist_angles(
 def _elbow_angles(
     ideal: IdealArm, outward: float, up: float, slack: float
 ) -> list[tuple[float, float]]:
-    """Solve the triangle of upper arm, forearm and the way to wrist 1: theta2, theta3."""
+    """Return theta2 and theta3 from the triangle of shoulder, elbow and wrist 1."""
     a2, a3 = ideal.a2, ideal.a3
     square = outward * outward + up * up
-    # The law of cosines for half the angle, tan(theta3 / 2)^2 = (1 - cos) / (1 + cos): what the
-    # square lacks to the stretched arm's over what it exceeds the folded arm's by.
+    # Law of cosines for half the angle, tan(theta3 / 2)^2 = (1 - cos) / (1 + cos), which is
+    # ((a2 + a3)^2 - square) / (square - (a2 - a3)^2).
     folds = _roots(square - (a2 - a3) ** 2, slack)
     if not folds:
         return []
@@ -146,13 +147,13 @@ def _elbow_angles(
         theta3 = 2.0 * atan2(stretched, folded)
         theta2 = direction - atan2(a3 * sin(theta3), a2 + a3 * cos(theta3))
         elbows.append((theta2, theta3))
-        if folded == 0.0:  # pi and -pi are one elbow
+        if folded == 0.0:  # pi and -pi are the same elbow
             break
     return elbows
 
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:
-    """Return the square roots, the positive one first; both also where slack decides."""
+    """Return both roots, positive first; slack turns a slightly negative square positive."""
     if square < -max(slack, FLANGE_ROUNDING):
         return ()
     square = max(square, 0.25 * slack)

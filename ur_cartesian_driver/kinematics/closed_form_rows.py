@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The closed form for many poses at once, one branch at a time.
+Closed-form inverse kinematics of many poses, for one branch at a time.
 
-The formulas are those of :mod:`~.closed_form`. There each root of one pose is found in turn; here
-the three choices (shoulder, elbow, wrist) are given as signs and all poses are solved for them.
-The same three quantities whose signs are the choices vanish where the arm is singular, so that a
-:class:`Posture` is both the name of a branch and its distance from its twin.
+The formulas are those of :mod:`~.closed_form`, which finds all solutions of one pose. Here the
+three choices (shoulder, elbow, wrist) are given as signs, and all poses are solved for them. The
+quantities with these signs are zero where the arm is singular, so :class:`BranchMeasures` both
+identifies a branch and measures its distance from a singularity.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ BRANCHES = tuple(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BranchMeasures:
     """
-    Of each row, three signed measures: the sign is the branch, 0 is the singularity.
+    Three signed measures per row: the signs are the branch, zero is a singularity.
 
-    Those of a calibrated arm are of the ideal arm that is most like it: exact to its misfit.
+    For a calibrated arm they are those of its ideal arm, exact to the misfit.
     """
 
-    #: How far the wrist centre is in front of the plane of the axes 1 and 2 [m]. The centre is
-    #: that far outside of the cylinder about the axis 1 that it cannot enter, by Pythagoras:
-    #: its distance from the axis is hypot(d4, shoulder).
+    #: Distance of the wrist centre in front of the plane of axes 1 and 2 [m]. The centre cannot
+    #: enter the cylinder of radius d4 about axis 1: its distance from axis 1 is
+    #: hypot(d4, shoulder).
     shoulder: Floats
     #: sin theta3: 0 where the arm is stretched or folded.
     elbow: Floats
-    #: sin theta5: 0 where the axes 4 and 6 are parallel.
+    #: sin theta5: 0 where axes 4 and 6 are parallel.
     wrist: Floats
 
     @property
     def branch(self) -> NDArray[np.int64]:
-        """The number of the branch, 0 to 7; see :data:`BRANCHES`."""
+        """Branch number, 0 to 7, an index of :data:`BRANCHES`."""
         return (4 * (self.shoulder < 0) + 2 * (self.elbow < 0) + (self.wrist < 0)).astype(np.int64)
 
 
@@ -65,7 +65,7 @@ class TargetPoses:
 
     @classmethod
     def of(cls, poses: Floats) -> TargetPoses:
-        """Take rows (n, 7): x y z [m], unit quaternion x y z w."""
+        """Convert rows (n, 7): x y z [m], unit quaternion x y z w."""
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
         return cls(
             (px, py, pz),
@@ -83,20 +83,20 @@ class TargetPoses:
         )
 
     def rows(self, index: NDArray[np.int64]) -> TargetPoses:
-        """Return some of the rows."""
+        """Return the poses at these indices."""
         px, py, pz = (p[index] for p in self.position)
         return TargetPoses((px, py, pz), tuple(r[index] for r in self.rotation))
 
 
 @dataclass(frozen=True, slots=True)
 class BranchSolution:
-    """One branch of many poses."""
+    """The solutions of many poses in one branch."""
 
-    #: (6, n) angles [rad], not wrapped; meaningless where it does not exist.
+    #: (6, n) joint positions [rad], not wrapped; undefined where ``exists`` is false.
     q: Floats
-    #: (n,) whether the pose has this branch; of two that meet it has both.
+    #: (n,) whether the pose has a solution in this branch; where two branches meet, in both.
     exists: Flags
-    #: (n,) no other branch is nearer than this [rad], full turns not counted.
+    #: (n,) lower bound of the distance to the other branches, modulo full turns [rad].
     separation: Floats
 
 
@@ -119,9 +119,9 @@ def branch_rows(
     ideal: IdealArm, targets: TargetPoses, signs: tuple[int, int, int]
 ) -> BranchSolution:
     """
-    Solve all poses for one branch; wrist 3 shows 0 where the axes 4 and 6 are one line.
+    Solve all poses for one branch; wrist 3 is 0 where axes 4 and 6 are parallel.
 
-    :param signs: of shoulder, elbow and wrist.
+    :param signs: signs of shoulder, elbow and wrist.
     """
     shoulder, elbow, wrist = signs
     pan = _pan(ideal, targets, shoulder)
@@ -141,7 +141,7 @@ def branch_rows(
     return BranchSolution(
         theta - np.array(ideal.offsets)[:, None],
         pan.exists & lift.exists,
-        # The twin of the wrist has theta6 + pi, whatever its elbow and if its shoulder is this.
+        # With the same shoulder, the other wrist has theta6 + pi, so it is never the nearest.
         np.minimum(np.minimum(elbow_separation, tau - elbow_separation), pan.separation),
     )
 
@@ -233,5 +233,5 @@ def _lift(ideal: IdealArm, flip: _Flip, sign: int) -> _Lift:
 
 
 def _root(square: Floats) -> tuple[Floats, Flags]:
-    """Return the root that is not negative, and whether there is one."""
+    """Return the non-negative root, and whether it exists."""
     return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), square >= -FLANGE_ROUNDING

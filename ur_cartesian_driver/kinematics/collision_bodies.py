@@ -1,21 +1,21 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Collision bodies of the arm: every link as a few cylinders, for many configurations at once.
+Collision bodies of the arm: a few cylinders per link, for many configurations at once.
 
 A preflight checks tens of thousands of configurations for collisions with itself and planes.
-Cylinders in capsules (all points within a radius of a segment) answer that in numpy for every
-model. They contain the true shape, so what they clear is clear; what they do not clear may still
-be, and :mod:`~.collision_meshes` tells exactly for the models whose meshes there are.
+Cylinders inside capsules (all points within a radius of a segment) allow this in numpy for every
+model. They contain the true shape: if they do not collide, the arm does not. If they do, the arm
+may still be free; :mod:`~.collision_meshes` decides exactly for the models that have meshes.
 
 The DH table has one lateral length, d4, which is the sum of three: the upper arm lies beside the
 axis of joint 1 by the *shoulder offset* s, the forearm by the *elbow offset* e, and wrist 1 ends
 at d4. All joint housings are cylinders about their own joint's axis, and all tubes run from axis
-to axis; so each end of a body is a place on an axis, and a calibrated arm needs no other table.
+to axis. So each end of a body is a point on an axis, and calibrated arms use the same table.
 
 Sources. Radii and lengths of the housings: measured on the collision meshes of UR3, UR5 and UR10
-in the package example-robot-data (:data:`_SIZES`); a test proves that these cylinders contain
-them, but for the plug of the cable at the base. e-Series arms have the joints of the CB3 arm of
+in the package example-robot-data (:data:`_SIZES`); a test checks that these cylinders contain
+them, except the cable connector at the base. e-Series arms have the joints of the CB3 arm of
 the same size. The larger ones are a UR10's scaled by the footprints of the data sheets (190 mm;
 UR15 and its relatives 204 mm, UR20 and UR30 245 mm). s and e: the offsets in the configuration
 files of the ROS 2 description package of Universal Robots, but for the UR15 and its relatives, for
@@ -42,7 +42,7 @@ Floats: TypeAlias = NDArray[np.float64]
 
 
 class Link(IntEnum):
-    """What moves as one: link i is behind joint i."""
+    """The rigid bodies of the arm; joint i moves link i."""
 
     BASE = 0
     SHOULDER = 1
@@ -54,7 +54,7 @@ class Link(IntEnum):
     TOOL = 7
 
     def __str__(self) -> str:
-        """Return the name in a sentence."""
+        """Return the name for messages."""
         return self.name.lower().replace('_', ' ')
 
 
@@ -63,30 +63,30 @@ class HousingSizes:
     """
     The housings of one size of arm [m].
 
-    ``_in`` and ``_out`` are how far a housing goes along its axis: towards the link before it
-    (where the two meet) and away from it, from the tube's axis or, at the wrists, from the next
-    joint's.
+    ``_in`` and ``_out`` are the extents of a housing along its joint's axis, towards the previous
+    link (where the two meet) and away from it. They count from the axis of the tube or, at the
+    wrists, from the axis of the next joint.
     """
 
     base_radius: float
     shoulder_radius: float
     shoulder_below: float
     shoulder_above: float
-    #: Both ends of the upper arm, from its tube.
+    #: Both ends of the upper arm, counted from its tube.
     upper_shoulder_in: float
     upper_shoulder_out: float
     upper_elbow_radius: float
     upper_elbow_in: float
     upper_elbow_out: float
     upper_tube: float
-    #: Both ends of the forearm, from its tube.
+    #: Both ends of the forearm, counted from its tube.
     elbow_radius: float
     elbow_in: float
     elbow_out: float
     fore_tube: float
     fore_wrist_in: float
     fore_wrist_out: float
-    #: Wrists 1 and 2 are alike: a housing about the joint behind, one about the joint in front.
+    #: Wrists 1 and 2 are alike: one housing about the previous joint, one about the next.
     wrist_radius: float
     wrist_in: float
     wrist_out: float
@@ -179,7 +179,7 @@ _UR10 = HousingSizes(
 _UR15 = _UR10.scaled(204 / 190)
 _UR20 = _UR10.scaled(245 / 190)
 
-#: Of each model: its housings, shoulder offset and elbow offset [m].
+#: Housings, shoulder offset and elbow offset [m] of each model.
 _SIZES: Mapping[str, tuple[HousingSizes, float, float]] = MappingProxyType(
     {
         'ur3': (_UR3, 0.1198, 0.0273),
@@ -199,25 +199,24 @@ _SIZES: Mapping[str, tuple[HousingSizes, float, float]] = MappingProxyType(
     }
 )
 
-# The base of the UR5 goes a little below its frame [m].
+# The base of the UR5 extends a little below its frame [m].
 _BASE_BOTTOM = -0.0035
-# Where links meet one reaches a little into the other [m].
+# Overlap of two links where they meet [m].
 _OVERLAP = 0.002
-# A capsule with the axis of a cylinder sticks out by its radius at both ends. One that is 1.1
-# times as thick may be shorter, and sticks out by 0.64 of it.
+# A capsule on the whole axis of a cylinder sticks out by its radius at both ends. With 1.1 times
+# the radius its segment can be shorter, and it sticks out by only 0.64 of the cylinder's radius.
 _RADIUS_FACTOR = 1.1
 _END_FACTOR = (_RADIUS_FACTOR**2 - 1.0) ** 0.5
-# Rows whose distances are computed together: their numbers stay in the cache.
+# Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 256
-# Squared sine of the angle below which segments count as parallel: an error of 1e-6 of a length.
+# Segments count as parallel below this squared sine of their angle: error 1e-6 of a length.
 _PARALLEL = 1e-12
 _TINY = 1e-300
 
-#: Pairs of links that are checked. Left out are neighbours, which share a joint that turns freely,
-#: and those that turn past each other whatever the joints do, as the tests show with the meshes:
-#: base and upper arm (only joint 2 matters), forearm and wrist 2 (which wrist 3 reaches before),
-#: wrist 1 and wrist 3 (which are d5 apart). Also wrist 2 and the tool, which stands on wrist 3 and
-#: only turns about its axis.
+#: Pairs of links that are checked. Neighbours share a joint that turns freely and are left out, as
+#: are pairs that cannot collide, which the tests show with the meshes: base and upper arm (only
+#: joint 2 matters), forearm and wrist 2 (wrist 3 collides first), wrist 1 and wrist 3 (d5 apart).
+#: Wrist 2 and tool are left out because the tool only turns about the axis of wrist 3.
 PAIRS: tuple[tuple[Link, Link], ...] = tuple(
     (a, b)
     for a in Link
@@ -235,13 +234,13 @@ PAIRS: tuple[tuple[Link, Link], ...] = tuple(
 
 @dataclass(frozen=True, slots=True)
 class _LinkCylinder:
-    """A cylinder between two places on axes: the axis (0..5) and how far along it [m]."""
+    """A cylinder between two points, each given by an axis (0..5) and a distance along it [m]."""
 
     link: Link
     start: tuple[int, float]
     end: tuple[int, float]
     radius: float
-    #: Whether its ends lie inside housings, so that caps on them add nothing.
+    #: Whether its ends lie inside housings, so that the capsule's caps add nothing.
     tube: bool = False
 
 
@@ -250,12 +249,12 @@ class CollisionBodies:
     The cylinders of one arm and its tool. Immutable.
 
     :param arm: nominal or calibrated.
-    :param T_flange_tcp: where the tool ends.
+    :param T_flange_tcp: the TCP, where the tool ends.
     :param tool_radius: radius of a cylinder from the flange to the TCP [m]; 0 = no tool.
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose = IDENTITY, tool_radius: float = 0.0) -> None:
-        """Prepare the places of all ends on their axes."""
+        """Compute the positions of all ends on their axes."""
         self.arm, self._tcp = arm, T_flange_tcp.position
         bodies = _link_cylinders(arm)
         self._ends_on_axes = _ends_on_axes(arm, bodies)
@@ -274,10 +273,10 @@ class CollisionBodies:
 
     def distances(self, q: Floats) -> Floats:
         """
-        Return how far the links of each of :attr:`pairs` are apart at least.
+        Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
         :param q: (n, 6) [rad].
-        :returns: (n, pairs) between their capsules [m]; negative where these overlap.
+        :returns: (n, pairs) distance of their capsules [m]; negative where these overlap.
         """
         result = np.empty((len(q), len(self.pairs)))
         sums = (self.capsule_radii[self._first] + self.capsule_radii[self._second])[:, None]
@@ -295,11 +294,11 @@ class CollisionBodies:
 
     def heights(self, q: Floats, normals: Floats) -> Floats:
         """
-        Return the lowest point of every cylinder in some directions.
+        Return the height of each cylinder's lowest point along each normal.
 
         :param q: (n, 6) [rad].
         :param normals: (m, 3) unit vectors in base.
-        :returns: (n, m, k): least normal . point of the cylinder [m].
+        :returns: (n, m, k): minimum of normal . point over cylinder k [m].
         """
         result = np.empty((len(q), len(normals), len(self.links)))
         for begin in range(0, len(q), _BLOCK):
@@ -315,7 +314,7 @@ class CollisionBodies:
         return result
 
     def _ends(self, frames: ChainFramesOf[Floats]) -> Floats:
-        """Return both ends of every cylinder, coordinates and rows last: (2, 3, k, n)."""
+        """Return both ends of every cylinder, (2 ends, 3 coordinates, k cylinders, n rows)."""
         origins, axes = np.array(frames.origins), np.array(frames.axes)  # (6, 3, n)
         index, along = self._ends_on_axes
         ends = origins[index] + along[:, :, None, None] * axes[index]  # (2, k, 3, n)
@@ -330,7 +329,7 @@ class CollisionBodies:
         return ordered
 
     def _capsules(self, ends: Floats) -> tuple[Floats, Floats]:
-        """Return the start of each capsule's segment and the way to its end, each (3, k, n)."""
+        """Return start and vector of each capsule's segment, each (3, k, n)."""
         start, end = ends
         vector = end - start
         cut = self._cut[:, None]
@@ -341,12 +340,12 @@ def segment_distance(
     start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Floats
 ) -> Floats:
     """
-    Return the distance of segments; parallel ones and points are segments too.
+    Return the distances of pairs of segments, which may be parallel or points.
 
     The minimum of a convex quadratic form over the unit square (Ericson, Real-Time Collision
     Detection, 5.1.9).
 
-    :param start_1: (3, ...) [m]; the segment goes from there by ``way_1``.
+    :param start_1: (3, ...) [m]; the segment ends at ``start_1 + vector_1``.
     """
     r = start_1 - start_2
     a, e = _dot(vector_1, vector_1), _dot(vector_2, vector_2)
@@ -367,7 +366,7 @@ def _dot(u: Floats, v: Floats) -> Floats:
 
 
 def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
-    """Return the cylinders of a model, by the joint axes that they lie on."""
+    """Return the cylinders of the arm's model."""
     g = arm.model.geometry
     d1, d4, d5, d6 = g.d[0], *g.d[3:]
     z, s, e = _SIZES[arm.model.name]
@@ -411,11 +410,11 @@ def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
 
 def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.intp], Floats]:
     """
-    Return axis and place of both ends of each body, (2, k) each.
+    Return the axis and the distance along it of both ends of each body, (2, k) each.
 
-    The origin of a calibrated table lies anywhere on its axis, hundreds of metres away where
-    axes are nearly parallel. With all joints at 0 the true axis is next to the nominal one; the
-    foot of the nominal origin on it is where the bodies count from.
+    The origin of a calibrated DH frame can lie anywhere on its axis, hundreds of metres away
+    where axes are nearly parallel. With all joints at 0 the true axis is close to the nominal
+    one, so distances count from the projection of the nominal origin onto the true axis.
     """
     ends = [[body.start for body in bodies], [body.end for body in bodies]]
     index = np.array([[axis for axis, _ in row] for row in ends], dtype=np.intp)
@@ -426,7 +425,7 @@ def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.int
 
 
 def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
-    """Return the part of a cylinder's axis to cut off at each end, and its capsule's radius."""
+    """Return the fraction of the axis cut off at each end, and the radius of the capsule."""
     (axis, begin), (other, end) = body.start, body.end
     if body.tube or axis != other:
         return 0.0, body.radius
@@ -439,7 +438,7 @@ def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
 def _pair_indices(
     links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Return the bodies to compare, first and second, and where each pair of links begins."""
+    """Return first and second body of each comparison, and the first index per pair of links."""
     first: list[int] = []
     second: list[int] = []
     begins: list[int] = []

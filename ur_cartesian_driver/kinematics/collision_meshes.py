@@ -3,13 +3,13 @@
 """
 Exact distances between the links of a UR3, UR5 or UR10, from the manufacturer's meshes.
 
-The meshes are those of the package example-robot-data, pinocchio measures between them. Both are
+The meshes come from the package example-robot-data; pinocchio computes the distances. Both are
 optional; without them the capsules of :mod:`~.collision_bodies` decide. e-Series arms have
-another shape, so they have no meshes here.
+a different shape, so there are no meshes for them.
 
-The meshes are put on the axes of our own kinematics, so that a calibrated arm carries them where
-its links really are: with all joints at 0 every mesh stands where the robot description puts it,
-and from there it moves with its joint.
+The meshes follow the axes of our own kinematics, so those of a calibrated arm are where its links
+really are: with all joints at 0 each mesh has its pose from the robot description, and moves with
+its joint from there.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from ur_cartesian_driver.kinematics.collision_bodies import Link
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 
-#: The models that have meshes.
+#: Models that have meshes.
 MODELS_WITH_MESHES = ('ur3', 'ur5', 'ur10')
 
 _DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
-#: In the robot description, by link.
+#: Frame names in the robot description, in the order of the links.
 _FRAMES = (
     'base_link',
     'shoulder_link',
@@ -46,11 +46,11 @@ _FRAMES = (
 
 
 class CollisionMeshes:
-    """The meshes of one arm, on its axes. Not for two threads at once."""
+    """The meshes of one arm, attached to its joints. Not thread-safe."""
 
     def __init__(self, arm: Arm) -> None:
         """
-        Load the meshes and put them on the axes.
+        Load the meshes and attach them to the joints.
 
         :raises ValueError: the model has none.
         :raises ImportError: pinocchio is not installed.
@@ -81,7 +81,7 @@ class CollisionMeshes:
 
     @classmethod
     def of(cls, arm: Arm) -> CollisionMeshes | None:
-        """Return the meshes of an arm, None where there are none or what they need is missing."""
+        """Return the meshes of an arm; None if it has none or a package is missing."""
         if arm.model.name not in MODELS_WITH_MESHES:
             return None
         try:
@@ -91,7 +91,7 @@ class CollisionMeshes:
 
     def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
         """
-        Return how far two links are apart.
+        Return the distance of two links.
 
         :param pair: the lower link first.
         :param q: (n, 6) [rad].
@@ -111,7 +111,7 @@ class CollisionMeshes:
         """
         Return where two links are nearer than a bound [m]; several times faster than distances.
 
-        :returns: (n,) whether they are, and (n,) a lower bound of the distance where not [m].
+        :returns: (n,) whether they are, and (n,) a lower bound of the distance if not [m].
         """
         index = self._pairs[pair]
         self._placement.collisionRequests[index].security_margin = bound
@@ -119,7 +119,7 @@ class CollisionMeshes:
         for row, joints in enumerate(q):
             self._update_placement(joints)
             near[row] = self._pinocchio.computeCollision(self._geometry, self._placement, index)
-            # It counts from the bound.
+            # Pinocchio counts it from the security margin.
             lower_bounds[row] = bound + max(
                 0.0, self._placement.collisionResults[index].distance_lower_bound
             )
@@ -133,7 +133,7 @@ class CollisionMeshes:
 
 @lru_cache
 def _load_meshes(name: str) -> list[tuple[Any, Any]]:
-    """Return shape and place (in base, all joints at 0) of each link's mesh."""
+    """Return shape and pose (in base, all joints at 0) of each link's mesh."""
     import pinocchio
 
     share = _find_share()
@@ -162,7 +162,7 @@ def _find_share() -> Path:
     """
     Return the directory that holds example-robot-data.
 
-    :raises FileNotFoundError: there is none.
+    :raises FileNotFoundError: it is not installed.
     """
     for share in _share_candidates():
         if (share / _DESCRIPTION).is_dir():

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Velocities and accelerations of tool and joints, in rows: one from the other.
+Convert velocities and accelerations between TCP and joints, in rows.
 
 With the twist V and the joint velocities q', V = J q' and V' = J q'' + J' q'. The last term is the
-acceleration that the tool has while all joints turn evenly; it is added up along the arm.
+acceleration of the TCP at constant joint velocities; it is summed up along the arm.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ur_cartesian_driver.motion.pose import Pose
 
 Floats = NDArray[np.float64]
 
-# Far below the least singular value of an arm that may move.
+# Far below the smallest singular value at which the arm may move.
 _MIN_SINGULAR_VALUE = 1e-12
 
 
 class _Jacobians(NamedTuple):
-    """Of rows of joint positions: frames, Jacobians (n, 6, 6), and the TCP (3, n) [m]."""
+    """Frames, Jacobians (n, 6, 6) and TCP positions (3, n) [m] of n configurations."""
 
     frames: ChainFramesOf[Floats]
     jacobian: Floats
@@ -35,14 +35,14 @@ def joint_rates(
     arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, acceleration: Floats
 ) -> tuple[Floats, Floats]:
     """
-    Return joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) that move the TCP so.
+    Return the joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) of a TCP motion.
 
-    :param q: (n, 6) [rad]; beside a singularity the joints get as fast as it takes.
+    :param q: (n, 6) [rad]; near a singularity joint velocities are not limited.
     :param twist: (n, 6) of the TCP in base axes [m/s], [rad/s].
     :param acceleration: (n, 6) [m/s^2], [rad/s^2].
     """
     at = _jacobians(arm, T_flange_tcp, q)
-    # An arm that leaves a singularity at rest shall not be divided by zero.
+    # Avoid a division by zero for an arm at rest in a singularity.
     inverse = np.linalg.inv(at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6))
     qd: Floats = (inverse @ twist[:, :, None])[:, :, 0]
     rest = acceleration - _bias_acceleration(at, qd)
@@ -52,7 +52,7 @@ def joint_rates(
 def tool_rates(
     arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
 ) -> tuple[Floats, Floats]:
-    """Return twist and acceleration (n, 6) of the TCP in base axes; as :func:`joint_rates`."""
+    """Return twist and acceleration (n, 6) of the TCP; the inverse of :func:`joint_rates`."""
     at = _jacobians(arm, T_flange_tcp, q)
     twist: Floats = (at.jacobian @ qd[:, :, None])[:, :, 0]
     return twist, (at.jacobian @ qdd[:, :, None])[:, :, 0] + _bias_acceleration(at, qd)
@@ -73,10 +73,10 @@ def _jacobians(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Jacobians:
 
 def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
     """
-    Return J' q' (n, 6): the acceleration of the TCP while the joint velocities stay.
+    Return J' q' (n, 6): the acceleration of the TCP at constant joint velocities.
 
-    From link to link: an axis that is carried by w turns the velocity about it, w x (z q'), and a
-    point r farther out is accelerated by e x r + w x (w x r).
+    From link to link: a link that turns with w adds the angular acceleration w x (z q') of the
+    joint it carries, and a point at r from the joint is accelerated by e x r + w x (w x r).
     """
     origins, axes = np.array(at.frames.origins), np.array(at.frames.axes)  # (6, 3, n)
     w, e, a = np.zeros((3, 3, len(qd)))
@@ -90,7 +90,7 @@ def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Return the products of vectors (3, n); numpy's own takes twenty times as long for few."""
+    """Return cross products (3, n); numpy.cross takes twenty times as long for small n."""
     return np.stack(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )

@@ -1,14 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The ideal arm that is most like a given one: where the closed form of the inverse can begin.
+Fit an ideal arm to a calibrated one, as a start for the closed-form inverse kinematics.
 
-The closed form needs axes that are exactly parallel or perpendicular, which those of a calibrated
-arm are not. Its DH table does not show directly how close they come: the axes of the shoulder
-lift, the elbow and wrist 1 are so nearly parallel that their common normals may lie metres away,
-so that d2, d3 and d4 are large and cancel, and theta 2 to 4 mean little one by one. Therefore the
-ideal arm is fitted to where the flange really goes: six lengths and six joint offsets by least
-squares.
+The closed form needs axes that are exactly parallel or perpendicular; those of a calibrated arm
+are not. The ideal lengths cannot be read from the calibrated DH table: the axes of shoulder lift,
+elbow and wrist 1 are so nearly parallel that their common normals may lie metres away. Then d2, d3
+and d4 are large and cancel, and theta 2 to 4 mean little one by one. So the ideal arm is fitted to
+the flange poses of the real one: six lengths and six joint offsets, by least squares.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _ITERATIONS = 5
 
 @dataclass(frozen=True, slots=True)
 class IdealArm:
-    """Lengths [m] of an ideal arm, and what its joints show more than the real ones [rad]."""
+    """Lengths [m] of an ideal arm, and its joint positions minus the real arm's [rad]."""
 
     d1: float
     a2: float
@@ -45,13 +44,13 @@ class IdealArm:
     d5: float
     d6: float
     offsets: Vector6
-    #: How far from there the real flange is, root mean square [m]; 0 for a nominal arm.
+    #: RMS distance between real and ideal flange [m]; 0 for a nominal arm.
     misfit: float
 
 
 @lru_cache(maxsize=64)
 def ideal_arm_of(arm: Arm) -> IdealArm:
-    """Return the ideal arm most like this one; for a nominal arm that is the arm itself."""
+    """Return the ideal arm that fits this one best; a nominal arm is its own ideal arm."""
     lengths = _nominal_lengths(arm)
     offsets = np.zeros(6)
     misfit = 0.0
@@ -70,7 +69,7 @@ def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:
 def _fit(
     arm: Arm, lengths: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Gauss-Newton over samples spread through the joint space; linear but for the last digits."""
+    """Fit by Gauss-Newton over samples of the joint space; the problem is nearly linear."""
     samples = np.random.default_rng(1).uniform(-np.pi, np.pi, (_SAMPLES, 6))
     targets = [arm.forward(q) for q in samples]
     offsets = np.zeros(6)
@@ -99,7 +98,7 @@ def _arm_with_lengths(arm: Arm, lengths: NDArray[np.float64]) -> Arm:
 
 def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
     """
-    Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the six joint positions.
+    Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the joint positions.
 
     A length d moves the flange along its joint's axis. A length a moves it along the link: the
     origins of links 2 and 3 lie on it.
@@ -118,7 +117,7 @@ def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
 
 
 def _twist(T_base_from: Pose, T_base_to: Pose) -> NDArray[np.float64]:
-    """Return the way from one pose to another: translation, rotation vector, both in base."""
+    """Return translation and rotation vector between two poses, both in base."""
     turn = rotation_vector_from_quaternion(
         multiply(T_base_to.quaternion, conjugate(T_base_from.quaternion))
     )

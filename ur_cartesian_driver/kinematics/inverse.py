@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From the flange to joint positions: every solution, or the one that is nearest to another.
+Inverse kinematics of one pose: every solution, or the one nearest to a configuration.
 
-An ideal arm has a closed form. A calibrated arm has none: there each solution of the ideal arm
-most like it is the start of a Newton iteration on the real one.
+An ideal arm has a closed form, a calibrated arm has none. For the latter, each solution of its
+ideal arm is the start of a Newton iteration on the real one.
 """
 
 from __future__ import annotations
@@ -29,53 +29,53 @@ from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import Vector3, vector6
 
-# How far a position may lie outside its limit by rounding [rad].
+# Rounding by which a position may exceed its limit [rad].
 _LIMIT_ROUNDING = 1e-9
 
-# How many times its misfit, a mean, the ideal arm is taken to be wrong; the second if the first
-# leads to nothing, which happens where two singularities meet.
+# How many times its misfit (an RMS value) the ideal arm may be wrong. The second factor is tried
+# if the first finds no solution, which happens where two singularities meet.
 MISFIT_FACTORS = (3.0, 30.0)
 
-# Newton: the sum of the squares of metres and radians that counts as exact; the number of steps,
-# of steps that may fail to halve the error, and the longest of a joint [rad].
+# Newton: squared error (metres and radians) that counts as exact, maximum number of steps, number
+# of steps that may fail to halve the squared error, and largest joint step [rad].
 _EXACT = 1e-24
 _MAX_STEPS = 40
 _MAX_FAILURES = 12
 _MAX_JOINT_STEP = 0.5
-#: The least damping, which keeps the normal equations of a singular arm solvable and slows no
-#: other down.
+#: Minimum damping: keeps the normal equations of a singular arm solvable and does not slow down
+#: the convergence of others.
 MIN_DAMPING = 1e-14
-# A least singular value of the Jacobian below which solutions may meet close by, the sine of
-# theta5 the same, the farthest twin that is looked for [rad], and the step of a derivative [rad].
+# Smallest singular value of the Jacobian, and sine of theta5, below which another solution may be
+# close; largest distance of a twin that is searched [rad]; step of the derivative [rad].
 _NEARLY_SINGULAR = 0.05
 _NEARLY_STRAIGHT = 0.1
 _MAX_TWIN_DISTANCE = 0.6
 _DIFFERENCE = 1e-4
-# Two refined solutions closer than this are one [rad].
+# Two refined solutions closer than this are the same [rad].
 _SAME = 1e-5
-# How near to the pose a seed must be to be a start of its own [m, rad].
+# A seed whose pose is this near to the goal pose is one more start [m, rad].
 _NEAR_POSE = 0.1
-# With a solution this near [rad] no other one is looked for around the seed.
+# If a solution is this near to the seed [rad], the search ends.
 _CLOSE_TO_SEED = 0.02
-# A start that is farther by this than the best refined solution cannot win [rad]: refinement
-# moves it by the calibration, some hundredths, unless the arm is singular there.
+# A start farther from the seed than the best refined solution plus this is skipped [rad]:
+# refinement moves a start by a few hundredths, unless the arm is singular there.
 _PRUNING_MARGIN = 0.5
 
-# Solutions this close in the named joints are equally near [rad]: branches that agree in a joint
-# of the ideal arm differ by a few milliradians in it in a calibrated one.
+# Solutions this close in the named joints count as equally near [rad]: branches that agree in a
+# joint of the ideal arm differ by a few milliradians in that joint of a calibrated one.
 _EQUALLY_NEAR = 0.01
 
 
 def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list[Joints]:
     """
-    Return every joint solution [rad], each angle within (-pi, pi], whatever the limits are.
+    Return every joint solution [rad], each angle within (-pi, pi], ignoring joint limits.
 
-    Of a calibrated arm a solution may be missed where two singularities meet, within some degrees
-    of both, and rarely within half a degree of a straight wrist, since the ideal arm says little
-    about the real one there; not the one next to the seed. There may also be more than eight.
+    For a calibrated arm, solutions may be missing within some degrees of two singularities at
+    once, and rarely within half a degree of a straight wrist, because the ideal arm is a poor
+    start there. The solution next to the seed is never missing. There may be more than eight.
 
-    :param seed: where the axes of wrist 1 and wrist 3 are one line, wrist 3 is taken from here
-        (else it is 0). For a calibrated arm a seed near the pose is one more start of the search.
+    :param seed: position of wrist 3 where the axes of wrist 1 and wrist 3 are parallel (default
+        0). For a calibrated arm, a seed near the pose is one more start of the search.
     """
     wrist_3 = 0.0 if seed is None else seed[5]
     if not arm.calibrated:
@@ -93,7 +93,7 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     """
     Return the solution nearest to ``q_near`` [rad] within the limits, or None.
 
-    Nearest of all branches and of all full turns of each joint, by the sum of squares.
+    It searches all branches and full turns; the distance is Euclidean in joint space.
     """
     best = None
     for misfit_factor in MISFIT_FACTORS if arm.calibrated else (0.0,):
@@ -117,13 +117,13 @@ def nearest_to_posture(
     arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_before: Joints
 ) -> Joints | None:
     """
-    Return the solution that a partial posture asks for, or None.
+    Return the solution nearest to a partial posture, or None.
 
-    Of the solutions within the limits those that are nearest in the named joints (within 0.01
-    rad), and of these the one nearest to ``q_before``. Full turns count in both.
+    Of the solutions within the limits it takes those nearest in the named joints (within 0.01
+    rad), and of these the one nearest to ``q_before``. Full turns count in both distances.
 
-    :param named: wanted positions [rad] by the index of the joint.
-    :param q_before: the configuration before [rad].
+    :param named: preferred positions [rad] by joint index.
+    :param q_before: the previous configuration [rad].
     """
     wanted = vector6(named.get(i, position) for i, position in enumerate(q_before))
     candidates = [
@@ -142,7 +142,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     Return a clause that says why no solution lies within the limits; empty if one does.
 
-    Lengths are those of the ideal arm that is most like this one.
+    For a calibrated arm, lengths are those of its ideal arm.
     """
     found = solutions(arm, T_base_flange)
     if found:
@@ -162,7 +162,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
 
 
 def _refined(arm: Arm, T_base_flange: Pose, starts: list[Joints]) -> list[Joints]:
-    """Return the different solutions that the starts lead to."""
+    """Return the distinct solutions found from the starts."""
     found: list[Joints] = []
     pending = deque(starts)
     while pending:
@@ -175,12 +175,11 @@ def _refined(arm: Arm, T_base_flange: Pose, starts: list[Joints]) -> list[Joints
 
 def _twins(arm: Arm, q: Joints) -> list[Joints]:
     """
-    Return where to look for the solutions that meet with this one in a singularity close by.
+    Return starts for the twins: the solutions that meet this one in a nearby singularity.
 
-    Along the direction v in which the arm hardly moves, the error grows with the length t of the
-    step as sigma t + curvature t^2 / 2 (seen along u, where sigma is the least singular value and
-    u, v are its vectors): it vanishes again at the twin. Straight wrists have theirs half a turn
-    away.
+    Let sigma be the smallest singular value and u, v its vectors. A joint step of length t along v
+    hardly moves the flange: the error along u is sigma t + curvature t^2 / 2, which is zero again
+    at the twin. The twin of a straight wrist is half a turn away.
     """
     jacobian = arm.jacobian(q)
     u, sigma, v = np.linalg.svd(jacobian)
@@ -204,8 +203,8 @@ def _step_along(q: Joints, direction: NDArray[np.float64], distance: float) -> J
 def _nearest_of(
     arm: Arm, T_base_flange: Pose, starts: list[Joints], q_near: Joints
 ) -> Joints | None:
-    """Return the nearest of the solutions that the starts lead to, refining only the promising."""
-    # By the distance without limits, which is never longer than that within them.
+    """Return the nearest solution found from the starts; refine only those that can win."""
+    # Ignoring joint limits gives a lower bound of the distance.
     ranked = sorted((_distance_by_turns(q, q_near), q) for q in starts)
     allowance = _PRUNING_MARGIN if arm.calibrated else 0.0
     best, min_distance = None, inf
@@ -219,17 +218,17 @@ def _nearest_of(
 
 
 def _solve_from(arm: Arm, T_base_flange: Pose, start: Joints, q_near: Joints) -> Joints | None:
-    """Return the solution that a start leads to, turned towards q_near within the limits."""
+    """Return the solution found from a start, at the turns nearest to q_near."""
     q = _refine(arm, T_base_flange, start) if arm.calibrated else start
     return None if q is None else _nearest_turns(q, q_near, arm.model.position_limits)
 
 
 def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     """
-    Return the joint positions of the pose that Newton's method finds from a start, or None.
+    Return the solution that Newton's method finds from a start, or None.
 
-    The step is damped by the square of the error (Levenberg-Marquardt), which keeps it finite
-    where the arm is singular and costs no accuracy elsewhere.
+    The squared error damps the step (Levenberg-Marquardt). This keeps the step finite at a
+    singularity and costs no accuracy elsewhere.
     """
     target = _columns(T_base_flange)
     q, failures, previous = start, 0, inf
@@ -246,7 +245,7 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
         q = _step(q, frames, error, square)
     else:
         return None
-    # The error of the orientation is a sine: it also vanishes for half a turn.
+    # The orientation error is a sine, which is also zero at half a turn.
     if not _is_near(arm.forward(q), T_base_flange):
         return None
     return vector6(wrap(angle) for angle in q)
@@ -262,7 +261,7 @@ def _columns(T_base_flange: Pose) -> tuple[Vector3, Vector3, Vector3]:
 def _error(
     frames: ChainFrames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
 ) -> list[float]:
-    """Return what lacks to the target: translation [m], and half the sum of axis x target axis."""
+    """Return the error: translation [m], and half the sum of axis x target axis."""
     ex = ey = ez = 0.0
     for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), target, strict=True):
         ex += ay * bz - az * by
@@ -273,7 +272,7 @@ def _error(
 
 
 def _step(q: Joints, frames: ChainFrames, error: list[float], square: float) -> Joints:
-    """Return q + (J'J + square I)^-1 J' error, the largest change limited."""
+    """Return q + (J'J + square I)^-1 J' error, with a bounded largest joint step."""
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
     normal.flat[::7] += max(square, MIN_DAMPING)
@@ -294,7 +293,7 @@ def _same(a: Joints, b: Joints) -> bool:
 
 
 def _distance_by_turns(a: Joints, b: Joints) -> float:
-    """Return the Euclidean distance when full turns do not count [rad]."""
+    """Return the Euclidean distance modulo full turns [rad]."""
     (a1, a2, a3, a4, a5, a6), (b1, b2, b3, b4, b5, b6) = a, b
     return hypot(
         remainder(a1 - b1, tau),
@@ -353,7 +352,7 @@ def _nearest_turn(angle: float, target: float, low: float, high: float) -> float
 
 
 def format_distinct(value: float, bound: float) -> tuple[str, str]:
-    """Return both numbers with as few digits, four at the least, as tell one from the other."""
+    """Return both numbers with the fewest digits (at least four) that distinguish them."""
     if abs(value) >= 1e4:
         return f'{value:.4g}', f'{bound:.4f}'
     digits = next((n for n in range(4, 9) if round(value, n) != round(bound, n)), 9)
@@ -380,7 +379,7 @@ def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
 
 
 def _explain_outside_limits(found: list[Joints], limits: PositionLimits) -> str:
-    """Name the joint of the solution that misses its limits least, or return nothing."""
+    """Explain which joint exceeds its limits in the best solution; empty if none does."""
     worst = [max(_outside(q, limits)) for q in found]
     excess, joint, angle = min(worst)
     if excess <= 0.0:
@@ -394,7 +393,7 @@ def _explain_outside_limits(found: list[Joints], limits: PositionLimits) -> str:
 
 
 def _outside(q: Joints, limits: PositionLimits) -> Iterator[tuple[float, int, float]]:
-    """Give for each joint how far it is outside its limits at the best turn [rad], and where."""
+    """Yield for each joint its excess over the limits at the best turn [rad], index, angle."""
     for joint, (angle, (low, high)) in enumerate(zip(q, limits, strict=True)):
         if _nearest_turn(angle, 0.0, low, high) is not None:
             yield 0.0, joint, angle

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Joint positions one small step after the other, as a control cycle needs them.
+Inverse kinematics in small steps, for use in a control cycle.
 
-Where the solution before is known, and the next one is near it, neither all branches have to be
-looked at nor many steps of an iteration taken: Newton's method doubles the exact digits with each,
-of a nominal arm as of a calibrated one. A branch is never left, because a solution that is far
-from the one before is none.
+When the previous solution is known and the next one is near, there is no need to search all
+branches or to iterate long: each step of Newton's method doubles the exact digits, for nominal and
+calibrated arms alike. The branch never changes, because a solution far from the previous one is
+rejected.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import add6, Vector3, vector6
 
-#: An error of metres and radians whose square is below this leaves one of 1e-10 after the next
-#: step, as long as the arm is not singular to the same degree.
+#: A squared error (metres and radians) below this leaves an error of 1e-10 after the next step,
+#: unless the arm is nearly singular.
 _ONE_STEP_LEFT = 1e-12
 _MAX_STEPS = 8
-#: A joint that would move farther than this is on its way to another solution [rad].
+#: If a joint moves farther than this, Newton converges to another branch [rad].
 _MAX_JOINT_CHANGE = 0.5
-#: Keeps the normal equations of an arm solvable that is singular to the last digit.
+#: Keeps the normal equations of an exactly singular arm solvable.
 _DAMPING = 1e-14
 
 
 def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
     """
-    Return the joint positions of a pose next to those of one close by [rad].
+    Return the joint positions of a pose near those of a nearby pose [rad].
 
-    :param q_before: of a pose centimetres away at most.
-    :returns: None where the iteration does not get there: out of reach, or nearly singular.
+    :param q_before: joint positions of a pose at most centimetres away [rad].
+    :returns: None if the iteration does not converge: out of reach, or nearly singular.
     """
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
         T_base_flange.quaternion
@@ -59,10 +59,10 @@ def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None
 
 def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     """
-    Return how far wrist [rad], elbow [rad] and shoulder [m] are from their singularities.
+    Return the distances of wrist [rad], elbow [rad] and shoulder [m] from singularity.
 
-    All >= 0: the angle of wrist 2 and of the elbow, and how far the centre of the wrist is in
-    front of the plane of the axes 1 and 2.
+    All >= 0: the angles of wrist 2 and elbow, and the distance of the wrist centre from the plane
+    of axes 1 and 2.
     """
     ideal = ideal_arm_of(arm)
     _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))
@@ -74,9 +74,9 @@ def _error(
     frames: ChainFrames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
 ) -> tuple[list[float], float]:
     """
-    Return what lacks to a pose: translation [m], sine of the turn (base axes), and 1 + 2 cos.
+    Return the error: translation [m] and sine of the rotation in base axes; and 1 + 2 cos.
 
-    The last one is positive up to a third of a turn; beyond, the sine misleads.
+    The last value is positive up to a third of a turn; beyond that the sine is misleading.
     """
     ex = ey = ez = facing = 0.0
     for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), axes, strict=True):

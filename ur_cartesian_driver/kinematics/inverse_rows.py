@@ -1,14 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The inverse kinematics of a sampled path, or of any batch of poses.
+Inverse kinematics of a sampled path, or of any batch of poses.
 
-A look ahead along a goal asks for tens of thousands of poses; one by one that takes seconds. Here
-numpy solves them together. Where rows are regular, which is nearly always, the result needs no
-search: the branch stays the one of the row before. That is proved for each row by comparing its
-step with its distance to the other branches; the few rows where the proof fails (next to
-singularities, at joint limits, after a jump) are given to :mod:`~.inverse`, so that both give the
-same answers.
+The preflight of a goal has tens of thousands of poses; one by one they would take seconds. Here
+numpy solves them together. Nearly all rows need no search, because they stay on the branch of the
+previous row. A row is certain to do so if its step is shorter than half the distance to the other
+branches. The few rows that are not certain (near singularities, at joint limits, after a jump) go
+to :mod:`~.inverse`, so that both modules return the same solutions.
 
 Poses are rows (n, 7), x y z [m] and the unit quaternion x y z w; joints rows (n, 6) [rad].
 """
@@ -36,19 +35,19 @@ from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 
-# Rows solved together: as many as have their numbers in the cache of a core.
+# Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 1024
-# Rows that are tried after one at which the branch had to be searched for; then ever more.
+# Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
-# Newton: the sum of the squares of metres and radians that counts as exact.
+# Newton: squared error (metres and radians) that counts as exact.
 _EXACT = 1e-21
 _MAX_JOINT_STEP = 0.5
-# Steps from a solution of the ideal arm: two suffice but next to singularities.
+# Newton steps from a solution of the ideal arm: two suffice except near singularities.
 _STEPS = 3
-# A solution of the real arm this far from that of the ideal one [rad] may belong to another.
+# Farther than this from the ideal solution [rad], Newton may have found another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
-# Branches of the ideal arm this close may be exchanged in the real one [rad].
+# Branches of the ideal arm closer than this may be swapped in the real one [rad].
 _AMBIGUOUS_SEPARATION = 4.0 * _MAX_CALIBRATION_SHIFT
 _LIMIT_ROUNDING = 1e-9
 
@@ -59,15 +58,15 @@ class PathSolution:
 
     #: (n, 6) [rad], NaN where no solution lies within the limits.
     q: Floats
-    #: (n,) whether there is one.
+    #: (n,) whether there is a solution.
     found: Flags
-    #: (n,) the largest change of a joint from the last row that was found [rad], of the first row
-    #: from the start. Where branch or turn jump it is large however finely the path is sampled.
+    #: (n,) largest joint change from the last solved row (or from the start) [rad]. Where branch
+    #: or turn jump, it is large however finely the path is sampled.
     step: Floats
 
 
 def branch_measures(arm: Arm, q: Floats) -> BranchMeasures:
-    """Return the branch, and the distance from each singularity, of joint rows (n, 6)."""
+    """Return branch and singularity measures of joint rows (n, 6) [rad]."""
     return ideal_branch_measures(ideal_arm_of(arm), q)
 
 
@@ -78,15 +77,15 @@ def solve_path(
     arm: Arm, poses: Floats, q_start: Joints, *, skip_gaps: bool = True
 ) -> PathSolution:
     """
-    Return the joint positions along a path, each the nearest to those of the row before.
+    Return joint positions along a path, each row the nearest to the previous one.
 
-    The same as :func:`~.inverse.nearest` from row to row: nearest of all branches and all full
-    turns within the limits. A row without solution is passed over.
+    Equals :func:`~.inverse.nearest` from row to row: the nearest of all branches and full turns
+    within the limits. Rows without solution are skipped.
 
     :param poses: (n, 7).
-    :param q_start: from where the first row is reached [rad].
-    :param skip_gaps: False ends the search at the first row without solution: of a calibrated arm
-        each such row takes some milliseconds.
+    :param q_start: the configuration before the first row [rad].
+    :param skip_gaps: False ends the search at the first row without solution; for a calibrated
+        arm each such row takes some milliseconds.
     """
     q = np.full((len(poses), 6), np.nan)
     before, row, block, single_count = q_start, 0, _BLOCK, 1
@@ -104,7 +103,7 @@ def solve_path(
                 q[index] = before = solution
             elif not skip_gaps:
                 return _path_solution(q, q_start)
-        # Of a long stretch that is not certain few rows are tried in vain.
+        # Back off: in a long uncertain stretch few blocks are tried in vain.
         row, block, single_count = (
             row + single_count,
             _MIN_BLOCK,
@@ -119,7 +118,7 @@ def _path_solution(q: Floats, q_start: Joints) -> PathSolution:
 
 
 def _solve_certain(arm: Arm, poses: Floats, before: Joints) -> Floats:
-    """Return the joints of the rows that are certain to stay on the branch they are on."""
+    """Return the joints of the leading rows that certainly stay on the branch."""
     start = np.array([before])
     signs = BRANCHES[int(branch_measures(arm, start).branch[0])]
     q, max_step = _on_branch(arm, TargetPoses.of(poses), signs)
@@ -133,9 +132,9 @@ def _solve_certain(arm: Arm, poses: Floats, before: Joints) -> Floats:
 
 def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     """
-    Return for each pose the solution nearest to a configuration of its own.
+    Return for each pose the solution nearest to its row of ``q_near``.
 
-    The same as :func:`~.inverse.nearest`, one by one.
+    Equals :func:`~.inverse.nearest` for each row.
 
     :param poses: (n, 7).
     :param q_near: (n, 6) [rad].
