@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write doc/faults.md from the table that the tests of the fault matrix run.
+Write doc/faults.md from the table of the fault matrix tests.
 
-What users are told about faults is what is tested, word by word. A test compares the file with the
-table; this script brings it up to date::
+So the page states exactly what the tests check. A test compares page and table; after a change of
+the table, run::
 
     python scripts/make_faults.py
 """
@@ -29,46 +29,46 @@ Made by `scripts/make_faults.py` from the table that `test/faults` runs against 
 controller: every fault in every phase of a goal. Do not edit.
 
 Whatever happens, the goal ends with its [code and sentence](errors.md), the arm comes to rest, and
-an interrupted motion never resumes by itself: not when somebody unlocks the robot, not when
-somebody plays the program. Then `~/status` says what is needed, and after the steps of the last
-column the next goal works.
+an interrupted motion never resumes by itself, even if an operator unlocks the robot or plays the
+program. Then `~/status` says which steps are needed; after the steps in the last column the robot
+takes the next goal.
 
-Times count from the fault, or from the goal if it is sent later; "as without": the fault does not
-disturb the goal. They hold for the default parameters, except `node_timeout` (0.4 s instead of
-5 s), and for goals with a `goal_time_tolerance` of 1.4 s and a `path_tolerance` of 4 mm. The
-sockets of the robot program are named after the parameters of their ports. "Half-open": the
-connection looks open, and no data comes through.
+Times count from the fault, or from the goal if it is sent later. "As without fault": the fault
+does not affect the goal. The times hold for the default parameters, except `node_timeout` (0.4 s
+instead of 5 s), and for goals with a `goal_time_tolerance` of 1.4 s and a `path_tolerance` of
+4 mm. The sockets of the robot program are named after the parameters of their ports. "Half-open":
+the connection looks open, but carries no data.
 
 """
 
 HEADLESS_HEAD = """## Headless operation
 
-The driver sends the robot program, and stops it after a stop of the robot. So no joint moves
-between the fault and the next goal, even if another client unlocks the arm and plays.
+The driver sends the robot program, and stops the program when the robot stops. So no joint moves
+between the fault and the next goal, even if another client unlocks the arm and plays the program.
 
 """
 
 LOCAL_HEAD = """## Local control
 
 The program is on the pendant, and the robot takes no commands from the network. A paused program
-resumes when it is played, until it reads, within its next cycles, the message that ends it. By
-then no joint has moved by more than {travel:g} rad (simulated joints do not move at all, real ones
-start slowly); then the program has to be played again.
+that is played resumes for a few cycles, until it reads the message that ends it. In these cycles
+no joint moves more than {travel:g} rad (simulated joints do not move at all, real ones start
+slowly). Then the program has to be played again.
 
 """
 
 CONTINUED_HEAD = """## With `on_robot_stop: continue`
 
-A protective or safeguard stop then holds the goal like a pause. Everything else is as above.
+A protective or safeguard stop then pauses the goal. All other faults end as above.
 
 """
 
 MODES_HEAD = """## The other execution modes
 
-The tables above are about goals with execution PRIMITIVES. The following goals meet the same
-faults while they move, wait or end. Faults before the motion, and faults of interfaces that no
-goal uses, do not depend on the execution mode; they are above. A phase in brackets after a fault
-is the only one that is tested.
+The tables above are for goals with execution PRIMITIVES. The tables below are for the other
+execution modes, with faults while a goal moves, waits or ends. Faults before the motion, and
+faults of interfaces that no goal uses, do not depend on the execution mode; see above. Where
+phases stand in brackets after a fault, only these are tested.
 
 """
 
@@ -110,7 +110,7 @@ def page() -> str:
 
 
 def _mode(mode: Mode) -> str:
-    """Return the section of a execution mode."""
+    """Return the section of an execution mode."""
     return ''.join(
         (
             f'### {mode.name}\n\n{mode.about}\n\n',
@@ -139,9 +139,11 @@ def _cells(row: Row, phases: Sequence[str]) -> Sequence[str]:
     where = f' ({", ".join(row.phases)})' if row.phases else ''
     return (
         row.fault + where,
-        tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
-        tell(lambda at: f'{at.result_within:g} s' if _disturbs(at) else 'as without'),
-        tell(lambda at: f'{at.rest_within:g} s' if _disturbs(at) or at.waits else 'as without'),
+        tell(lambda at: ('pauses, then ' if at.waits else '') + at.code.name),
+        tell(lambda at: f'{at.result_within:g} s' if _disturbs(at) else 'as without fault'),
+        tell(
+            lambda at: f'{at.rest_within:g} s' if _disturbs(at) or at.waits else 'as without fault'
+        ),
         tell(lambda at: at.state_after.name),
         tell(lambda at: ', '.join(_needed(at.steps)) or 'nothing'),
     )
@@ -152,17 +154,17 @@ def _disturbs(row: Row) -> bool:
 
 
 def _needed(steps: Sequence[str]) -> list[str]:
-    """Return the steps without the play of another client that has no effect."""
+    """Return the steps, without a play that has no effect because a resend follows."""
     return [step for i, step in enumerate(steps) if tuple(steps[i : i + 2]) != ('play', 'resend')]
 
 
 def _by_phase(row: Row, phases: Sequence[str], tell: Callable[[Row], str]) -> str:
-    """Return the usual text of a row, and the phases with another one."""
+    """Return the usual text of a row, and the phases whose text differs."""
     usual = tell(row)
     phases_of: dict[str, list[str]] = {}
     for phase in phases:
         phases_of.setdefault(tell(row.at(phase)), []).append(phase)
-    if usual not in phases_of:  # what would be usual is in no phase
+    if usual not in phases_of:  # no listed phase has the usual text
         usual = next(iter(phases_of))
     phases_of.pop(usual)
     return '<br>'.join(

@@ -123,7 +123,7 @@ async def perform(cell: RobotCell, step: str):
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait for the robot':
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
-        case 'wait until it is over':
+        case 'wait until the fault ends':
             await end_faults(cell)
             await cell.until(lambda: cell.loop.open_ends(robot_cell.PRIMARY))
         case _:

@@ -42,9 +42,9 @@ class Mode:
 FAULTS = (
     'protective stop',
     'emergency stop',
-    'somebody stops the program',
+    'an operator stops the program',
     "another client's program replaces ours",
-    'somebody pauses the program',
+    'an operator pauses the program',
     'the speed slider is moved to 0',
     'the controller crashes',
     'the network cable is cut',
@@ -61,7 +61,7 @@ FAULTS = (
 #: Further faults of RTDE, for a mode with set-points.
 FAULTS_OF_RTDE = (
     'safeguard stop',
-    'somebody switches the arm off',
+    'an operator switches the arm off',
     'all connections are cut for 0.1 s, RTDE first',
     'all connections are cut for 0.1 s, the program first',
     'RTDE is half-open',
@@ -74,7 +74,7 @@ FAULTS_OF_RTDE = (
 ON_THE_PENDANT = (
     'protective stop',
     'protective stop that the driver does not see',
-    'somebody pauses the program',
+    'an operator pauses the program',
     'the network cable is cut',
 )
 
@@ -210,12 +210,12 @@ SETPOINTS = (
         result_within=0.7,
         rest_within=0.7,
         state_after=S.CONNECTED,
-        steps=('wait until it is over', 'resend'),
+        steps=('wait until the fault ends', 'resend'),
         differs={
             'cancelling': {
                 'code': E.CANCELLED,
                 'state_after': S.READY,
-                'steps': ('wait until it is over',),
+                'steps': ('wait until the fault ends',),
             }
         },
     ),
@@ -225,7 +225,7 @@ SETPOINTS = (
         code=E.SUCCESSFUL,
         result_within=4.0,
         rest_within=4.0,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
         differs={'cancelling': {'code': E.CANCELLED, 'result_within': 0.7, 'rest_within': 0.7}},
     ),
     Row(
@@ -233,7 +233,7 @@ SETPOINTS = (
         phases=('idle',),
         cause=('take the inputs',),
         code=E.ROBOT_NOT_READY,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
     ),
 )
 
@@ -266,16 +266,20 @@ SERVO = _mode(
     },
     1.8,
     {
-        'somebody pauses the program': _STAYS_PAUSED,
+        'an operator pauses the program': _STAYS_PAUSED,
         'the network cable is cut': _NOT_ENTERED
-        | {'': {'steps': ('wait until it is over', 'resend')}},
+        | {'': {'steps': ('wait until the fault ends', 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
         'RTDE is half-open': _SILENT,
         'RTDE is silent for 1.5 s': _SILENT,
         'garbage on RTDE': _SILENT,
         "the program's answers are lost": {
-            '': {'code': E.SUCCESSFUL, 'state_after': S.READY, 'steps': ('wait until it is over',)}
+            '': {
+                'code': E.SUCCESSFUL,
+                'state_after': S.READY,
+                'steps': ('wait until the fault ends',),
+            }
         },
         'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
         'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}},
@@ -288,9 +292,9 @@ SERVO = _mode(
     once=('between points', FAULTS_OF_RTDE),
     more=SETPOINTS,
     pendant_changes={
-        'somebody pauses the program': _STAYS_PAUSED,
+        'an operator pauses the program': _STAYS_PAUSED,
         'the network cable is cut': _NOT_ENTERED
-        | {'': {'steps': ('wait until it is over', 'play')}},
+        | {'': {'steps': ('wait until the fault ends', 'play')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
     },
 )
@@ -315,7 +319,7 @@ OUTPUTS = _mode(
         for name in FAULTS
         if name not in ("another client's program replaces ours", 'the controller crashes')
     ),
-    pendant=('protective stop', 'somebody pauses the program'),
+    pendant=('protective stop', 'an operator pauses the program'),
 )
 
 APPEND = _mode(
@@ -354,7 +358,7 @@ FREEDRIVE = replace(
         faults=(
             'protective stop',
             'emergency stop',
-            'somebody stops the program',
+            'an operator stops the program',
             'the network cable is cut',
             'protective stop that the driver does not see',
             'RTDE is cut',

@@ -20,10 +20,10 @@ PHASES = {
     'idle': 'no goal runs; one is sent 0.1 s after the fault',
     'planning': 'the goal is planned; it is sent to the robot one cycle after the fault',
     'arming': 'START is on the wire, the robot program has not begun the first point',
-    'first point': 'on the way to the first of three points',
+    'first point': 'on the segment to the first of three points',
     'mid-segment': 'on the straight part of the second segment',
     'in a blend': 'in the blend at the first point',
-    'last point': 'on the second half of the way to the last point',
+    'last point': 'on the second half of the last segment',
     'settling': 'the robot program has reported the end, the arm is outside the goal tolerance',
     'cancelling': 'CANCEL is on the wire, the arm still moves',
 }
@@ -33,7 +33,7 @@ MOVING = ('arming', 'first point', 'mid-segment', 'in a blend', 'last point')
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One fault, and how goal, robot and driver have to behave."""
+    """One fault, and the required behaviour of goal, robot and driver."""
 
     #: Name of the fault on the page and in tests.
     fault: str
@@ -45,7 +45,7 @@ class Row:
     result_within: float = 0.3
     #: Longest time from the fault until the arm is at rest.
     rest_within: float = 0.5
-    #: Whether the goal waits, and goes on after the steps.
+    #: Whether the goal pauses, and resumes after the steps.
     waits: bool = False
     #: State of the connection after the end of the goal, before the steps.
     state_after: ConnectionState = S.READY
@@ -71,7 +71,7 @@ def _in(phases: tuple[str, ...], **changes: Any) -> dict[str, dict[str, Any]]:
     return dict.fromkeys(phases, changes)
 
 
-#: The robot is known not to take a goal.
+#: The driver knows that the robot cannot take a goal.
 REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
 CANCELLED = _in(('cancelling',), code=E.CANCELLED)
 #: Times of a goal that the fault does not disturb.
@@ -114,7 +114,7 @@ def _hangs_up(fault: str, cause: str) -> Row:
     )
 
 
-#: When the program resumes it reads that its goal has ended.
+#: The program that resumes reads that its goal has ended.
 UNSEEN_STOP = Row(
     fault='protective stop that the driver does not see',
     cause=('drop rtde for 0.3 s', 'protective_stop'),
@@ -125,7 +125,7 @@ UNSEEN_STOP = Row(
     differs=REFUSED,
 )
 
-#: A stopped program never runs again by itself, whoever unlocks or plays.
+#: A stopped program never runs again by itself, even if another client unlocks or plays.
 HEADLESS = (
     _safety('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
     _safety('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
@@ -147,7 +147,7 @@ HEADLESS = (
         play=False,
     ),
     Row(
-        fault='somebody stops the program',
+        fault='an operator stops the program',
         cause=('stop',),
         code=E.PROGRAM_STOPPED,
         state_after=S.CONNECTED,
@@ -155,7 +155,7 @@ HEADLESS = (
         differs=REFUSED,
     ),
     Row(
-        fault='somebody switches the arm off',
+        fault='an operator switches the arm off',
         cause=('power_off',),
         code=E.PROGRAM_STOPPED,
         state_after=S.CONNECTED,
@@ -172,7 +172,7 @@ HEADLESS = (
         differs=REFUSED,
     ),
     Row(
-        fault='somebody pauses the program',
+        fault='an operator pauses the program',
         cause=('pause',),
         code=E.SUCCESSFUL,
         waits=True,
@@ -197,7 +197,7 @@ HEADLESS = (
         differs={'cancelling': {'code': E.CANCELLED, 'waits': False}},
     ),
     _harmless(
-        'somebody plays or unlocks what is not stopped',
+        'play and unlock while nothing is stopped',
         'play',
         'unlock',
         'reset_safeguard',
@@ -241,7 +241,7 @@ HEADLESS = (
         cause=('drop primary for 0.5 s', 'protective_stop'),
         code=E.PROTECTIVE_STOP,
         state_after=S.STOPPED,
-        steps=('unlock', 'play', 'wait until it is over', 'resend'),
+        steps=('unlock', 'play', 'wait until the fault ends', 'resend'),
         differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play')),
     ),
     Row(fault='RTDE is cut', cause=('drop rtde',), code=E.CONNECTION_LOST, differs=REFUSED),
@@ -261,18 +261,20 @@ HEADLESS = (
         state_after=S.DISCONNECTED,
         ready_within=4.0,
     ),
-    _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until it is over',)),
+    _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until the fault ends',)),
     _harmless(
-        'RTDE carries less than it should', 'throttle rtde 60000', steps=('wait until it is over',)
+        'RTDE carries less data than needed',
+        'throttle rtde 60000',
+        steps=('wait until the fault ends',),
     ),
     Row(
-        fault='RTDE carries next to nothing',
+        fault='RTDE carries almost no data',
         cause=('throttle rtde 300',),
         code=E.CONNECTION_LOST,
         result_within=2.3,
         rest_within=2.7,
         state_after=S.DISCONNECTED,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
         ready_within=4.0,
     ),
     Row(
@@ -285,13 +287,13 @@ HEADLESS = (
     _harmless('the primary interface is cut', 'drop primary'),
     _harmless('the primary interface is half-open', 'half_open primary'),
     _harmless(
-        'the primary interface is silent', 'silence primary', steps=('wait until it is over',)
+        'the primary interface is silent', 'silence primary', steps=('wait until the fault ends',)
     ),
     _harmless(
         'the primary interface is late and slow',
         'delay primary 0.1 s',
         'throttle primary 1000',
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
     ),
     _harmless('garbage on the primary interface', 'garbage primary 64'),
     _harmless(
@@ -318,12 +320,12 @@ HEADLESS = (
         result_within=3.5,
         rest_within=1.2,
         state_after=S.CONNECTED,
-        steps=('wait until it is over', 'resend'),
+        steps=('wait until the fault ends', 'resend'),
         differs={
             'settling': {
                 'code': E.SUCCESSFUL,
                 'state_after': S.READY,
-                'steps': ('wait until it is over',),
+                'steps': ('wait until the fault ends',),
             },
             'cancelling': {'code': E.CANCELLED},
         },
@@ -331,12 +333,12 @@ HEADLESS = (
     _harmless(
         "the program's sockets are 0.05 s late",
         'delay sockets 0.05 s',
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
     ),
     _harmless(
         "the program's sockets carry 2500 bytes/s",
         'throttle sockets 2500',
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
     ),
     _hangs_up("garbage on the program's sockets", 'garbage sockets 64'),
     *(
@@ -372,7 +374,7 @@ HEADLESS = (
         cause=('offset pose z 0.006',),
         code=E.PATH_TOLERANCE_VIOLATED,
         result_within=0.7,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
         differs=CANCELLED
         | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'result_within': 1.7}},
     ),
@@ -382,14 +384,14 @@ HEADLESS = (
         code=E.PATH_TOLERANCE_VIOLATED,
         result_within=0.7,
         rest_within=0.7,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
         differs=CANCELLED
         | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'result_within': 1.7}},
     ),
     _harmless(
         'the pose is measured with noise of 0.1 mm',
         'noise pose z 0.0001',
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
     ),
     Row(
         fault='the twist is measured 0.5 m/s off for 0.3 s',
@@ -405,13 +407,13 @@ HEADLESS = (
         code=E.CANCELLED,
         result_within=0.9,
         rest_within=1.0,
-        steps=('wait until it is over',),
+        steps=('wait until the fault ends',),
         differs={'last point': {'code': E.SUCCESSFUL}},
     ),
 )
 
 
-#: With ``on_robot_stop: continue``, for those who want what the robot does by itself.
+#: With ``on_robot_stop: continue``: the robot resumes the goal by itself.
 CONTINUED = tuple(
     Row(
         fault=fault,
@@ -441,7 +443,7 @@ def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
     """
     Return the row of a stop that pauses a program on the pendant.
 
-    The interface takes no 'stop program', so the old motion goes on with the play until the
+    The interface takes no 'stop program', so a play resumes the old motion until the
     program reads the message that ends it; after that it has to be played again.
     """
     return Row(
@@ -464,7 +466,7 @@ LOCAL = (
     ),
     UNSEEN_STOP,
     Row(
-        fault='somebody stops the program',
+        fault='an operator stops the program',
         cause=('stop',),
         code=E.PROGRAM_STOPPED,
         state_after=S.CONNECTED,
@@ -472,7 +474,7 @@ LOCAL = (
         differs=REFUSED,
     ),
     Row(
-        fault='somebody pauses the program',
+        fault='an operator pauses the program',
         cause=('pause',),
         code=E.SUCCESSFUL,
         waits=True,
