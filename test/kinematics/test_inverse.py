@@ -5,7 +5,7 @@
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise, product
-from math import acos, cos, dist, pi, remainder, tau
+from math import acos, cos, dist, pi, remainder, sin, tau
 import re
 
 from hypothesis import given, settings
@@ -27,7 +27,20 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import vector6
 
 UR5E = Arm(MODELS['ur5e'])
-JOINTS = st.tuples(*[st.floats(-pi, pi)] * 6)
+
+
+def is_well_defined(q: tuple[float, ...]) -> bool:
+    """
+    Tell whether the pose of these joints says where the wrist is.
+
+    Where a stretched elbow meets a wrist that is less than a microradian from singular, but not
+    singular, the rounding of the pose decides whether and where there is a solution.
+    """
+    return abs(sin(q[2])) > 1e-6 or not 2e-10 < abs(sin(q[4])) < 1e-6
+
+
+JOINTS = st.tuples(*[st.floats(-pi, pi)] * 6).filter(is_well_defined)
+JOINTS_OF_ALL_TURNS = st.tuples(*[st.floats(-tau, tau)] * 6).filter(is_well_defined)
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)
 # A UR5e in an everyday posture.
 READY = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)
@@ -195,7 +208,7 @@ def test_the_nearest_is_the_nearest_of_every_branch_and_every_turn():
 
 
 @settings(max_examples=50)
-@given(q=st.tuples(*[st.floats(-tau, tau)] * 6))
+@given(q=JOINTS_OF_ALL_TURNS)
 def test_the_nearest_to_a_solution_is_that_solution_in_the_same_turn(q):
     found = nearest(UR5E, UR5E.forward(q), q)
     assert found is not None
