@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from figures import Figure, seconds_each
 
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
 from ur_cartesian_driver.urscript import core_builtins, parse, ScriptInterpreter

@@ -39,7 +39,7 @@ import robot_loop_with_echo
 from wire_tap import Relay, RelayDirection, TAP_HOST
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
-from ur_cartesian_driver.driver.loop import host
+from ur_cartesian_driver.driver.loop import loop_host as host
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose

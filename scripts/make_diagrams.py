@@ -16,7 +16,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
-import ur_cartesian_driver.execution.goal.states as states
+import ur_cartesian_driver.execution.goal.goal_transitions as states
 import ur_cartesian_driver.execution.servo.servo_stream as servo_stream
 from ur_cartesian_driver.robot import lifecycle
 
@@ -37,7 +37,7 @@ def pages() -> dict[str, str]:
         ),
         'trajectory.md': page(
             'A goal on its way through the robot program',
-            'ur_cartesian_driver/execution/goal/states.py',
+            'ur_cartesian_driver/execution/goal/goal_transitions.py',
             goal(),
             [signal.name for signal in states.GoalSignal],
         ),

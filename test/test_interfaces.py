@@ -13,8 +13,8 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
-from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.robot_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTolerance,

@@ -17,9 +17,9 @@ import socket
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
-from ur_cartesian_driver.robot.driver_status import required_action
+from ur_cartesian_driver.robot.connection_status import required_action
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services.recovery_steps import (
     next_step,

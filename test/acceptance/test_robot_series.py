@@ -7,8 +7,8 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 
 pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
 

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

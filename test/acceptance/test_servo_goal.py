@@ -17,7 +17,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.servo import ServoActivity
+from ur_cartesian_driver.motion.servo_report import ServoActivity
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState

@@ -16,14 +16,14 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataReceived,
     HandshakeDone,
     RtdeClientCodec,
 )
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder

@@ -11,7 +11,7 @@ from synthetic_recording import only_file, outputs, packet, record
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 
 
 def busy(i):

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.driver import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver import ConnectionStatus, DriverConfig
 from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.robot.driver_status import LinkGaps
+from ur_cartesian_driver.robot.connection_status import LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services import service_calls
 
@@ -29,7 +29,7 @@ MESSAGES = [
     channel.AppendAnswered(motion=3, answer=AnswerAppend(number=1, refusal='The goal ended.')),
     channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
     channel.StatusChanged(
-        status=DriverStatus(state=ConnectionState.READY, ports={'reverse_port': 50001})
+        status=ConnectionStatus(state=ConnectionState.READY, ports={'reverse_port': 50001})
     ),
     channel.CallRobot(number=2, call=service_calls.SetTcpCall(T_flange_tcp=Pose((0.0, 0.0, 0.1)))),
     channel.CallAnswered(

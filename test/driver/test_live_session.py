@@ -10,14 +10,14 @@ from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.ipc.channel import LENGTH, pack, SetLiveTarget, StartMotion, unpack
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, stationary_plan
-from ur_cartesian_driver.driver.loop.machine_factory import is_slow_to_make, make_machine
+from ur_cartesian_driver.driver.loop.goal_machine_factory import is_slow_to_make, make_machine
 from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
 from ur_cartesian_driver.execution.live.live_feeder import LiveFeeder
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 

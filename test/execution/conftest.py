@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, Tr
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.motion.vectors import scale6, subtract6, ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.motion import MotionGenerator

@@ -19,13 +19,13 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendPoints,
     SetTemporaryTcp,
 )
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
-from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 SPEED, STEP = 0.1, 0.1

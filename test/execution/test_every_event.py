@@ -16,8 +16,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendControl,
     SendPoints,
 )
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, TRANSITIONS
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
-from ur_cartesian_driver.execution.goal.states import GoalState, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -31,7 +31,12 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.motion.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyStatus,
+)
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 POINTS = 3

@@ -19,14 +19,14 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.monitor import STALL_TIMEOUT
-from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.goal.states import (
+from ur_cartesian_driver.execution.goal.goal_monitor import STALL_TIMEOUT
+from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalSignal,
     GoalState,
     STOP_SIGNALS,
     TRANSITIONS,
 )
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import SET_TIMEOUT
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, CAUSE_TIMEOUT, STOP_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -42,7 +42,12 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.motion.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyStatus,
+)
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 START, END = (0.4, 0.0, 0.2), (0.6, 0.0, 0.2)

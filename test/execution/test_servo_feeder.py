@@ -16,8 +16,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     WriteServo,
 )
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -36,8 +36,13 @@ from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.servo import ServoFeedback
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.motion.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyStatus,
+)
+from ur_cartesian_driver.motion.servo_report import ServoFeedback
 
 STEP, REST = 0.002, (0.0,) * 6
 LENGTH, DURATION = 0.1, 0.2

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.motion.vectors import ZERO6
 
 TARGET = Pose((0.6, 0.0, 0.2))

@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 

@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
     rotate,
 )
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import subtract, vector3, ZERO6
 
 DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))

@@ -13,7 +13,7 @@ from ur_cartesian_driver.kinematics.inverse_incremental import singularity_dista
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.preflight.margins import singularity_distance_rows
+from ur_cartesian_driver.planning.preflight.tightest_margins import singularity_distance_rows
 
 UR5E = robot_model('ur5e')
 HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)

@@ -16,9 +16,9 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import add6, scale6, subtract6
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS

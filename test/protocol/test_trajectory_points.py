@@ -15,6 +15,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     MoveC,
@@ -26,7 +27,6 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
     SwitchOutput,
 )
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import encode_result
 from ur_cartesian_driver.protocol.program.point_fields import (

@@ -9,8 +9,8 @@ import logging
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
-from ur_cartesian_driver.robot.driver_status import DriverStatus
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
@@ -53,7 +53,7 @@ class Ear:
         return [
             index
             for index, told in enumerate(self.heard)
-            if isinstance(told, DriverStatus) and told.state is state
+            if isinstance(told, ConnectionStatus) and told.state is state
         ]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode, STATE_TABLE
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode, STATE_TABLE
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.robot.rtde.state_recipe import (
     in_recipe_order,

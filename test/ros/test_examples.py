@@ -9,7 +9,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import check, plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal

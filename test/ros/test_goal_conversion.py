@@ -17,8 +17,8 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTrajectoryPoint,

@@ -6,7 +6,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.ros.tf.known_frames import (
     ArmSnapshot,
     Frames,

@@ -10,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.driver import DriverStatus as Connection
+from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode, STATE_TABLE
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode, STATE_TABLE
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ToolData
 from ur_cartesian_driver.robot.rtde.signal_stream import (
     OPTIONAL_FIELDS,
@@ -182,6 +181,6 @@ def test_every_state_of_the_connection_has_a_level():
 
 def test_each_field_of_the_status_has_the_name_of_what_it_shows():
     known = {row.name for row in STATE_TABLE} | {
-        name for name in dir(Connection) if not name.startswith('_')
+        name for name in dir(ConnectionStatus) if not name.startswith('_')
     }
     assert set(DriverStatus.get_fields_and_field_types()) - {'header'} <= known

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.dashboard import COMMAND_SPECS
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig

@@ -23,7 +23,7 @@ import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.robot import Ports
+from ur_cartesian_driver.sim.simulated_robot import Ports
 
 HOST = '127.0.0.1'
 PORTS = [field.name for field in fields(Ports)]

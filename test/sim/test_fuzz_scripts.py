@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.sim.builtins import controller_builtins
 
 HERE = Path(__file__).parent

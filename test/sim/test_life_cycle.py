@@ -6,7 +6,7 @@ from math import dist
 
 import pytest
 
-from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 LONG_MOVE = 'movej([1.5, -1.57, 1.57, -1.57, -1.57, 0], a=2, v=1)'

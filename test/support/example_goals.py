@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal

@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

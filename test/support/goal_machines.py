@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor, MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder

@@ -42,7 +42,7 @@ from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, ReverseMessage
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
-from ur_cartesian_driver.robot.driver_status import DriverStatus
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
@@ -71,7 +71,7 @@ class Owner:
     """The other end of the robot loop's pipe, as the node is."""
 
     def __init__(self):
-        self.status = DriverStatus()
+        self.status = ConnectionStatus()
         self.statuses = []
         self.motions = {}
         #: Answers to appended points.

@@ -15,14 +15,14 @@ import numpy as np
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.program.reverse import keepalive, trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
     TrajectoryResultDecoder,
 )
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
-from ur_cartesian_driver.motion.servo import ServoFeedback
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataReceived,
@@ -21,7 +21,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     RtdeClientCodec,
 )
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 

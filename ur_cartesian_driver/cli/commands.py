@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.robot_models import (
 )
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES, PART_SUFFIX
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
 
 #: Largest number of packets in a picture.
 MAX_ROWS = 6000

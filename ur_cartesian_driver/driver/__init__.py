@@ -14,7 +14,7 @@ Plan, execute and stop Cartesian motions of one robot, from plain Python.
 from ur_cartesian_driver.driver.api import Driver
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.motion_handle import MotionHandle
-from ur_cartesian_driver.robot.driver_status import DriverStatus
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
-__all__ = ['ConnectionState', 'Driver', 'DriverConfig', 'DriverStatus', 'MotionHandle']
+__all__ = ['ConnectionState', 'ConnectionStatus', 'Driver', 'DriverConfig', 'MotionHandle']

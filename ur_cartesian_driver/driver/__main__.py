@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``python -m ur_cartesian_driver.driver``: the robot loop of a driver in another process."""
 
-from ur_cartesian_driver.driver.loop.host import main
+from ur_cartesian_driver.driver.loop.loop_host import main
 
 main()

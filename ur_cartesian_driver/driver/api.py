@@ -66,19 +66,19 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.servo import ServoReport
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
-from ur_cartesian_driver.robot.driver_status import (
-    DriverStatus,
+from ur_cartesian_driver.robot.connection_status import (
+    ConnectionStatus,
     is_paused,
     is_stopped,
     LinkGaps,
@@ -141,11 +141,11 @@ class Driver(RobotServices, InteractiveMotions):
         self._numbers = itertools.count(1)
         self._active_motions: dict[int, ActiveMotion] = {}
         self._calls: dict[int, Future[ServiceAnswer]] = {}
-        self._status = DriverStatus()
+        self._status = ConnectionStatus()
         self._ready = threading.Event()
         self._signals: Signals | None = None
         self._gaps = LinkGaps()
-        self._status_listeners: list[Callable[[DriverStatus], None]] = []
+        self._status_listeners: list[Callable[[ConnectionStatus], None]] = []
         self._servo_listeners: list[Callable[[ServoReport], None]] = []
         #: The TCP that a goal has set, until the one before is restored.
         self._temporary_tcp: TemporaryTcpSet | None = None
@@ -177,7 +177,7 @@ class Driver(RobotServices, InteractiveMotions):
         if not self._loop.close():
             return
         # The status first: it refuses new motions, which would never end.
-        self._set_status(DriverStatus(message='The driver is closed; open it.'))
+        self._set_status(ConnectionStatus(message='The driver is closed; open it.'))
         self._abort_all('The driver was closed.')
 
     def heartbeat(self) -> None:
@@ -187,7 +187,7 @@ class Driver(RobotServices, InteractiveMotions):
     # ---- state and status ---------------------------------------------------------------------
 
     @property
-    def status(self) -> DriverStatus:
+    def status(self) -> ConnectionStatus:
         """How far the connection is."""
         return self._status
 
@@ -234,7 +234,7 @@ class Driver(RobotServices, InteractiveMotions):
         """The arm's kinematics: calibrated once the robot has reported them, else nominal."""
         return self._arm
 
-    def add_status_listener(self, callback: Callable[[DriverStatus], None]) -> None:
+    def add_status_listener(self, callback: Callable[[ConnectionStatus], None]) -> None:
         """Call back with each new status, and at once with the present one."""
         self._status_listeners.append(callback)
         callback(self._status)
@@ -478,7 +478,7 @@ class Driver(RobotServices, InteractiveMotions):
     def _on_loop_lost(self) -> None:
         # A program that somebody stopped stays stopped.
         self._may_upload = self._status.program_running
-        self._set_status(DriverStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST)))
+        self._set_status(ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST)))
         self._abort_all(LOOP_LOST)
 
     def _reconfigure(self) -> Configure:
@@ -543,7 +543,7 @@ class Driver(RobotServices, InteractiveMotions):
                 1e3 * limit,
             )
 
-    def _set_status(self, status: DriverStatus) -> None:
+    def _set_status(self, status: ConnectionStatus) -> None:
         self._status = status
         if status.state is ConnectionState.DISCONNECTED:
             self._signals, self._gaps = None, LinkGaps()

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.workspace import parse_planes

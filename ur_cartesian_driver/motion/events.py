@@ -11,8 +11,8 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.servo import ServoFeedback
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.servo_report import ServoFeedback
 from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 

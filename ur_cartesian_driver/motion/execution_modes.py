@@ -42,7 +42,7 @@ class ModeTraits:
     #: ``module:function`` that plans a checked goal; see ``planning.planner.PlanGoal``.
     planner: str
     #: ``module:function`` that makes the feeder of a motion; see
-    #: ``driver.loop.machine_factory.MakeFeeder``.
+    #: ``driver.loop.goal_machine_factory.MakeFeeder``.
     feeder: str
     #: Whether a spline of joint positions joins the points; if not, motions of the robot do.
     is_spline: bool
@@ -59,7 +59,7 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = MappingProxyType(
     {
         ExecutionMode.PRIMITIVES: ModeTraits(
             planner='ur_cartesian_driver.planning.planner:plan_moves',
-            feeder='ur_cartesian_driver.driver.loop.machine_factory:point_feeder',
+            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
             is_spline=False,
             streams_setpoints=False,
             switches_outputs=True,
@@ -67,7 +67,7 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = MappingProxyType(
         ),
         ExecutionMode.SPLINE: ModeTraits(
             planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
-            feeder='ur_cartesian_driver.driver.loop.machine_factory:point_feeder',
+            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
             is_spline=True,
             streams_setpoints=False,
             switches_outputs=True,
@@ -75,7 +75,7 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = MappingProxyType(
         ),
         ExecutionMode.SERVO: ModeTraits(
             planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
-            feeder='ur_cartesian_driver.driver.loop.machine_factory:servo_feeder',
+            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:servo_feeder',
             is_spline=True,
             streams_setpoints=True,
             switches_outputs=False,

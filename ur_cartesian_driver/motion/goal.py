@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
 
 

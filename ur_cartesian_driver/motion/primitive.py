@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 Joints: TypeAlias = Vector6

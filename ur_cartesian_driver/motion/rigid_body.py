@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import add, cross, Vector3, Vector6
 
 

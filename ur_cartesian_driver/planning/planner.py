@@ -42,14 +42,14 @@ from ur_cartesian_driver.motion.primitive import (
     Primitive,
     Target,
 )
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import segment_line, tightest_remark
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
+from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_draft import JOINT_SPACE_TYPES
-from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_timing import schedule
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs

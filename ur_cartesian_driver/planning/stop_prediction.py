@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import add_scaled6, ZERO6
 
 

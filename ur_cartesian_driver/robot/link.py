@@ -24,17 +24,17 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.program import PROGRAM_NAME, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
-from ur_cartesian_driver.robot.driver_status import (
-    DriverStatus,
+from ur_cartesian_driver.robot.connection_status import (
+    ConnectionStatus,
     is_paused,
     is_stopped,
     required_action,
@@ -66,7 +66,7 @@ class RobotLink:
         *,
         on_state: Callable[[RobotState], None],
         on_event: Callable[[Event], None],
-        on_status: Callable[[DriverStatus], None],
+        on_status: Callable[[ConnectionStatus], None],
         on_geometry: Callable[[DhTable], None],
         on_log: Callable[[int, str], None],
         on_signals: Callable[[Signals], None] = lambda _: None,
@@ -136,7 +136,7 @@ class RobotLink:
         )
 
     @property
-    def status(self) -> DriverStatus:
+    def status(self) -> ConnectionStatus:
         """How far the connection is."""
         return self._status.current
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 import logging
 
-from ur_cartesian_driver.robot.driver_status import DriverStatus, timestamped
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, timestamped
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
 
 #: In these states nothing is known of the robot, or it is the wrong one: the reason is the
@@ -27,7 +27,7 @@ class LinkStatus:
         self,
         message: str,
         required_action: Callable[[ConnectionState], str],
-        on_status: Callable[[DriverStatus], None],
+        on_status: Callable[[ConnectionStatus], None],
         on_log: Callable[[int, str], None],
     ) -> None:
         """
@@ -36,7 +36,7 @@ class LinkStatus:
         :param required_action: what is needed in a state, as a sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
-        self.current = DriverStatus(message=message)
+        self.current = ConnectionStatus(message=message)
 
     @property
     def state(self) -> ConnectionState:
@@ -63,7 +63,7 @@ class LinkStatus:
         self.update(last_error=timestamped(text))
         self._on_log(logging.ERROR, text)
 
-    def _log_change(self, before: DriverStatus, now: DriverStatus) -> None:
+    def _log_change(self, before: ConnectionStatus, now: ConnectionStatus) -> None:
         """Log what is needed, for those who do not see the status."""
         if now.message and now.message != before.message:
             if now.state is ConnectionState.CONNECTED:

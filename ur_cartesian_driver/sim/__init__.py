@@ -7,9 +7,9 @@ A simulated UR controller: it interprets the URScript it is sent and knows nothi
 its :class:`Controller` without network and clock, for tests that count cycles.
 """
 
-from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.robot import Ports, RobotSnapshot, SimulatedRobot
+from ur_cartesian_driver.sim.controller_assembly import assemble
+from ur_cartesian_driver.sim.simulated_robot import Ports, RobotSnapshot, SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 

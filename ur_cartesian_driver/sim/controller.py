@@ -16,7 +16,7 @@ from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import (
+from ur_cartesian_driver.motion.robot_state import (
     RobotMode,
     RobotStatus,
     RuntimeState,
@@ -30,7 +30,7 @@ from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Moti
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
-from ur_cartesian_driver.sim.programs.secondary_builtins import Builtins
+from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo

@@ -8,7 +8,7 @@ import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_client import HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.assembly import assemble
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 OUTPUTS = (

@@ -22,11 +22,11 @@ from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.servo import ServoReport
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.robot.driver_status import DriverStatus, LinkGaps
+from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 LENGTH = struct.Struct('>I')
@@ -139,7 +139,7 @@ class Shutdown:
 class StatusChanged:
     """The status changed."""
 
-    status: DriverStatus
+    status: ConnectionStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

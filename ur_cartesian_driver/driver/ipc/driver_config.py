@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.execution.goal.monitor import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.goal.goal_monitor import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 
 

@@ -19,7 +19,7 @@ import tempfile
 from typing import Any
 
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.state import RobotState, STATE_TABLE
+from ur_cartesian_driver.motion.robot_state import RobotState, STATE_TABLE
 from ur_cartesian_driver.motion.vectors import Vector6
 
 _COUNTER = struct.Struct('<Q')

@@ -25,7 +25,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
 )
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.end_reporter import EndReporter
-from ur_cartesian_driver.driver.loop.machine_factory import is_slow_to_make, make_machine
+from ur_cartesian_driver.driver.loop.goal_machine_factory import is_slow_to_make, make_machine
 from ur_cartesian_driver.driver.loop.newest_state import NewestState
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.point_buffer import PointBuffer
@@ -62,9 +62,9 @@ from ur_cartesian_driver.motion.events import (
     ServoReceived,
     StateReceived,
 )
+from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.rtde.servo_connection import ServoConnection
 

@@ -6,7 +6,7 @@ The robot loop: one asyncio loop that owns the sockets and the machine of the ru
 It never imports ROS. In a process of its own the owner cannot delay a message that the robot
 waits for: receiving a goal of 100,000 points holds Python's interpreter lock for seconds. It can
 also run in a thread. One pipe for messages and shared memory for the newest robot state join it
-to its owner, see :mod:`~ur_cartesian_driver.driver.loop.host`.
+to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
 
 When the pipe ends the loop closes its sockets, and the robot program stops the arm and ends. When
 the owner is silent the loop stops the arm.
@@ -47,8 +47,8 @@ from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.events import CancelRequested, Tick
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.robot.driver_status import DriverStatus, LinkGaps
+from ur_cartesian_driver.motion.io_signals import Signals
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.service_calls import DashboardCall
@@ -185,7 +185,7 @@ class RobotLoop:
 
     # ---- the robot ----------------------------------------------------------------------------
 
-    def _status_changed(self, status: DriverStatus) -> None:
+    def _status_changed(self, status: ConnectionStatus) -> None:
         before, self._status = self._status, status
         if status.state is ConnectionState.DISCONNECTED:
             self._newest.clear()

@@ -29,17 +29,17 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendControl,
     SendPoints,
 )
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.motion_job import AppendJob
-from ur_cartesian_driver.execution.goal.send_window import SendWindow
-from ur_cartesian_driver.execution.goal.states import (
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalSignal,
     GoalState,
     is_at_rest,
     Meaning,
     NO_MEANING,
 )
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob
+from ur_cartesian_driver.execution.goal.send_window import SendWindow
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 #: How long a motion that is only its ending so far waits for more before it begins [s]: the robot

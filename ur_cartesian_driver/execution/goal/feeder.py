@@ -13,12 +13,12 @@ from abc import ABC, abstractmethod
 from math import nan
 
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
-from ur_cartesian_driver.execution.goal.states import GoalState, Meaning, NO_MEANING
 from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 
 
 class Feeder(ABC):

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.servo import ServoReport
+from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 

@@ -25,10 +25,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.missed_deadlines import missed_deadline
-from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
-from ur_cartesian_driver.execution.goal.outcome_text import failure_text, tcp_report
-from ur_cartesian_driver.execution.goal.states import (
+from ur_cartesian_driver.execution.goal.goal_transitions import (
     detect_stop,
     GoalSignal,
     GoalState,
@@ -43,6 +40,9 @@ from ur_cartesian_driver.execution.goal.states import (
     STOP_PROGRAM_AFTER,
     TRANSITIONS,
 )
+from ur_cartesian_driver.execution.goal.missed_deadlines import missed_deadline
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
+from ur_cartesian_driver.execution.goal.outcome_text import failure_text, tcp_report
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import (
     ARMING_TIMEOUT,
@@ -63,7 +63,7 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 
 
 class GoalMachine:

@@ -5,7 +5,12 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.feeder import Feeder
-from ur_cartesian_driver.execution.goal.states import GoalSignal, GoalState, is_at_rest, Meaning
+from ur_cartesian_driver.execution.goal.goal_transitions import (
+    GoalSignal,
+    GoalState,
+    is_at_rest,
+    Meaning,
+)
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, STOP_TIMEOUT
 

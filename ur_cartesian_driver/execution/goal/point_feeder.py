@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendControl, SendPoints
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.send_window import SendWindow
-from ur_cartesian_driver.execution.goal.states import GoalState
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.states import GoalSignal, GoalState, Meaning
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalSignal, GoalState, Meaning
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.motion.events import Event, ServoReceived
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.servo import ServoFeedback
+from ur_cartesian_driver.motion.servo_report import ServoFeedback
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.program.registers import ServoMode
 

@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import subtract, Vector3, Vector6
 
 _AXES = ('x', 'y', 'z')

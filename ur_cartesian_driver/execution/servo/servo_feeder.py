@@ -33,13 +33,18 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     ReportServo,
     WriteServo,
 )
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor, START_ANGLE_TOLERANCE
-from ur_cartesian_driver.execution.goal.states import GoalSignal, GoalState, Meaning, NO_MEANING
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, START_ANGLE_TOLERANCE
+from ur_cartesian_driver.execution.goal.goal_transitions import (
+    GoalSignal,
+    GoalState,
+    Meaning,
+    NO_MEANING,
+)
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
 from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
-from ur_cartesian_driver.motion.servo import ServoFeedback, UNKNOWN6
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
 from ur_cartesian_driver.motion.vectors import subtract6, Vector6
 
 #: The connection to the inputs, as :class:`LinkLost` names it.

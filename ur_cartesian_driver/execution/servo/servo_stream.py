@@ -39,7 +39,12 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
-from ur_cartesian_driver.motion.servo import ServoActivity, ServoFeedback, ServoReport, UNKNOWN6
+from ur_cartesian_driver.motion.servo_report import (
+    ServoActivity,
+    ServoFeedback,
+    ServoReport,
+    UNKNOWN6,
+)
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoMode, SyncState
 

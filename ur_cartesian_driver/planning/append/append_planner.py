@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
     AppendedPoints,

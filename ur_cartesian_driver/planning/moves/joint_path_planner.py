@@ -38,26 +38,26 @@ from ur_cartesian_driver.planning.geometry.curves import (
 from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece, segments_of
 from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
+from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
 from ur_cartesian_driver.planning.moves.segment_draft import (
     can_blend,
     JOINT_SPACE_TYPES,
     SegmentDraft,
     SegmentDraftBuilder,
 )
-from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.joint_path import (
+from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,
     sample_joint_moves,
     solve_joint_path,
 )
-from ur_cartesian_driver.planning.preflight.margins import near_singularity_refusal
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     describe_miss,
     named_joints,
     TcpKinematics,
 )
+from ur_cartesian_driver.planning.preflight.tightest_margins import near_singularity_refusal
 from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
 from ur_cartesian_driver.planning.request.goal_fields import (
     DEFAULT_SEGMENT,

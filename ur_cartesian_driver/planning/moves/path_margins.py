@@ -16,9 +16,9 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece, Ints, PathSamples
-from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound
-from ur_cartesian_driver.planning.preflight.joint_path import JointPath
-from ur_cartesian_driver.planning.preflight.margins import (
+from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound
+from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
     margins_by_segment,
     singularity_distance_rows,
     TightestMargin,

@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
-from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 
 

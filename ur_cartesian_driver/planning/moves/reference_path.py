@@ -18,7 +18,7 @@ from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, path_
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
-from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 
 #: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8

@@ -24,7 +24,7 @@ from ur_cartesian_driver.planning.geometry.speed_profile import (
     SpeedProfile,
     trapezoid,
 )
-from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.speed_limits import (
     is_blended,
     leading_quantity,

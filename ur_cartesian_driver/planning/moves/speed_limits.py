@@ -16,7 +16,7 @@ from math import inf
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, SAME_POSITION
-from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound, SegmentGeometry
+from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound, SegmentGeometry
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 

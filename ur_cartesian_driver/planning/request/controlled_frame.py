@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
 from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import add, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (

@@ -38,22 +38,22 @@ from ur_cartesian_driver.planning.geometry.samples import (
 )
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.joint_path import (
+from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,
     solve_joint_path,
-)
-from ur_cartesian_driver.planning.preflight.margins import (
-    is_leaving_rows,
-    margins_by_segment,
-    near_singularity_refusal,
-    singularity_distance_rows,
-    TightestMargin,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     describe_miss,
     named_joints,
     TcpKinematics,
+)
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    is_leaving_rows,
+    margins_by_segment,
+    near_singularity_refusal,
+    singularity_distance_rows,
+    TightestMargin,
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 

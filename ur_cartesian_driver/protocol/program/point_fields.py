@@ -48,6 +48,7 @@ from typing import cast, TypeAlias, TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     Instruction,
@@ -62,7 +63,6 @@ from ur_cartesian_driver.motion.primitive import (
     SwitchOutput,
     Target,
 )
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
-from ur_cartesian_driver.robot.driver_status import DriverStatus, has_ended
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RobotStatus
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, has_ended
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 
@@ -48,7 +48,9 @@ class ProgramAutoStart:
         self._power_up, self._upload, self._warn = power_up, upload, warn
         self._powering_up = False
 
-    def review(self, robot: RobotState, status: DriverStatus, *, program_connected: bool) -> None:
+    def review(
+        self, robot: RobotState, status: ConnectionStatus, *, program_connected: bool
+    ) -> None:
         """Start the program, or log why not, once the robot is known."""
         if not self._pending or status.state not in (
             ConnectionState.CONNECTED,
@@ -70,7 +72,7 @@ class ProgramAutoStart:
         else:
             self._upload()
 
-    def _is_waiting_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
+    def _is_waiting_for_power(self, robot: RobotState, status: ConnectionStatus) -> bool:
         """Switch the arm on if auto_power asks for it; tell whether the program has to wait."""
         s = self._settings
         if (

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from math import inf
 
-from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.robot.driver_status import has_ended, is_paused
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
 #: How long a program may hold its sockets after the robot has reported its end [s].

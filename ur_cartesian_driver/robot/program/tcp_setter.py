@@ -9,12 +9,12 @@ When that is due is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
 from __future__ import annotations
 
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.program.secondary_program import tcp_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.protocol.program.script_command import TcpPersistence
-from ur_cartesian_driver.robot.driver_status import is_paused
+from ur_cartesian_driver.robot.connection_status import is_paused
 from ur_cartesian_driver.robot.primary_client import PrimaryClient
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 

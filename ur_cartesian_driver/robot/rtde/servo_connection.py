@@ -17,8 +17,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ur_cartesian_driver.motion.servo import ServoFeedback
-from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, SERVO_OUTPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.dashboard import (
     COMMAND_SPECS,
     DashboardGreeting,

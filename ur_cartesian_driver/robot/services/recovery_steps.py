@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import auto, Enum
 from types import MappingProxyType
 
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 

@@ -14,8 +14,8 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector3
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 

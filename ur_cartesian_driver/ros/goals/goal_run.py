@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.message_fields import nanoseconds
-from ur_cartesian_driver.ros.messages.feedback_messages import feedback_message, FeedbackFrame
+from ur_cartesian_driver.ros.messages.action_messages import feedback_message, FeedbackFrame
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message, resolve_frames
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames

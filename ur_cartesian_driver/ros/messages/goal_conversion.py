@@ -27,8 +27,8 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.message_fields import (

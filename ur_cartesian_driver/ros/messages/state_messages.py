@@ -15,11 +15,11 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from ur_cartesian_driver.driver import DriverStatus as DriverState
+from ur_cartesian_driver.driver import ConnectionStatus
+from ur_cartesian_driver.motion.io_signals import AnalogChannel, Signals
 from ur_cartesian_driver.motion.pose import conjugate, rotate
-from ur_cartesian_driver.motion.servo import ServoReport
-from ur_cartesian_driver.motion.signals import AnalogChannel, Signals
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
 from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage
@@ -83,7 +83,7 @@ def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> Transf
 
 
 def status_message(
-    driver_state: DriverState, state: RobotState | None, stamp: Time
+    connection: ConnectionStatus, state: RobotState | None, stamp: Time
 ) -> DriverStatus:
     """
     Return the state of the connection and the modes of the robot.
@@ -94,7 +94,7 @@ def status_message(
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
         if name != 'header':
-            value = getattr(driver_state if hasattr(driver_state, name) else state, name, None)
+            value = getattr(connection if hasattr(connection, name) else state, name, None)
             if value is None:
                 value = _unknown(name, getattr(message, name))
             setattr(message, name, int(value) if isinstance(value, IntEnum) else value)

@@ -28,8 +28,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.io_signals import Signals
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,

@@ -24,7 +24,7 @@ from math import isfinite, sqrt
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
-from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 
 #: ``base_link`` in ``base``.

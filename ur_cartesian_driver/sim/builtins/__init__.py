@@ -30,7 +30,7 @@ from ur_cartesian_driver.sim.builtins.robot_builtins import (
 )
 from ur_cartesian_driver.sim.builtins.socket_builtins import SocketBuiltins
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.programs.secondary_builtins import Builtins
+from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
 from ur_cartesian_driver.urscript import core_builtins
 
 BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (

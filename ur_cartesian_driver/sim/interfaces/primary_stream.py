@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ur_cartesian_driver.motion.state import RobotMode, RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotStatus, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_message,
     encode_state,

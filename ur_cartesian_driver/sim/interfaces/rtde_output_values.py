@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.motion.robot_state import RobotMode
 from ur_cartesian_driver.motion.vectors import add, add6, dot, scale, Vector3, Vector6, ZERO6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (

@@ -8,6 +8,11 @@ functions of time, geometry is a function of a path parameter, and servo laws in
 """
 
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
-from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
+from ur_cartesian_driver.sim.motion.motion_values import (
+    MotionError,
+    MotionFault,
+    MotionWarning,
+    Move,
+)
 
 __all__ = ['MotionError', 'MotionFault', 'MotionGenerator', 'MotionWarning', 'Move']

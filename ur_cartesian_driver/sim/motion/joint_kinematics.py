@@ -15,8 +15,8 @@ from ur_cartesian_driver.motion.pose import (
     rotation_vector_from_quaternion,
 )
 from ur_cartesian_driver.motion.vectors import scale, scale6, subtract, subtract6, Vector6, ZERO6
+from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.move_paths import MovePath
-from ur_cartesian_driver.sim.motion.moves import MotionFault
 from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
 
 # Assumptions; the robot's numbers are not published:

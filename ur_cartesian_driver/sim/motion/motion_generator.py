@@ -32,13 +32,18 @@ from ur_cartesian_driver.sim.motion.motion_calls import (
     PathStart,
 )
 from ur_cartesian_driver.sim.motion.motion_reports import MotionReports
+from ur_cartesian_driver.sim.motion.motion_values import (
+    MotionError,
+    MotionFault,
+    MotionWarning,
+    Move,
+)
 from ur_cartesian_driver.sim.motion.move_paths import (
     CircularMovePath,
     JointMovePath,
     LinearMovePath,
     MovePath,
 )
-from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
 from ur_cartesian_driver.sim.motion.path_motion import PathMotion, ProfileParameters
 from ur_cartesian_driver.sim.motion.path_queue import PathQueue
 from ur_cartesian_driver.sim.motion.running_motion import RunningMotion

@@ -16,7 +16,7 @@ from collections.abc import Callable, Generator, Hashable
 from enum import Enum
 
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
-from ur_cartesian_driver.sim.motion.moves import MotionError, Move
+from ur_cartesian_driver.sim.motion.motion_values import MotionError, Move
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
 #: What a function of a program is that takes time: it yields once per cycle.

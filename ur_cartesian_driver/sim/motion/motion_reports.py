@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.sim.motion.moves import MotionFault, MotionWarning, Move
+from ur_cartesian_driver.sim.motion.motion_values import MotionFault, MotionWarning, Move
 
 #: Arguments of C171 by move: a waypoint was skipped; a blend is too small.
 _BLEND_SKIPPED_ARGUMENTS = {

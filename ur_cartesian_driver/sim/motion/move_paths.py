@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.vectors import (
     Vector3,
     Vector6,
 )
-from ur_cartesian_driver.sim.motion.moves import MotionError
+from ur_cartesian_driver.sim.motion.motion_values import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose
 

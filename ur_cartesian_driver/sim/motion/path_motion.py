@@ -23,6 +23,7 @@ from ur_cartesian_driver.sim.motion.motion_profile import (
     timed_cruise,
     trapezoid,
 )
+from ur_cartesian_driver.sim.motion.motion_values import Move
 from ur_cartesian_driver.sim.motion.move_paths import (
     end_within_radius,
     make_blend,
@@ -31,7 +32,6 @@ from ur_cartesian_driver.sim.motion.move_paths import (
     Setpoint,
     start_within_radius,
 )
-from ur_cartesian_driver.sim.motion.moves import Move
 
 # A section is over when less than this is left [s]: sums of cycles are rounded.
 _ROUNDING = 1e-9

@@ -22,8 +22,8 @@ from functools import lru_cache
 import logging
 from typing import Protocol
 
-from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.programs.secondary_builtins import Builtins, refuse_timed_functions
+from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins, refuse_timed_functions
 from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
 from ur_cartesian_driver.urscript import (
     CompileError,

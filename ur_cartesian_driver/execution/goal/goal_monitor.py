@@ -13,8 +13,8 @@ from math import inf
 
 import numpy as np
 
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalSignal
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.goal.states import GoalSignal
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
@@ -22,7 +22,7 @@ from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCh
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 
 #: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01

@@ -57,7 +57,12 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.motion.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyStatus,
+)
 
 
 class GoalState(Enum):

@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
 from ur_cartesian_driver.planning.geometry.curves import SegmentCurve
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile
-from ur_cartesian_driver.planning.preflight.margins import TightestMargin
+from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargin
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.driver import ConnectionState, DriverStatus
+from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_error
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
-from ur_cartesian_driver.msg import DriverStatus as DriverStatusMessage
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.message_fields import duration_message, seconds
-from ur_cartesian_driver.ros.messages.feedback_messages import (
+from ur_cartesian_driver.ros.messages.action_messages import (
     feedback_message,
     FeedbackFrame,
     result_message,
@@ -175,20 +175,20 @@ def test_the_robot_state_becomes_joint_states_and_a_pose():
 
 def test_the_status_joins_connection_and_modes():
     message = status_message(
-        DriverStatus(state=ConnectionState.STOPPED, message='Unlock it.', robot_model='ur5e'),
+        ConnectionStatus(state=ConnectionState.STOPPED, message='Unlock it.', robot_model='ur5e'),
         STATE,
         STAMP,
     )
-    assert message.state == DriverStatusMessage.STOPPED
+    assert message.state == DriverStatus.STOPPED
     assert message.message == 'Unlock it.'
     assert message.robot_model == 'ur5e'
-    assert message.robot_mode == DriverStatusMessage.ROBOT_MODE_IDLE
-    assert message.safety_mode == DriverStatusMessage.SAFETY_MODE_PROTECTIVE_STOP
+    assert message.robot_mode == DriverStatus.ROBOT_MODE_IDLE
+    assert message.safety_mode == DriverStatus.SAFETY_MODE_PROTECTIVE_STOP
     assert message.speed_scaling == 0.75
 
 
 def test_the_status_without_a_robot_knows_no_modes():
-    message = status_message(DriverStatus(), None, STAMP)
-    assert message.robot_mode == DriverStatusMessage.ROBOT_MODE_UNKNOWN
-    assert message.safety_mode == DriverStatusMessage.SAFETY_MODE_UNKNOWN
+    message = status_message(ConnectionStatus(), None, STAMP)
+    assert message.robot_mode == DriverStatus.ROBOT_MODE_UNKNOWN
+    assert message.safety_mode == DriverStatus.SAFETY_MODE_UNKNOWN
     assert isnan(message.speed_scaling)

@@ -14,7 +14,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
-from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder

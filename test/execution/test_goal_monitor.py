@@ -14,7 +14,7 @@ from random import Random
 import pytest
 
 from ur_cartesian_driver.execution.goal.goal_commands import Finish, SendControl
-from ur_cartesian_driver.execution.goal.states import GoalState
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Tolerance
 from ur_cartesian_driver.motion.pose import multiply, Pose, quaternion_from_rotation_vector

@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.errors import NearSingularity
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.joint_path import describe_location, JointPath
+from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath
 
 #: This close to a start at rest the arm may be singular [m], [rad] ...
 START_LENGTH = 0.001

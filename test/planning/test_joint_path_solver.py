@@ -44,7 +44,7 @@ from ur_cartesian_driver.planning.geometry.samples import (
     STEP_ANGLE,
     STEP_LENGTH,
 )
-from ur_cartesian_driver.planning.preflight.joint_path import solve_joint_path
+from ur_cartesian_driver.planning.preflight.joint_path_solver import solve_joint_path
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 
 TYPE = SegmentType

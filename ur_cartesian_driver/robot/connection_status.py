@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from datetime import datetime, UTC
 from math import nan
 
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DriverStatus:
+class ConnectionStatus:
     """How far the connection is, and what is needed before a goal can run."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED

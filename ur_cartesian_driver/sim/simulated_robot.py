@@ -19,11 +19,11 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.motion.vectors import Vector6
-from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
