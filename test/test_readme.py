@@ -331,6 +331,19 @@ def test_links_lead_to_files(document):
     assert missing == []
 
 
+@pytest.mark.parametrize('page', ['glossary.md', 'architecture.md', 'planning.md'])
+def test_modules_that_a_page_names_exist(page):
+    text = (CHECKOUT / 'doc' / page).read_text(encoding='utf-8')
+    named = re.findall(r'`([a-z_]+(?:/[a-z_]+)+/?(?:\.py)?)`', text)
+    assert len(named) > 5
+    folders = CHECKOUT / 'ur_cartesian_driver', CHECKOUT
+    assert [
+        name
+        for name in named
+        if not any((folder / f'{name}{end}').exists() for folder in folders for end in ('', '.py'))
+    ] == []
+
+
 def test_readme_leads_to_every_document():
     linked = set()
     for document in DOCUMENTS:
