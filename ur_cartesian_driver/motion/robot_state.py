@@ -113,7 +113,8 @@ class RobotState:
     Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
 
     This is the only table of these fields: what is read by RTDE, the shared memory and the
-    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come last.
+    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come last. A
+    field of the same name in DriverStatus.msg shows it; the simulator computes what it sends.
     """
 
     #: The controller's clock [s].

@@ -3,9 +3,10 @@
 """
 From a goal to a plan: choose the primitives, and refuse what the arm cannot do.
 
-:func:`plan` checks a goal as far as that needs no robot (:func:`~.request.validate.check`),
-expresses it for the TCP with which it runs, and gives it to the planner of its execution mode:
-:func:`plan_moves` or :func:`plan_spline_goal`.
+:func:`plan` checks a goal as far as that needs no robot
+(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses it for the TCP with which
+it runs, and gives it to the planner of its execution mode: :func:`plan_moves` or
+:func:`plan_spline_goal`.
 
 The stages of :func:`plan_moves`: the curve of every segment with the configuration in which it
 arrives, and the blends between them; clearance; times and speeds; primitives, outputs, reference

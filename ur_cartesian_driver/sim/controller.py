@@ -3,9 +3,9 @@
 """
 The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
-:func:`~.assembly.assemble` makes one; its owner calls :meth:`Controller.step` once per cycle, and
-any other method between two steps. It never waits, and owns neither clock nor network, so it
-runs on a virtual clock as well.
+:func:`~.controller_assembly.assemble` makes one; its owner calls :meth:`Controller.step` once per
+cycle, and any other method between two steps. It never waits, and owns neither clock nor network,
+so it runs on a virtual clock as well.
 """
 
 from __future__ import annotations

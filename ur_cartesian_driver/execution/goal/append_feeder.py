@@ -15,7 +15,7 @@ sent their number. Three things hold, whoever appends:
   cancelled has to read all of it.
 * Memory does not grow: records that were sent, and the path behind the arm, are forgotten.
 
-The states RUNNING_OUT and AWAITING_POINTS are of these goals only (:mod:`~.states`).
+The states RUNNING_OUT and AWAITING_POINTS are of these goals only (:mod:`~.goal_transitions`).
 """
 
 from __future__ import annotations

@@ -7,9 +7,10 @@ It sends nothing and reads no clock. The owner of the sockets calls :meth:`GoalM
 and then :meth:`GoalMachine.step` with every event, and carries out the commands that they return,
 until one of them is :class:`~.goal_commands.Finish`.
 
-Each event becomes a signal, the signal chooses a transition in the table of :mod:`~.states`, and
-the state that is entered gives commands. :mod:`~.monitor` compares the packets of the robot with
-the plan; a :class:`~.feeder.Feeder` knows what to send to the robot and what its answers mean.
+Each event becomes a signal, the signal chooses a transition in the table of
+:mod:`~.goal_transitions`, and the state that is entered gives commands. :mod:`~.goal_monitor`
+compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` knows what to send to
+the robot and what its answers mean.
 """
 
 from __future__ import annotations

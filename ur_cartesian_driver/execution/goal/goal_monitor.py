@@ -4,7 +4,7 @@
 Compare each packet of the robot with the plan of a goal: progress, and faults.
 
 The monitor finds faults and decides nothing: what follows from one in the present state is in the
-table of :mod:`~.states`.
+table of :mod:`~.goal_transitions`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How long a goal waits in its states; the states are in :mod:`~.states`."""
+"""How long a goal waits in its states; the states are in :mod:`~.goal_transitions`."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 Feeds a goal through the buffered servo: not points but set-points go to the robot.
 
 They come from a source, one for each packet of the robot (:mod:`~.servo_stream`). In the states of
-a goal (:mod:`~.states`) that means:
+a goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) that means:
 
 * in ARMING the inputs of the robot are taken, the divergence thresholds are written and the
   robot program has to answer. Inputs that belong to another client, or a program that does not

@@ -10,7 +10,8 @@ at its end, and the next part begins there.
 
 A primitive is planned again with the two before it as context, because its blend depends on them.
 A spline needs none, for its state at a point is position, velocity and acceleration; its ending is
-a piece that brakes after the last point (:func:`~.spline_planner.plan_stop`).
+a piece that brakes after the last point
+(:func:`~ur_cartesian_driver.planning.spline.spline_planner.plan_stop`).
 """
 
 from __future__ import annotations

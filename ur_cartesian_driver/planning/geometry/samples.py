@@ -5,7 +5,8 @@ Samples along the path of a goal: on parts of curves, and on the blends between 
 
 One sample every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
 and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four samples
-on each of them. Where the joints turn fast :mod:`~.joint_path` adds samples.
+on each of them. Where the joints turn fast
+:mod:`~ur_cartesian_driver.planning.preflight.joint_path_solver` adds samples.
 """
 
 from __future__ import annotations

@@ -31,7 +31,8 @@ def reference_path(
     Return the path that the robot is expected to follow, blends included.
 
     Lines are sampled at their ends and where their acceleration changes, other curves so that
-    their chords stay close (see :mod:`~.curves`); no two rows differ by more than 10 degrees.
+    their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); no two rows
+    differ by more than 10 degrees.
     """
     sections = list(_sections(geometries, timings))
     count = [len(section.at) for section in sections]

@@ -4,9 +4,9 @@
 Check the clearance of the arm from itself and from the workspace planes along its whole path.
 
 Capsules are checked in every row; where they come close, meshes measure exactly, for the models
-that have them (:mod:`~.collision_meshes`). An arm that starts too close can move away: rows pass
-as long as a pair that is too close at the start only separates, until it is clear; from then on it
-is treated like all others.
+that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). An arm that starts too
+close can move away: rows pass as long as a pair that is too close at the start only separates,
+until it is clear; from then on it is treated like all others.
 """
 
 from __future__ import annotations

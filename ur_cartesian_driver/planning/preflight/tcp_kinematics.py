@@ -5,7 +5,7 @@ Kinematics of an arm with a tool, with refusals that say why a pose cannot be re
 
 The robot gets poses; which of up to eight configurations it takes depends on the one before. So
 the configuration is predicted segment by segment: along a line or an arc by following the inverse
-kinematics (:mod:`~.joint_path`), for a joint move by choosing the solution that is sent as
+kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the solution that is sent as
 ``q_near``.
 """
 

@@ -4,7 +4,8 @@
 The checks of a goal that need no robot.
 
 :data:`RULES` lists them in the order in which they run; each is a small function that raises a
-refusal or returns. Reach, postures and speeds need the robot: :mod:`~.planner` checks them.
+refusal or returns. Reach, postures and speeds need the robot:
+:mod:`~ur_cartesian_driver.planning.planner` checks them.
 
 Refusals name fields as the ROS messages do (``trajectory.points[2].pose.orientation``).
 """

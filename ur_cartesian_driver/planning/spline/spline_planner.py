@@ -3,10 +3,10 @@
 """
 From points with times, twists and accelerations to joint spline pieces: SPLINE and SERVO.
 
-Points -> the tool over time (:mod:`~.tool_spline`) -> the arm along it (:mod:`~.spline_path`) ->
-limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion may be planned in parts:
-:func:`plan_spline` starts from any :class:`SplineState`, also a moving one, and :func:`plan_stop`
-brings such a motion to rest.
+Points -> the tool over time (:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm
+along it (:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A
+motion may be planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, also a
+moving one, and :func:`plan_stop` brings such a motion to rest.
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ _MAX_INCOMING = 65_536
 
 class ImpairedSockets:
     """
-    Script sockets that faults can impair; see :class:`~.script_sockets.ScriptSockets`.
+    Script sockets that faults can impair.
 
-    Without a fault every call goes straight through.
+    They wrap :class:`~ur_cartesian_driver.sim.sockets.script_sockets.ScriptSockets`; without a fault every call goes straight through.
     """
 
     def __init__(self, sockets: ScriptSockets) -> None:
