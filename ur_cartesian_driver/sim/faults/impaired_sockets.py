@@ -15,7 +15,8 @@ class ImpairedSockets:
     """
     Script sockets that faults can impair.
 
-    They wrap :class:`~ur_cartesian_driver.sim.sockets.script_sockets.ScriptSockets`; without a fault every call goes straight through.
+    They wrap :class:`~ur_cartesian_driver.sim.sockets.script_sockets.ScriptSockets`; without a
+    fault every call goes straight through.
     """
 
     def __init__(self, sockets: ScriptSockets) -> None:
