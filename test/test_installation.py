@@ -120,7 +120,7 @@ def test_an_executable_prints_its_help(name):
 def test_the_executable_of_the_node_ends_with_a_sentence_for_a_wrong_parameter():
     done = run([*executable('driver'), '--ros-args', '-p', 'ur_type:=ur4'])
     assert done.returncode == 1
-    assert "Parameter ur_type is 'ur4'; it is one of ur3," in done.stderr
+    assert "Parameter ur_type is 'ur4', but must be one of ur3," in done.stderr
 
 
 @pytest.mark.slow
