@@ -62,6 +62,15 @@ class Client:
             'twist': self.receive.getActualTCPSpeed(),
         }
 
+    def note_at_rest(self, name: str, **values: Any) -> None:
+        """Note what is read once the arm rests.
+
+        The package's two connections read packets of their own, so the answer to a move may be
+        ahead of the newest state.
+        """
+        self.until(lambda: max(map(abs, self.receive.getActualQd())) < 1e-9)
+        self.note(name, **values)
+
     @contextlib.contextmanager
     def sampled(self, name: str) -> Iterator[None]:
         """Read poses all the time while something moves the arm."""
@@ -79,7 +88,7 @@ class Client:
         finally:
             end.set()
             reader.join()
-        self.note(name, poses=poses, joints=joints)
+        self.note_at_rest(name, poses=poses, joints=joints)
 
     def until(self, happened: Any) -> bool:
         """Wait until a condition holds."""
@@ -99,15 +108,15 @@ def offset(pose: list[float], x: float = 0.0, y: float = 0.0, z: float = 0.0) ->
 
 def moves(client: Client) -> None:
     control, receive = client.control, client.receive
-    client.note('start')
+    client.note_at_rest('start')
     target = [0.3, -1.6, 1.7, -1.4, -1.5, 0.2]
-    client.note('moveJ', done=control.moveJ(target, 1.05, 3.0), target=target)
+    client.note_at_rest('moveJ', done=control.moveJ(target, 1.05, 3.0), target=target)
     line = offset(receive.getActualTCPPose(), y=0.04, z=0.06)
     with client.sampled('moveL'):
         control.moveL(line, 0.25, 1.2)
     client.readings['moveL']['target'] = line
     near = offset(line, x=-0.05)
-    client.note('moveJ_IK', done=control.moveJ_IK(near, 1.05, 3.0), target=near)
+    client.note_at_rest('moveJ_IK', done=control.moveJ_IK(near, 1.05, 3.0), target=near)
     corners = [offset(near, z=0.08), offset(near, x=0.08, z=0.08), offset(near, x=0.08)]
     with client.sampled('blended'):
         control.moveL(
@@ -122,9 +131,9 @@ def moves(client: Client) -> None:
     with client.sampled('movec'):
         control.sendCustomScriptFunction('arc', f'\tmovec(p{via}, p{end}, a=1.2, v=0.2)\n')
     client.readings['movec'] |= {'start': start, 'via': via, 'end': end}
-    client.note('again', done=client.upload() and control.moveJ(HOME, 1.5, 3.0))
+    client.note_at_rest('again', done=client.upload() and control.moveJ(HOME, 1.5, 3.0))
     asked = control.getInverseKinematics(near, target)
-    client.note(
+    client.note_at_rest(
         'kinematics',
         forward=control.getForwardKinematics(target, TOOL),
         joints=target,
@@ -133,7 +142,7 @@ def moves(client: Client) -> None:
     )
     control.setTcp(TOOL)
     client.until(lambda: receive.getActualTCPPose()[:3] != client.readings['again']['pose'][:3])
-    client.note('tcp', offset=control.getTCPOffset())
+    client.note_at_rest('tcp', offset=control.getTCPOffset())
 
 
 def streams(client: Client) -> None:
@@ -155,9 +164,7 @@ def streams(client: Client) -> None:
     time.sleep(0.8)
     client.note('speedL', before=before)
     control.speedStop()
-    # Its two connections read packets of their own: the answer may be ahead of the newest state.
-    client.until(lambda: max(map(abs, receive.getActualTCPSpeed())) < 1e-9)
-    client.note('speedStop')
+    client.note_at_rest('speedStop')
     control.moveJ([home[0] + 1.0, *home[1:]], 0.5, 1.0, True)
     client.until(lambda: receive.getActualQd()[0] > 0.4)
     client.note('running')
@@ -237,7 +244,7 @@ def power(client: Client) -> None:
     dashboard.unlockProtectiveStop()
     client.until(lambda: not receive.isProtectiveStopped())
     q = [HOME[0] + 0.1, *HOME[1:]]
-    client.note(
+    client.note_at_rest(
         'unlocked',
         refused=refused,
         safety=dashboard.safetymode(),
@@ -250,7 +257,7 @@ def power(client: Client) -> None:
     idle = client.until(lambda: receive.getRobotMode() == 5)
     dashboard.brakeRelease()
     running = client.until(lambda: receive.getRobotMode() == 7)
-    client.note(
+    client.note_at_rest(
         'cycled',
         modes=[off, idle, running],
         moved=client.upload() and control.moveJ(HOME, 1.0, 2.0),
