@@ -55,22 +55,21 @@ class SegmentGeometry:
     unblended_fraction: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True)
 class SegmentTiming:
-    """The speed of one segment over time."""
+    """The speed of one segment over time; its blends change it until it is returned."""
 
     #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
     velocity: float
     acceleration: float
-    wire_time: float = 0.0
-    #: The unit of the leading quantity, and its speed profile between the blends.
-    unit: str
+    #: The speed profile of its leading quantity between the blends.
     profile: SpeedProfile
+    #: Where speed or time come from, for the report.
+    source: str
+    #: On a change that the limits made; empty = none.
+    remark: str
+    wire_time: float = 0.0
     #: Expected time, half of each blend included [s]; 0 until the blends are timed.
     duration: float = 0.0
     #: Time in the blend after it [s], 0 without one.
     blend_time: float = 0.0
-    #: Where speed or time come from, for the report.
-    source: str = ''
-    #: On a change that the limits made; empty = none.
-    remark: str = ''
