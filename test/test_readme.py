@@ -407,12 +407,22 @@ def test_every_robot_model_is_listed():
     assert set(re.findall(r'\bur\d+(?:e|long)?\b', section)) == set(MODELS)
 
 
-def test_diagrams_are_those_of_the_tables():
-    spec = importlib.util.spec_from_file_location(
-        'make_diagrams', CHECKOUT / 'scripts' / 'make_diagrams.py'
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, CHECKOUT / 'scripts' / f'{name}.py')
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_parameter_file_is_that_of_the_declarations():
+    make_parameter_file = script('make_parameter_file')
+    assert make_parameter_file.FILE.read_text(encoding='utf-8') == make_parameter_file.text(), (
+        'run python scripts/make_parameter_file.py'
     )
-    make_diagrams = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(make_diagrams)
+
+
+def test_diagrams_are_those_of_the_tables():
+    make_diagrams = script('make_diagrams')
     directory = CHECKOUT / 'doc' / 'diagrams'
     assert {
         path.name: path.read_text(encoding='utf-8') for path in directory.glob('*.md')

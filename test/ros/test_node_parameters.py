@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import fields
 import re
+from typing import get_args, get_origin, get_type_hints, Literal
 
 import pytest
 import rclpy
@@ -11,7 +12,9 @@ from rclpy.parameter import Parameter
 import yaml
 
 from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.parameters.node_parameters import (
     as_overrides,
@@ -57,6 +60,15 @@ def in_the_file():
 
 def test_the_file_holds_all_parameters_with_their_defaults():
     assert in_the_file() == defaults()
+
+
+def test_choices_are_those_of_the_tables_and_types_that_use_them():
+    choices = {declaration.name: declaration.choices for declaration in DECLARATIONS}
+    assert choices['ur_type'] == list(MODELS)
+    assert choices['wire_dialect'] == list(DIALECTS)
+    for name, kind in get_type_hints(PlanningOptions).items():
+        if get_origin(kind) is Literal:
+            assert set(choices[name]) == set(get_args(kind)), name
 
 
 def test_the_file_has_the_order_of_the_declarations():
