@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -350,7 +351,7 @@ def test_nothing_moves_when_the_robot_does_not_set_the_tcp(make_driver, ur_sim, 
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     program = wrap_in_program(fetch_program(driver))
-    line = 'apply_tcp(pose_at(command, 2), command[8])'
+    line = f'{PREFIX}apply_tcp({PREFIX}pose_at(command, 2), command[8])'
     assert line in program
     ur_sim.run_script(program.replace(line, 'textmsg("no TCP")'))
     driver.wait_ready(5.0)

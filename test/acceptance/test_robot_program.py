@@ -17,6 +17,7 @@ from waiting import wait_for
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     PrimaryDecoder,
     RuntimeExceptionMessage,
@@ -59,13 +60,13 @@ def test_the_served_program_runs_as_it_is(served, ur_sim):
 def test_a_program_with_other_names_does_the_same(served, ur_sim):
     driver, text = served
     for name in (
-        'run_point',
-        'points_left',
-        'abandon_trajectory',
-        'run_trajectory',
+        f'{PREFIX}run_point',
+        f'{PREFIX}points_left',
+        f'{PREFIX}abandon_trajectory',
+        f'{PREFIX}run_trajectory',
         'kind',
-        'read_timeout',
-        'connect_sockets',
+        'timeout',
+        f'{PREFIX}connect_sockets',
     ):
         text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
         assert count >= 2
@@ -77,8 +78,8 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
 def test_an_added_line_is_executed(served, ur_sim):
     driver, text = served
     text = text.replace(
-        '  local kind = point[POINT_TYPE]',
-        '  local kind = point[POINT_TYPE]\n  textmsg("this point is a ", kind)',
+        f'  local kind = point[{PREFIX}POINT_TYPE]',
+        f'  local kind = point[{PREFIX}POINT_TYPE]\n  textmsg("this point is a ", kind)',
     )
     upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
@@ -89,7 +90,7 @@ def test_an_added_line_is_executed(served, ur_sim):
 def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
     """Halve the scale of the program: the arm covers half the distance."""
     driver, text = served
-    text = text.replace('MULT_TIME = 1000000', 'MULT_TIME = 500000')
+    text = text.replace('MULT_TIME = 1000000.0', 'MULT_TIME = 500000.0')
     upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
     with record() as recording:
@@ -108,8 +109,12 @@ def test_a_changed_result_changes_the_outcome(served, ur_sim):
 @pytest.mark.parametrize(
     ('line', 'replacement', 'expected'),
     [
-        ('begin_motion()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
-        ('local kind = point[POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
+        (
+            f'{PREFIX}begin_motion()',
+            'no_such_function()',
+            'compile_error_name_not_found:no_such_function:',
+        ),
+        (f'local kind = point[{PREFIX}POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
     ],
 )
 def test_a_broken_program_is_refused_with_line_and_column(

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
 from ur_cartesian_driver.motion.vectors import add6, scale6, subtract6
 from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
@@ -261,7 +262,7 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
     ('text', 'changed', 'far'),
     [
         ('OUTPUT_LEAD = 1.5', 'OUTPUT_LEAD = 21.5', 20.0),
-        ('due = outputs_done < outputs_due', 'due = True', 25.0),
+        (f'due = {PREFIX}outputs_done < {PREFIX}outputs_due', 'due = True', 25.0),
     ],
 )
 def test_a_changed_program_changes_where_outputs_switch(text, changed, far):
@@ -284,6 +285,23 @@ def test_a_changed_program_changes_where_outputs_switch(text, changed, far):
         on_cycle=watched,
     )
     assert apart(watched.changes[0][2], place.position) >= 0.9 * far * SPEED * STEP
+
+
+def test_no_variable_begins_as_an_int_and_is_given_a_fraction(widened):
+    robot = RobotInMemory('ur5e')
+    watched = Watched(robot)
+    place = watched.at(x=0.005)
+    points = [
+        line(watched.at(y=0.01)),
+        switch(1, delay=0.01),
+        line(watched.at()),
+        switch(2, trigger_pose=place, trigger_direction=heading(place, 1, 0)),
+        line(watched.at(x=0.01)),
+        *(switch(3, float(k % 2)) for k in range(MAX_PENDING_OUTPUTS + 1)),
+        MoveJ(target=HOME, duration=0.5),
+    ]
+    assert not robot.run(points, on_cycle=watched).failure
+    assert widened == set()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
-from ur_cartesian_driver.program.render import FEATURES, has_feature
+from ur_cartesian_driver.program.render import FEATURES, has_feature, MARKERS, PREFIX
 from ur_cartesian_driver.protocol.program.point_fields import MotionType, SplineKind
 from ur_cartesian_driver.protocol.program.registers import (
     ExternalError,
@@ -24,7 +24,7 @@ from ur_cartesian_driver.protocol.program.registers import (
 )
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.script_command import ScriptCommand, TcpPersistence
-from ur_cartesian_driver.urscript import parse
+from ur_cartesian_driver.urscript import parse, ScriptInterpreter
 
 SETTINGS: dict[str, Any] = {
     'host': '192.168.56.1',
@@ -35,7 +35,8 @@ SETTINGS: dict[str, Any] = {
 
 
 def text(**changes):
-    return render(ProgramSettings(**SETTINGS | changes))
+    """Return the program with the names that its source has."""
+    return render(ProgramSettings(**SETTINGS | changes)).replace(PREFIX, '')
 
 
 @pytest.mark.parametrize('version', [(3, 15, 8), (5, 4, 0), (5, 21, 0), (10, 7, 0), (10, 12, 1)])
@@ -84,7 +85,7 @@ def test_statements_contain_no_numbers_of_the_protocol():
         for line in statements
         for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.])', re.sub(r'"[^"]*"', '', line))
     }
-    assert numbers <= {*map(str, range(13)), '15', '0.2', '1000'}
+    assert numbers <= {*map(str, range(13)), '15', '0.0', '0.2', '1.0', '2.0', '1000.0'}
 
 
 @pytest.mark.parametrize(
@@ -134,6 +135,13 @@ def test_no_local_has_the_name_of_a_global():
     assert not [place for place in inside if place[1] in everywhere]
 
 
+def test_a_fraction_after_an_int_is_found(widened):
+    """So the tests that run the program would find it."""
+    text = 'x = 0\ny = [0, 0]\nz = 0\nx = 0.5\ny[1] = 1.5\nz = 1\nu = 0.0\nu = 0.5\n'
+    ScriptInterpreter(parse(f'def f():\n{text}end\n'), {}).step()
+    assert widened == {'x', 'y'}
+
+
 def test_handles_of_threads_are_killed_and_not_compared():
     """What a controller makes of a handle beside a number is written nowhere."""
     handles = re.findall(r'(\w+) = run ', text())
@@ -149,23 +157,29 @@ def test_a_host_cannot_inject_text_into_the_program(host):
         ProgramSettings(**SETTINGS | {'host': host})
 
 
-def test_the_urcap_finds_its_markers():
-    lines = [line.strip() for line in text().splitlines()]
-    markers = [
+def test_the_external_control_node_finds_its_markers_and_no_other_comment():
+    lines = text().splitlines()
+    comments = [line for line in lines if '#' in line]
+    assert comments == [
         '# HEADER_BEGIN',
         '# HEADER_END',
         '# NODE_CONTROL_LOOP_BEGINS',
         '# NODE_CONTROL_LOOP_ENDS',
     ]
-    places = [lines.index(marker) for marker in markers]
-    assert places == sorted(places)
+    assert set(comments) == MARKERS
+    assert lines[0] == '# HEADER_BEGIN'  # what stands before it is lost
 
 
-def test_an_uploaded_program_is_one_indented_definition():
+def test_no_line_is_empty():
+    assert all(map(str.strip, text(allow_freedrive=True).splitlines()))
+
+
+def test_an_uploaded_program_is_one_indented_definition_without_comments():
     lines = wrap_in_program(text()).splitlines()
     assert lines[0] == 'def ur_cartesian_driver():'
     assert lines[-1] == 'end'
-    assert all(not line or line.startswith('\t') for line in lines[1:-1])
+    assert all(line.startswith('\t') for line in lines[1:-1])
+    assert '#' not in ''.join(lines)
 
 
 def test_an_include_is_inserted_with_its_settings():

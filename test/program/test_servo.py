@@ -317,3 +317,14 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
     assert controller.programs.running, controller.messages.log
     assert max(map(abs, controller.motion.qd)) == 0.0
     assert out.integers[OutputInteger.ACTUAL_MODE] == ServoMode.SERVO
+
+
+def test_no_variable_begins_as_an_int_and_is_given_a_fraction(widened):
+    servo = Servo().enter()
+    servo.swing(20)
+    servo.sequence += 3
+    servo.cycle(5, steps=3)
+    servo.leave()
+    servo.cycle(5)
+    assert servo.running
+    assert widened == set()

@@ -18,6 +18,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.primitive import MoveJ, Spline
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 START = np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2])
@@ -284,6 +285,14 @@ def test_a_spline_waits_during_a_pause_as_moves_do(robot):
 # ---- the text is what runs ---------------------------------------------------------------------
 
 
+def test_no_variable_begins_as_an_int_and_is_given_a_fraction(widened):
+    robot = RobotInMemory('ur5e')
+    for quintic in (True, False):
+        robot.place(HOME, IDENTITY)
+        assert not robot.run(pieces([0.0011, 0.3, 0.4031], quintic)).failure
+    assert widened == set()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ('line', 'replacement', 'size'),
@@ -298,13 +307,14 @@ def test_a_changed_program_changes_the_motion(line, replacement, size):
     """So the tests above would find it."""
 
     def edit(text):
-        head, statements = text.split('# HEADER_BEGIN')[0], text
-        assert statements.count(line) >= 1
-        changed = [
-            row if row.startswith('SPLINE_') else row.replace(line, replacement)
-            for row in statements.splitlines()
-        ]
-        return wrap_in_program(head + '\n'.join(changed))
+        rows = text.replace(PREFIX, '').splitlines()
+        assert any(line in row for row in rows)
+        return wrap_in_program(
+            '\n'.join(
+                row if row.startswith('SPLINE_') else row.replace(line, replacement)
+                for row in rows
+            )
+        )
 
     splines = pieces([0.0603] * 20)
     robot = RobotInMemory('ur5e', edit=edit)

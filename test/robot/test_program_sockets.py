@@ -5,6 +5,7 @@
 import asyncio
 import contextlib
 import itertools
+import socket
 from unittest.mock import Mock
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol.program import reverse
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot import transport
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
@@ -346,6 +348,54 @@ def test_the_program_is_served_to_a_request_in_pieces_and_to_the_next_caller():
             reader, writer = await here.dial('script_sender_port')
             writer.write(b'request_program\n')
             assert await asyncio.wait_for(reader.readexactly(12), 5.0) == b'the program\n'
+
+    asyncio.run(scene())
+
+
+def read_until_pause(port):
+    """Fetch the program as the External Control node does: it stops when nothing is waiting."""
+    with socket.create_connection((HOST, port), timeout=5.0) as node:
+        node.sendall(REQUEST)
+        received = node.recv(8192)
+        node.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while data := node.recv(8192):
+                received += data
+        return received
+
+
+def test_a_reader_that_stops_at_the_first_pause_gets_the_whole_program():
+    async def scene():
+        async with cell() as here:
+            here.sockets.render(HOST, ControllerVersion(major=5, minor=21, bugfix=0))
+            port = here.sockets.ports['script_sender_port']
+            for _ in range(50):
+                program = await asyncio.to_thread(read_until_pause, port)
+                assert program.decode() == here.sockets.text + '\n'
+
+    asyncio.run(scene())
+
+
+def test_the_program_leaves_in_one_call_where_the_system_keeps_little(monkeypatch):
+    unsent = []
+
+    def send_at_once(connection, data):
+        sock = connection._transport.get_extra_info('socket')
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        sent = at_once(connection, data)
+        unsent.append(connection._transport.get_write_buffer_size())
+        return sent
+
+    at_once = transport.TcpConnection.send_at_once
+    monkeypatch.setattr(transport.TcpConnection, 'send_at_once', send_at_once)
+
+    async def scene():
+        async with cell() as here:
+            here.sockets.text = 'x' * 40_000
+            reader, writer = await here.dial('script_sender_port')
+            writer.write(REQUEST)
+            await reader.readuntil()
+            assert unsent == [0]
 
     asyncio.run(scene())
 

@@ -15,6 +15,10 @@ program that start with ``#!`` are instructions for this module:
     keep these lines only if the controller's software has the feature, because a controller
     refuses a program that names an unknown function. ``freedrive`` does not depend on the
     software: its lines are kept if freedrive is allowed.
+
+What is sent has no comments, except the markers of the External Control node, and no empty lines.
+Programs on the pendant share one name space with ours, so each name that the program defines on
+its first level (variables, functions, threads) gets a :data:`PREFIX` there.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from importlib.resources import files
+import re
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
@@ -32,6 +37,22 @@ from ur_cartesian_driver.protocol.program import point_fields, registers, revers
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
 
 PROGRAM_NAME = 'ur_cartesian_driver'
+
+#: Begins the name of every global variable, function and thread on the robot.
+PREFIX = 'urcd_'
+
+#: Comments by which the External Control node divides the program.
+MARKERS = frozenset(
+    {
+        '# HEADER_BEGIN',
+        '# HEADER_END',
+        '# NODE_CONTROL_LOOP_BEGINS',
+        '# NODE_CONTROL_LOOP_ENDS',
+    }
+)
+
+_DEFINITION = re.compile(r'(?:def|thread) (\w+)\(|(\w+) = ')
+_STRING_OR_NAME = re.compile(r'"[^"]*"|\w+')
 
 #: The buffered servo repeats a set-point until each joint is within this tolerance [rad], but at
 #: most so many times, as in the manufacturer's guide.
@@ -117,13 +138,24 @@ def render(settings: ProgramSettings) -> str:
 
     :raises LocalProtocolError: an instruction in the program is unknown (a defect of ours).
     """
-    return '\n'.join(_lines('driver', settings)) + '\n'
+    lines = [line for line in _lines('driver', settings) if not _is_comment(line)]
+    own = {match[1] or match[2] for line in lines if (match := _DEFINITION.match(line))}
+
+    def rename(found: re.Match[str]) -> str:
+        return PREFIX + found[0] if found[0] in own else found[0]
+
+    return ''.join(f'{_STRING_OR_NAME.sub(rename, line)}\n' for line in lines)
 
 
 def wrap_in_program(text: str) -> str:
     """Return the text as a program that can be uploaded: indented, in a ``def``."""
-    body = ''.join(f'\t{line}\n' if line else '\n' for line in text.splitlines())
+    body = ''.join(f'\t{line}\n' for line in text.splitlines() if line not in MARKERS)
     return f'def {PROGRAM_NAME}():\n{body}end\n'
+
+
+def _is_comment(line: str) -> bool:
+    """Tell whether the robot does not need a line."""
+    return line not in MARKERS and line.lstrip()[:1] in ('', '#')
 
 
 def has_feature(feature: str, version: tuple[int, int, int]) -> bool:
@@ -164,8 +196,9 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'POINT_TIMEOUT = {settings.point_timeout}'
     # PolyScope X can read twice as often in a step as its predecessors.
     yield f'DISCARDED_PER_STEP = {20 if settings.version[0] >= 10 else 10}'
-    yield f'MULT_JOINTSTATE = {FIXED_POINT}'
-    yield f'MULT_TIME = {FIXED_POINT}'
+    # Floats, because what is divided by them has fractions.
+    yield f'MULT_JOINTSTATE = {float(FIXED_POINT)}'
+    yield f'MULT_TIME = {float(FIXED_POINT)}'
     yield f'REVERSE_FIELDS = {reverse.MESSAGE_FIELDS}'
     yield f'POINT_FIELDS = {trajectory.POINT_FIELDS}'
     yield f'COMMAND_FIELDS = {script_command.COMMAND_WORDS}'

@@ -133,6 +133,14 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._transport.write(data)
         return True
 
+    def send_at_once(self, data: bytes) -> bool:
+        """Send bytes in one call of the system, for a reader that stops at the first pause."""
+        if self._transport is not None:
+            # Twice as much: the system counts the memory of its packets, not their bytes.
+            sock = self._transport.get_extra_info('socket')
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * len(data))
+        return self.send(data)
+
     def close(self, reason: str = '') -> None:
         """
         Close after what was sent has gone out, if it does within :data:`LINGER_TIMEOUT`.

@@ -8,8 +8,9 @@ The script sender: how the External Control URCap fetches the robot program.
     robot -> driver   request_program\n                 (16 bytes)
     driver -> robot   the program, and one more \n
 
-The connection stays open and the robot may ask again. The reply contains no length; the reader
-finds the end by a marker in the program.
+The connection stays open and the robot may ask again. The reply contains no length; the External
+Control node takes the lines that have arrived when it finds nothing more to read, so the reply
+must leave without a pause.
 """
 
 from __future__ import annotations

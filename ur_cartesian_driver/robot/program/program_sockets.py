@@ -263,7 +263,7 @@ class ProgramSockets:
             )
             return
         for _ in range(wanted):
-            if not connection.send(script_sender.reply(self.text)):
+            if not connection.send_at_once(script_sender.reply(self.text)):
                 return
 
 
