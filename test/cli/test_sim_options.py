@@ -59,3 +59,38 @@ def test_options_reach_the_robot():
         EventFault(action=FaultEvent.STOP, trigger=AfterTime(2.0)),
         DropFault(interface='rtde'),
     ]
+
+
+def test_programs_of_a_directory_and_the_loaded_one_have_the_names_of_the_dashboard(tmp_path):
+    (tmp_path / 'wait.script').write_text('def wait():\n  sleep(1)\nend\n')
+    (tmp_path / 'notes.txt').write_text('no program')
+    loaded = tmp_path / 'elsewhere' / 'glue.script'
+    loaded.parent.mkdir()
+    loaded.write_text('def glue():\n  sync()\nend\n')
+    arguments = parser().parse_args(
+        ['sim', '--programs', str(tmp_path), '--program', str(loaded), '--no-remote-control']
+    )
+    config = commands.simulator_config(arguments)
+    assert config.programs == {
+        'wait.urp': 'def wait():\n  sleep(1)\nend\n',
+        'glue.urp': loaded.read_text(),
+    }
+    assert config.program == 'glue.urp'
+    assert not config.has_remote_control
+
+
+@pytest.mark.parametrize('option', ['--program', '--programs'])
+def test_a_program_that_there_is_not_is_one_sentence(capsys, option):
+    assert main(['sim', option, '/nowhere']) == 1
+    error = capsys.readouterr().err
+    assert '/nowhere' in error
+    assert error.count('\n') == 1
+
+
+def test_a_loaded_program_that_is_no_urscript_is_one_sentence(capsys, tmp_path):
+    (tmp_path / 'bad.script').write_text('def bad():\n  nothing(1)\nend\n')
+    assert main(['sim', '--program', str(tmp_path / 'bad.script')]) == 1
+    error = capsys.readouterr().err
+    assert 'bad.urp' in error
+    assert 'nothing' in error
+    assert error.count('\n') == 1

@@ -154,6 +154,23 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
     sim.add_argument(
         '--local', action='store_true', help='local control: refuse scripts from the network'
     )
+    sim.add_argument(
+        '--no-remote-control',
+        action='store_true',
+        help='the feature is off: take scripts, but report no remote control',
+    )
+    sim.add_argument(
+        '--program',
+        type=Path,
+        metavar='FILE',
+        help='URScript that is loaded for the dashboard from the start; NAME.script is NAME.urp',
+    )
+    sim.add_argument(
+        '--programs',
+        type=Path,
+        metavar='DIR',
+        help='directory of such files, which the dashboard can load',
+    )
 
 
 def _add_goal(command: argparse.ArgumentParser) -> None:

@@ -62,6 +62,9 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
 
     :raises ValueError: there is no such robot, or its calibration is not readable.
     """
+    files = [arguments.program] if arguments.program else []
+    if arguments.programs:
+        files += [file for file in arguments.programs.iterdir() if file.suffix == '.script']
     return SimulatorConfig(
         model=arguments.model,
         host=arguments.host,
@@ -74,11 +77,19 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         interpreter_port=arguments.interpreter_port,
         power='off' if arguments.power_off else 'running',
         remote_control=not arguments.local,
+        has_remote_control=not arguments.no_remote_control,
         rate=arguments.rate,
         faults=arguments.faults,
         geometry=calibration(arguments, robot_model(arguments.model)),
+        programs={_program_name(file): file.read_text() for file in files},
+        program=_program_name(arguments.program) if arguments.program else '',
         **({'q': arguments.joints} if arguments.joints else {}),
     )
+
+
+def _program_name(file: Path) -> str:
+    """Return the name by which the dashboard loads a file of URScript."""
+    return f'{file.stem}.urp'
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:

@@ -37,12 +37,14 @@ class CommandSpec:
 
     :param reply: the reply, with ``{}`` for its value.
     :param takes_argument: whether a text follows the command.
+    :param argument_is_optional: whether the text may be left out.
     :param cb3: first CB3 software that has the command; None = none has.
     :param e_series: the same for e-Series.
     """
 
     reply: str
     takes_argument: bool = False
+    argument_is_optional: bool = False
     cb3: tuple[int, int] | None = (0, 0)
     e_series: tuple[int, int] | None = (5, 0)
 
@@ -104,6 +106,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
         'generate flight report': CommandSpec(
             reply='Flight Report generated with id: {}',
             takes_argument=True,
+            argument_is_optional=True,
             cb3=(3, 13),
             e_series=(5, 8),
         ),
@@ -146,7 +149,8 @@ class DashboardRequest:
             raise LocalProtocolError(
                 f'{self.name} takes one line of text, but it got {self.argument!r}.'
             )
-        if bool(self.argument) != spec.takes_argument:
+        missing = spec.takes_argument and not self.argument and not spec.argument_is_optional
+        if missing or (self.argument and not spec.takes_argument):
             raise LocalProtocolError(
                 f'{self.name} takes {"a" if spec.takes_argument else "no"} text, but it got '
                 f'{self.argument!r}.'

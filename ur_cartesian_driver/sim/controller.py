@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Hashable
+from math import inf
+from pathlib import PurePosixPath
 from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -35,7 +37,7 @@ from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo
 from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
-from ur_cartesian_driver.sim.state.controller_state import Payload, Popup, ProcessState
+from ur_cartesian_driver.sim.state.controller_state import Payload, Pendant, Popup, ProcessState
 from ur_cartesian_driver.sim.state.power_and_safety import (
     ArmPower,
     OPERATIONAL,
@@ -58,6 +60,8 @@ _MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
+#: From a line that unlocks a protective stop to its effect [s]; known is only: not at once.
+UNLOCK_TIME = 0.02
 
 
 class CycleFaults(Protocol):
@@ -116,7 +120,9 @@ class Controller:
         self.external_ft = False
         #: What `tool_contact` returns: steps back to the contact, 0 = none.
         self.contact_steps = 0
-        self.remote_control = config.remote_control
+        self._unlock_at = inf
+        self.pendant = Pendant()
+        self.remote_control = config.remote_control and config.has_remote_control
         #: The speed slider, 0..1.
         self.speed_slider = 1.0
         #: The speed scaling at which motion runs now, 0..1; it follows slider, pauses and stops.
@@ -125,6 +131,8 @@ class Controller:
         self.programs: ProgramRunner = ProgramRunner(make_builtins(self), self.messages, self)
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
+        if config.program and (refusal := self.load_program(config.program)):
+            raise ValueError(f'program is {config.program}, which cannot be loaded: {refusal}')
         self.messages.on_error = self._pause_if_wanted
         #: Set by the assembly; None = nothing goes wrong.
         self.faults: CycleFaults | None = None
@@ -153,6 +161,11 @@ class Controller:
         """Bits of the safety system."""
         return STATUS_BITS[self.safety.mode]
 
+    @property
+    def takes_scripts(self) -> bool:
+        """Whether clients may send programs and commands: with no remote control, always."""
+        return self.remote_control or not self.config.has_remote_control
+
     def joint_history(self, steps: int) -> Vector6:
         """
         Return the joint positions some cycles ago.
@@ -171,6 +184,9 @@ class Controller:
         if self.faults is not None and self.faults.active:
             self.faults.step()
         self.power.step(self.time)
+        if self.time >= self._unlock_at:
+            self._unlock_at = inf
+            self.safety_event(SafetyEvent.UNLOCK_BY_LINE)
         self.sockets.poll()
         self._watch_inputs()
         was_at_rest = not self.motion.moving
@@ -259,6 +275,15 @@ class Controller:
         """Set the speed slider, cut to 0..1."""
         self.speed_slider = min(1.0, max(0.0, fraction))
 
+    def load_program(self, name: str) -> str:
+        """
+        Load a program by its file name; return the reason of a refusal, else an empty string.
+
+        Directories do not matter here.
+        """
+        text = self.config.programs.get(file := PurePosixPath(name).name)
+        return f'File not found: {name}' if text is None else self.programs.load(file, text)
+
     def power_on(self) -> str:
         """Power up to IDLE; return the reason of a refusal, else an empty string."""
         if self.safety.mode in POWERLESS:
@@ -299,6 +324,11 @@ class Controller:
         elif self.safety.mode not in OPERATIONAL:
             self.programs.pause()
         return ''
+
+    def unlock_soon(self) -> None:
+        """Unlock a protective stop as a line on the primary interface does: without the wait."""
+        if self.safety.mode is SafetyMode.PROTECTIVE_STOP:
+            self._unlock_at = self.time + UNLOCK_TIME
 
     def watch_input(self, variable: str, frequency: float, action: str) -> None:
         """

@@ -107,7 +107,9 @@ class SimulatedRobot:
         self._loop: asyncio.AbstractEventLoop | None = None
         #: Called with the port and the bytes that a program's socket received, in our thread.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
-        impaired = ImpairedSockets(sockets or TcpScriptSockets(self._on_socket_data))
+        impaired = ImpairedSockets(
+            sockets or TcpScriptSockets(self._on_socket_data, self.config.host)
+        )
         self.controller, self._faults = assemble(self.config, impaired)
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
@@ -248,7 +250,7 @@ class SimulatedRobot:
                 line.write(client.answers())
             for message in stream.messages():
                 self._primary.broadcast(message)
-            if stream.is_due and (self._primary.connections or self._secondary.connections):
+            if stream.is_due() and (self._primary.connections or self._secondary.connections):
                 state = stream.state()
                 self._primary.broadcast_state(state)
                 self._secondary.broadcast_state(state)

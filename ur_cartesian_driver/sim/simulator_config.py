@@ -49,11 +49,15 @@ class SimulatorConfig:
     power: Literal['running', 'off'] = 'running'
     #: False = local control: the primary interface takes no scripts.
     remote_control: bool = True
+    #: False = the feature is off in the robot's settings: scripts are taken, and the dashboard
+    #: says that the robot is not in remote control.
+    has_remote_control: bool = True
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None
-    #: Time after a protective stop during which unlocking is refused [s]; 5 s on a real robot.
+    #: Time after a protective stop during which pendant and dashboard refuse to unlock [s]; 5 s on
+    #: a real robot.
     unlock_delay: float = 5.0
     #: From `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten times as
     #: long.
@@ -66,12 +70,17 @@ class SimulatorConfig:
     faults: Sequence[Fault | str] = ()
     #: Programs that the dashboard can load: file name -> URScript.
     programs: Mapping[str, str] = field(default_factory=dict)
+    #: The one that is loaded from the start; empty = an empty one without a name.
+    program: str = ''
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, naming the field."""
         model = self.robot_model  # raises for an unknown name
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
+        if self.program and self.program not in self.programs:
+            known = ', '.join(self.programs) or 'none'
+            raise ValueError(f'program is {self.program!r}; programs has {known}.')
         if self.frequency is not None and not 1.0 <= self.frequency <= 1000.0:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
         if self.rate < 0.0:

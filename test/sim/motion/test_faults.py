@@ -105,7 +105,6 @@ def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, beg
 @pytest.mark.parametrize(
     'call',
     [
-        lambda g: g.movej((*HOME[:5], 7.0), v=3.0, a=20.0),
         lambda g: g.speedj((0.0, 0.0, 0.0, 0.0, 0.0, 3.0), 10.0, 100.0),
         lambda g: g.speedl((0.0, 0.0, 0.0, 0.0, 0.0, -1.0), 10.0, 100.0),
         lambda g: g.servoj((*HOME[:5], 7.0), 100.0),

@@ -15,11 +15,16 @@ from typing import TypeVar
 
 from ur_cartesian_driver.sim.builtins.arguments import int32, number, text, whole
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import to_text, Value
 
 CONNECT_TIMEOUT = 2.0
+#: Reads of a socket within a cycle; the next one waits. A peer that writes without a pause is held
+#: back by that and by TCP, and the program gets on with its other work. How many a real
+#: controller does is not published.
+READS_PER_CYCLE = 32
 #: Values in one read of numbers, and characters in one string.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 
@@ -28,6 +33,12 @@ T = TypeVar('T')
 
 class SocketBuiltins(BuiltinGroup):
     """They wait on the controller's clock, so they also work on the virtual clock."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Begin without reads."""
+        super().__init__(controller)
+        #: Socket name -> the cycle of its last read, and the reads in it.
+        self._reads: dict[str, tuple[int, int]] = {}
 
     @property
     def _sockets(self) -> ScriptSockets:
@@ -62,6 +73,8 @@ class SocketBuiltins(BuiltinGroup):
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
+        if self._has_read_enough(name_):
+            yield
         while True:
             found = take(self._sockets.received(name_))
             if found is not None:
@@ -69,6 +82,15 @@ class SocketBuiltins(BuiltinGroup):
             if self._now >= deadline or self._sockets.state(name_) is not SocketState.OPEN:
                 return None
             yield
+
+    def _has_read_enough(self, name: str) -> bool:
+        """Count a read; tell whether it has to wait for the next cycle."""
+        now = self._controller.cycles
+        cycle, reads = self._reads.get(name, (now, 0))
+        reads = reads + 1 if cycle == now else 1
+        enough = reads > READS_PER_CYCLE
+        self._reads[name] = (now + 1, 1) if enough else (now, reads)
+        return enough
 
     def socket_read_binary_integer(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2

@@ -40,17 +40,16 @@ _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
 class DashboardHandlers:
     """
-    What the commands read and change: a controller, and the state of the pendant.
+    What the commands read and change: a controller, and its pendant.
 
     A method carries out a command; it returns None, or another reply than that of success.
     """
 
     def __init__(self, controller: Controller) -> None:
-        """Begin like a pendant after its start."""
+        """Serve the dashboard of a controller."""
         self.controller = controller
         self.programs = controller.programs
-        self.role = 'PROGRAMMER'
-        self.operational_mode = 'NONE'
+        self.pendant = controller.pendant
         config = controller.config
         self.version = '.'.join(map(str, config.version))
         #: Without the mark of its generation, as the robot writes it.
@@ -60,7 +59,7 @@ class DashboardHandlers:
 
     @property
     def loaded(self) -> str:
-        """The name of the loaded program."""
+        """The name of the loaded program; an empty one without a name is there from the start."""
         return self.programs.loaded or '<unnamed>'
 
     @property
@@ -81,12 +80,11 @@ class DashboardHandlers:
     # What commands do
 
     def load(self, name: str) -> str | None:
-        """Load a program by its file name; directories do not matter here."""
-        file = PurePosixPath(name).name
-        text = self.controller.config.programs.get(file)
-        if text is None:
-            return f'File not found: {name}'
-        return f'Error while loading program: {name}' if self.programs.load(file, text) else None
+        """Load a program."""
+        refusal = self.controller.load_program(name)
+        if not refusal or refusal.startswith('File not found'):
+            return refusal or None
+        return f'Error while loading program: {name}'
 
     def load_installation(self, name: str) -> str | None:
         """Load an installation: only the default one exists."""
@@ -116,16 +114,12 @@ class DashboardHandlers:
         """Write to the log."""
         self.controller.messages.note(text)
 
-    def loaded_program(self, _: str) -> str | None:
-        """Check that a program is loaded."""
-        return None if self.programs.loaded else 'No program loaded'
-
     def set_role(self, role: str) -> str | None:
         """Change the user role."""
         word = role.upper()
         if word not in _ROLES:
             return f'Failed setting user role: {role}'
-        self.role = word
+        self.pendant.user_role = word
         return None
 
     def set_operational_mode(self, mode: str) -> str | None:
@@ -133,12 +127,12 @@ class DashboardHandlers:
         word = mode.upper()
         if word not in ('MANUAL', 'AUTOMATIC'):
             return f'could not understand: "set operational mode {mode}"'
-        self.operational_mode = word
+        self.pendant.operational_mode = word
         return None
 
     def clear_operational_mode(self, _: str) -> None:
         """Give the operational mode back."""
-        self.operational_mode = 'NONE'
+        self.pendant.operational_mode = 'NONE'
 
 
 #: Commands to the controller; they fail if they return a reason.
@@ -164,7 +158,6 @@ _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = Mappin
         'restart safety': DashboardHandlers.restart_safety,
         'popup': DashboardHandlers.popup,
         'addToLog': DashboardHandlers.add_to_log,
-        'get loaded program': DashboardHandlers.loaded_program,
         'setUserRole': DashboardHandlers.set_role,
         'set operational mode': DashboardHandlers.set_operational_mode,
         'clear operational mode': DashboardHandlers.clear_operational_mode,
@@ -182,16 +175,16 @@ _VALUES: Mapping[str, str] = MappingProxyType(
         'isProgramSaved': 'true {0.loaded}',
         'PolyscopeVersion': '{0.version} (Jan 01 2026)',
         'version': '{0.version}',
-        'getUserRole': '{0.role}',
+        'getUserRole': '{0.pendant.user_role}',
         'set operational mode': '"{1}" is set',
-        'get operational mode': '{0.operational_mode}',
+        'get operational mode': '{0.pendant.operational_mode}',
         'clear operational mode': 'Current operational mode: NONE',
         'is in remote control': '{0.remote_control}',
         'get serial number': '20000000000',
         'get robot model': '{0.robot_model}',
         # Nothing is written.
         'generate flight report': '0',
-        'generate support file': '{1}/ursupport.zip',
+        'generate support file': '{1}/ur_20000000000_2026-01-01_00-00-00.zip',
     }
 )
 

@@ -14,7 +14,6 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.programs.script_upload import UploadedLine, UploadedProgram
-from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
@@ -24,9 +23,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'power on': Controller.power_on,
         'power off': Controller.power_off,
         'set robotmode run': Controller.release_brakes,
-        'set unlock protective stop': lambda controller: controller.safety_event(
-            SafetyEvent.UNLOCK
-        ),
+        'set unlock protective stop': Controller.unlock_soon,
         'stop program': lambda controller: controller.programs.stop(),
         'pause program': lambda controller: controller.programs.pause(),
         'resume program': lambda controller: controller.programs.play(),
@@ -36,7 +33,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 
 def execute_command(controller: Controller, item: UploadedProgram | UploadedLine) -> None:
     """Execute what a client has sent; answers go to all clients."""
-    if not controller.remote_control:
+    if not controller.takes_scripts:
         controller.messages.error(
             READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
         )

@@ -55,23 +55,27 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """What all clients get: messages at once, states at their rate."""
+    """What all clients get: messages at once, states at their rate and at a new safety mode."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""
         self._controller = controller
         self._constant = (_kinematics(controller), _configuration(controller))
         self._cycles_per_state = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
+        self._safety_mode = controller.safety.mode
 
     def messages(self) -> Iterator[bytes]:
         """Yield the messages since the last cycle."""
         for message in self._controller.messages.take():
             yield encode_message(message)
 
-    @property
     def is_due(self) -> bool:
-        """Whether this is one of the cycles in which the state is sent."""
-        return self._controller.cycles % self._cycles_per_state == 0
+        """Tell, once a cycle, whether the state is sent in it."""
+        before, self._safety_mode = self._safety_mode, self._controller.safety.mode
+        return (
+            self._controller.cycles % self._cycles_per_state == 0
+            or self._safety_mode is not before
+        )
 
     def state(self) -> bytes:
         """Return a state frame, its sub-packages in the order of a recorded UR5e."""

@@ -22,7 +22,11 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion
-from ur_cartesian_driver.sim.motion.joint_kinematics import MAX_JOINT_ACCELERATION, MAX_TOOL_SPEED
+from ur_cartesian_driver.sim.motion.joint_kinematics import (
+    MAX_JOINT_ACCELERATION,
+    MAX_TOOL_SPEED,
+    NO_CHANGE,
+)
 from ur_cartesian_driver.sim.motion.motion_calls import (
     check_fractions,
     check_profile_parameters,
@@ -148,7 +152,7 @@ class MotionGenerator:
     ) -> Move:
         """Move straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
-        return self._start_path('movej', self._joint_path(q), parameters, r)
+        return self._start_path('movej', self._joint_path('movej', q), parameters, r)
 
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
@@ -186,7 +190,8 @@ class MotionGenerator:
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
         check_fractions('optimovej', a, v)
-        return self._start_path('optimovej', self._joint_path(q), self._fastest(a, v), r)
+        move_path = self._joint_path('optimovej', q)
+        return self._start_path('optimovej', move_path, self._fastest(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
@@ -208,7 +213,15 @@ class MotionGenerator:
         self._paths.begin(call)
         return call.move
 
-    def _joint_path(self, q: Vector6) -> Callable[[PathStart], MovePath]:
+    def _joint_path(self, name: str, q: Vector6) -> Callable[[PathStart], MovePath]:
+        for i, (angle, (low, high)) in enumerate(
+            zip(q, self.arm.model.position_limits, strict=True), 1
+        ):
+            if not low - NO_CHANGE <= angle <= high + NO_CHANGE:
+                raise MotionError(
+                    f'{name}: joint {i} would go to {angle:g} rad, its range is {low:g} to '
+                    f'{high:g} rad.'
+                )
         return lambda start: JointMovePath(start.q, q, self._target.forward)
 
     def _fastest(self, a: float, v: float) -> ParameterFunction:

@@ -15,24 +15,28 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 Builtins = Mapping[str, Any]
 
 
+#: Functions that act at once and take time only afterwards: a secondary program does not wait.
+ACT_AT_ONCE = frozenset({'protective_stop'})
+
+
 def refuse_timed_functions(builtins: Builtins) -> Builtins:
     """Return the functions of a secondary program: what takes time raises."""
     return {
-        name: _refusing_function(name, function)
-        if inspect.isgeneratorfunction(function)
-        else function
+        name: _without_time(name, function) if inspect.isgeneratorfunction(function) else function
         for name, function in builtins.items()
     }
 
 
-def _refusing_function(name: str, function: Any) -> Any:
+def _without_time(name: str, function: Any) -> Any:
     @functools.wraps(function)
-    def refuse(*arguments: Any, **named: Any) -> None:
-        raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
+    def act_or_refuse(*arguments: Any, **named: Any) -> None:
+        if name not in ACT_AT_ONCE:
+            raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
+        next(function(*arguments, **named))
 
     # The signature stays that of the function; what counts as a generator must not.
-    refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
+    act_or_refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
         function
     )
-    del refuse.__wrapped__
-    return refuse
+    del act_or_refuse.__wrapped__
+    return act_or_refuse

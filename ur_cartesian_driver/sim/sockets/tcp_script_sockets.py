@@ -29,7 +29,8 @@ _Resolved = list[tuple[int, int, int, str, _Address]]
 class _ScriptConnection:
     """One socket: connecting, open, or closed with data left to read."""
 
-    def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None) -> None:
+    def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None, host: str) -> None:
+        self._host = host
         self.state = SocketState.CONNECTING
         self.incoming = bytearray()
         self._outgoing = bytearray()
@@ -45,6 +46,8 @@ class _ScriptConnection:
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if _is_loopback(self._host) and _is_loopback(self._target[0]):
+            self._socket.bind((self._host, 0))
         self._continue_connecting()
 
     def poll(self) -> None:
@@ -117,23 +120,31 @@ class _ScriptConnection:
         self._outgoing.clear()
 
 
+def _is_loopback(host: str) -> bool:
+    return host.startswith('127.')
+
+
 class TcpScriptSockets:
     """Named TCP connections; see :class:`~.script_sockets.ScriptSockets`."""
 
-    def __init__(self, on_data: Callable[[int, bytes], None] | None = None) -> None:
+    def __init__(
+        self, on_data: Callable[[int, bytes], None] | None = None, host: str = ''
+    ) -> None:
         """
         Begin with none.
 
         :param on_data: called with the peer's port and the bytes that are received from it.
+        :param host: the robot's address. On loopback, connections come from it, so that a peer can
+            tell several robots of one computer apart.
         """
-        self.on_data = on_data
+        self.on_data, self._host = on_data, host
         self._connections: dict[str, _ScriptConnection] = {}
         self._resolver: ThreadPoolExecutor | None = None
 
     def open(self, name: str, address: str, port: int) -> None:
         """Begin to connect; host names are looked up in a thread, as that may take seconds."""
         self.close(name)
-        connection = _ScriptConnection(port, self.on_data)
+        connection = _ScriptConnection(port, self.on_data, self._host)
         self._connections[name] = connection
         host = '127.0.0.1' if address == 'localhost' else address
         try:

@@ -32,6 +32,15 @@ class Popup:
 
 
 @dataclass(slots=True, kw_only=True)
+class Pendant:
+    """What dashboard clients set on the pendant, for all of them."""
+
+    user_role: str = 'PROGRAMMER'
+    #: NONE: no client controls it.
+    operational_mode: str = 'NONE'
+
+
+@dataclass(slots=True, kw_only=True)
 class PathOffset:
     """A Cartesian offset on top of the moves; the limits are a robot's defaults."""
 

@@ -24,7 +24,10 @@ class SafetyEvent(Enum):
     """An event that the safety system reacts to."""
 
     PROTECTIVE_STOP = 'protective stop'
+    #: By pendant or dashboard, which both make a person wait.
     UNLOCK = 'unlock protective stop'
+    #: By a line on the primary interface, which does not.
+    UNLOCK_BY_LINE = 'set unlock protective stop'
     EMERGENCY_STOP = 'emergency stop'
     RELEASE = 'release the emergency stop'
     SAFEGUARD_STOP = 'safeguard stop'
@@ -54,6 +57,7 @@ SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = Mapp
         SafetyMode.PROTECTIVE_STOP: {
             **_POWER_CUT_TRANSITIONS,
             SafetyEvent.UNLOCK: SafetyMode.NORMAL,
+            SafetyEvent.UNLOCK_BY_LINE: SafetyMode.NORMAL,
         },
         SafetyMode.SAFEGUARD_STOP: {
             **_POWER_CUT_TRANSITIONS,

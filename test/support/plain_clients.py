@@ -1,0 +1,111 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Clients of a robot's ports that know nothing of this package: sockets and the published formats.
+
+What they see is what any other client of a robot sees.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from typing import Any, Self
+
+#: For an answer [s].
+TIMEOUT = 10.0
+STATE, MESSAGE = 16, 20
+TEXT, SAFETY_MODE, ERROR, KEY, EXCEPTION = 0, 5, 6, 7, 10
+
+
+class PlainPrimary:
+    """The primary interface (30001) as pairs of a name and its fields."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.socket = socket.create_connection((host, port), timeout=TIMEOUT)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, text: str) -> None:
+        self.socket.sendall(text.encode())
+
+    def _exactly(self, size: int) -> bytes:
+        data = b''
+        while len(data) < size:
+            more = self.socket.recv(size - len(data))
+            assert more, 'the robot has closed the connection'
+            data += more
+        return data
+
+    def next(self) -> tuple[str, dict[str, Any]]:
+        """Return 'state' or the kind of a message, and its fields."""
+        size, kind = struct.unpack('>iB', self._exactly(5))
+        body = self._exactly(size - 5)
+        if kind == STATE:
+            return 'state', self._state(body)
+        stamp, _, message = struct.unpack_from('>QbB', body)
+        rest = body[10:]
+        if kind != MESSAGE:
+            return 'other', {}
+        if message == ERROR:
+            code, argument = struct.unpack_from('>ii', rest)
+            return 'error', {'stamp': stamp, 'code': code, 'argument': argument}
+        if message == KEY:
+            title = rest[9 : 9 + rest[8]].decode()
+            return 'key', {'stamp': stamp, 'title': title, 'text': rest[9 + rest[8] :].decode()}
+        if message == EXCEPTION:
+            line, column = struct.unpack_from('>ii', rest)
+            return 'exception', {'line': line, 'column': column, 'text': rest[8:].decode()}
+        if message == TEXT:
+            return 'text', {'stamp': stamp, 'text': rest.decode()}
+        return 'other', {}
+
+    def _state(self, body: bytes) -> dict[str, Any]:
+        start, fields = 0, dict[str, Any]()
+        while start < len(body):
+            size, kind = struct.unpack_from('>IB', body, start)
+            if kind == 0:
+                names = 'stamp real enabled power emergency protective running paused mode'
+                values = struct.unpack_from('>Q7?B', body, start + 5)
+                fields |= dict(zip(names.split(), values, strict=True))
+                fraction, scaling = struct.unpack_from('>dd', body, start + 22)
+                fields |= {'fraction': fraction, 'scaling': scaling}
+            elif kind == 1:
+                joints = [struct.unpack_from('>3d', body, start + 5 + 41 * i) for i in range(6)]
+                fields |= {'q': [joint[0] for joint in joints]}
+            start += size
+        return fields
+
+    def await_(self, wanted: str, **fields: object) -> dict[str, Any]:
+        """Return the fields of the next frame of this kind that has these values."""
+        deadline = time.monotonic() + TIMEOUT
+        while time.monotonic() < deadline:
+            kind, found = self.next()
+            if kind == wanted and all(found[name] == value for name, value in fields.items()):
+                return found
+        raise AssertionError(f'no {wanted} {fields} within {TIMEOUT} s')
+
+
+class PlainDashboard:
+    """The dashboard (29999): a line for a line."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.socket = socket.create_connection((host, port), timeout=TIMEOUT)
+        self._lines = self.socket.makefile()
+        assert self._lines.readline() == 'Connected: Universal Robots Dashboard Server\n'
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lines.close()
+        self.socket.close()
+
+    def ask(self, line: str) -> str:
+        self.socket.sendall(line.encode() + b'\n')
+        return self._lines.readline().removesuffix('\n')
