@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.sim.motion.motion_profile import (
+from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     ramp,
     s_curve,
     timed,

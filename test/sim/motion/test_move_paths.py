@@ -11,7 +11,7 @@ import pytest
 
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.sim.motion import MotionError
-from ur_cartesian_driver.sim.motion.move_paths import (
+from ur_cartesian_driver.sim.motion.paths.move_paths import (
     CircularMovePath,
     end_within_radius,
     FilletBlendPath,

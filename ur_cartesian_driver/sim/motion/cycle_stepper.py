@@ -18,8 +18,8 @@ from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
-from ur_cartesian_driver.sim.motion.move_paths import Setpoint
-from ur_cartesian_driver.sim.motion.path_motion import PathMotion
+from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
+from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 from ur_cartesian_driver.sim.motion.servo_motions import JointStopMotion, ServoLikeMotion
 
 Motion: TypeAlias = PathMotion | ServoLikeMotion

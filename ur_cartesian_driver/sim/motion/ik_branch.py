@@ -17,7 +17,7 @@ from math import ceil, log2
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.joint_kinematics import JointKinematics, max_joint_difference
-from ur_cartesian_driver.sim.motion.move_paths import JointMovePath, MovePath, Setpoint
+from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
 # The rest of a path is solved in so many steps, or in shorter ones down to this part of it, so
 # that no step turns a joint by more [rad].

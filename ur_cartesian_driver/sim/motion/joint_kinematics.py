@@ -16,8 +16,8 @@ from ur_cartesian_driver.motion.pose import (
 )
 from ur_cartesian_driver.motion.vectors import scale, scale6, subtract, subtract6, Vector6, ZERO6
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
-from ur_cartesian_driver.sim.motion.move_paths import MovePath
-from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
+from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
 # Assumptions; the robot's numbers are not published:
 #: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.

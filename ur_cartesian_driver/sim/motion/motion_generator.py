@@ -27,14 +27,6 @@ from ur_cartesian_driver.sim.motion.joint_kinematics import (
     MAX_TOOL_SPEED,
     NO_CHANGE,
 )
-from ur_cartesian_driver.sim.motion.motion_calls import (
-    check_fractions,
-    check_profile_parameters,
-    constant_speed_parameters,
-    MotionCall,
-    ParameterFunction,
-    PathStart,
-)
 from ur_cartesian_driver.sim.motion.motion_reports import MotionReports
 from ur_cartesian_driver.sim.motion.motion_values import (
     MotionError,
@@ -42,14 +34,22 @@ from ur_cartesian_driver.sim.motion.motion_values import (
     MotionWarning,
     Move,
 )
-from ur_cartesian_driver.sim.motion.move_paths import (
+from ur_cartesian_driver.sim.motion.paths.motion_calls import (
+    check_fractions,
+    check_profile_parameters,
+    constant_speed_parameters,
+    MotionCall,
+    ParameterFunction,
+    PathStart,
+)
+from ur_cartesian_driver.sim.motion.paths.move_paths import (
     CircularMovePath,
     JointMovePath,
     LinearMovePath,
     MovePath,
 )
-from ur_cartesian_driver.sim.motion.path_motion import PathMotion, ProfileParameters
-from ur_cartesian_driver.sim.motion.path_queue import PathQueue
+from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion, ProfileParameters
+from ur_cartesian_driver.sim.motion.paths.path_queue import PathQueue
 from ur_cartesian_driver.sim.motion.running_motion import RunningMotion
 from ur_cartesian_driver.sim.motion.servo_motions import (
     JointSpeedMotion,

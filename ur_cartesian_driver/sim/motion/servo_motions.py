@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.vectors import (
     vector6,
 )
 from ur_cartesian_driver.sim.motion.joint_kinematics import STILL
-from ur_cartesian_driver.sim.motion.move_paths import Setpoint
+from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
 
 _JointState: TypeAlias = tuple[Vector6, Vector6, float]
 _ToolState: TypeAlias = tuple[Pose, Vector6, float]

@@ -19,11 +19,11 @@ from ur_cartesian_driver.sim.motion.joint_kinematics import (
     max_joint_difference,
     STILL,
 )
-from ur_cartesian_driver.sim.motion.motion_calls import MotionCall, PathStart
 from ur_cartesian_driver.sim.motion.motion_reports import MotionReports
 from ur_cartesian_driver.sim.motion.motion_values import MotionError, MotionFault
-from ur_cartesian_driver.sim.motion.move_paths import FilletBlendPath, MovePath
-from ur_cartesian_driver.sim.motion.path_motion import (
+from ur_cartesian_driver.sim.motion.paths.motion_calls import MotionCall, PathStart
+from ur_cartesian_driver.sim.motion.paths.move_paths import FilletBlendPath, MovePath
+from ur_cartesian_driver.sim.motion.paths.path_motion import (
     append_move_path,
     PathMotion,
     start_from_rest,

@@ -15,7 +15,8 @@ from math import inf, sqrt
 from typing import Any
 
 from ur_cartesian_driver.motion.pose import distance
-from ur_cartesian_driver.sim.motion.motion_profile import (
+from ur_cartesian_driver.sim.motion.motion_values import Move
+from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     MotionProfile,
     ramp,
     s_curve,
@@ -23,8 +24,7 @@ from ur_cartesian_driver.sim.motion.motion_profile import (
     timed_cruise,
     trapezoid,
 )
-from ur_cartesian_driver.sim.motion.motion_values import Move
-from ur_cartesian_driver.sim.motion.move_paths import (
+from ur_cartesian_driver.sim.motion.paths.move_paths import (
     end_within_radius,
     make_blend,
     MotionPath,

@@ -11,8 +11,8 @@ from typing import NamedTuple, TypeAlias
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.motion_values import MotionError, Move
-from ur_cartesian_driver.sim.motion.move_paths import MovePath
-from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
+from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
 
 class PathStart(NamedTuple):
