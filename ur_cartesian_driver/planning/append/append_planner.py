@@ -25,7 +25,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import IOCommand, Segment
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
@@ -101,9 +101,10 @@ def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPla
     appended = AppendedPoints(
         waypoints=goal.waypoints, segments=goal.segments, io_commands=goal.io_commands
     )
+    planner = _PartPlanner(base, appended, arm, options)
     if plan.execution.traits.is_spline:
-        return _spline_append_plan(base, appended, plan, end_state(plan), 0, 0.0, arm, options)
-    return _moves_append_plan(base, appended, plan, 0.0, 0)
+        return planner.spline_part(plan, end_state(plan), 0, 0.0)
+    return planner.moves_part(plan, 0, 0.0)
 
 
 def plan_append(
@@ -124,400 +125,389 @@ def plan_append(
     options = replace(
         options, max_approach_distance=0.0, max_points=options.max_points + REPLANNED_POINTS
     )
-    if appendable.goal.execution.traits.is_spline:
-        return _append_spline(appendable, appended, arm, options, from_rest)
-    return _append_moves(appendable, appended, arm, options, from_rest)
-
-
-# ---- motions of the robot -----------------------------------------------------------------------
-
-
-def _append_moves(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    arm: Arm,
-    options: PlanningOptions,
-    from_rest: bool,
-) -> AppendPlan:
+    time, records_before = appendable.time, appendable.committed_records
     if from_rest:
-        appendable = replace(appendable, replannable=(), outputs=())
-    replannable, start_time = (
-        appendable.replannable,
-        appendable.rest_time if from_rest else appendable.time,
-    )
-    q_start, last_client_time = (
-        (replannable[0].q_before, replannable[0].time_before)
-        if replannable
-        else (appendable.q_rest, appendable.last_client_time)
-    )
-    waypoints = (*(points_known.waypoint for points_known in replannable), *appended.waypoints)
-    segments = appended.segments or (Segment(),) * len(appended.waypoints)
-    first = appendable.points - len(replannable)
-    timed = any(point.time != 0.0 for point in waypoints)
-    if timed:
-        waypoints = tuple(
-            replace(point, time=point.time - last_client_time) for point in waypoints
+        time, records_before = appendable.rest_time, appendable.records
+        appendable = replace(appendable, replannable=(), replanned_piece=None, outputs=())
+    planner = _PartPlanner(appendable, appended, arm, options)
+    if not appendable.goal.execution.traits.is_spline:
+        return planner.append_moves(records_before, time)
+    if not from_rest:
+        assert appendable.state is not None
+        return planner.append_spline(appendable.state, records_before, appendable.time_offset)
+    rest = SplineState(time=time, q=appendable.q_rest)
+    for delay in START_DELAYS:
+        try:
+            return planner.append_spline(
+                rest, records_before, time + delay - appendable.last_client_time
+            )
+        except GoalRefused as refusal:
+            last_refusal = refusal
+    raise last_refusal
+
+
+class _PartPlanner:
+    """Plans one part of a goal."""
+
+    def __init__(
+        self,
+        appendable: AppendableGoal,
+        appended: AppendedPoints,
+        arm: Arm,
+        options: PlanningOptions,
+    ) -> None:
+        self._before, self._appended, self._arm, self._options = appendable, appended, arm, options
+        self._T_flange_tcp = appendable.T_flange_tcp or appendable.T_flange_active
+        self._segments = appended.segments or (Segment(),) * len(appended.waypoints)
+        #: The number of points with those of this part.
+        self._points = appendable.points + len(appended.waypoints)
+
+    # -- motions of the robot --------------------------------------------------------------------
+
+    def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
+        """Return the part after motions of the robot, of which some are planned again."""
+        before, appended = self._before, self._appended
+        replannable, q_start, time_before = (
+            before.replannable,
+            before.q_rest,
+            before.last_client_time,
         )
-    pending = max(len(replannable) - 1, 0)
-    goal = replace(
-        appendable.goal,
-        waypoints=waypoints,
-        segments=(*(k.segment for k in replannable), *segments),
-        io_commands=_pending_commands(appendable, appended, first, pending, start_time),
-        keep_open=not appended.last,
-    )
-    try:
-        new_plan = plan_goal(goal, _state_at_rest(appendable, q_start, arm), arm, options)
-    except GoalRefused as refusal:
-        raise refusal.reworded(_renumber_text(str(refusal), first)) from None
-    return _moves_append_plan(
-        appendable,
-        appended,
-        _renumber_plan(
-            new_plan,
-            first,
-            appendable.points - 1 if replannable else appendable.points,
-            start_time,
-        ),
-        start_time,
-        appendable.records if from_rest else appendable.committed_records,
-    )
+        if replannable:
+            q_start, time_before = replannable[0].q_before, replannable[0].time_before
+        first = before.points - len(replannable)
+        waypoints = (*(known.waypoint for known in replannable), *appended.waypoints)
+        if any(point.time != 0.0 for point in waypoints):
+            waypoints = tuple(replace(point, time=point.time - time_before) for point in waypoints)
+        goal = replace(
+            before.goal,
+            waypoints=waypoints,
+            segments=(*(known.segment for known in replannable), *self._segments),
+            io_commands=self._pending_commands(first, start_time),
+            keep_open=not appended.last,
+        )
+        try:
+            plan = plan_goal(goal, self._state_at_rest(q_start), self._arm, self._options)
+        except GoalRefused as refusal:
+            raise refusal.reworded(_renumber_text(str(refusal), first)) from None
+        plan = _renumber_plan(plan, first, before.points - bool(replannable), start_time)
+        return self.moves_part(plan, records_before, start_time)
+
+    def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
+        """Return the commands of a part, with those before it that are still due."""
+        old = []
+        # The last point of a motion that is planned again, but already committed.
+        committed = len(self._before.replannable) - 2
+        for end_time, command in self._before.outputs:
+            if command.waypoint == self._before.points - 1:
+                old.append(replace(command, waypoint=command.waypoint - first))
+            elif end_time > start_time and committed >= 0:
+                old.append(replace(command, waypoint=committed, offset=end_time - start_time))
+        return (*old, *numbered(self._appended, first))
+
+    def moves_part(self, plan: Plan, records_before: int, start_time: float) -> AppendPlan:
+        """Return a part whose last motion is its ending."""
+        *others, last = plan.segments
+        time = start_time + sum(segment.duration for segment in others)
+        replannable = self._replannable(plan)
+        timed = any(known.waypoint.time != 0.0 for known in replannable)
+        next_goal = replace(
+            self._before,
+            time=time,
+            rest_time=time + last.duration,
+            q_rest=last.joints,
+            replannable=replannable,
+            outputs=self._commands_of_ending(plan, start_time),
+        )
+        return self._part(plan, records_before, start_time, (last,), next_goal, timed=timed)
+
+    def _replannable(self, plan: Plan) -> tuple[ReplannablePoint, ...]:
+        """Return the last points of the goal, with where the arm is before them."""
+        before = self._before
+        known = list(before.replannable) + [
+            ReplannablePoint(
+                waypoint=waypoint,
+                segment=segment,
+                q_before=before.q_rest,
+                time_before=before.last_client_time,
+            )
+            for waypoint, segment in zip(self._appended.waypoints, self._segments, strict=True)
+        ]
+        first = self._points - len(known)
+        for segment in plan.segments:
+            k = segment.waypoint + 1 - first
+            if k < len(known):
+                known[k] = replace(
+                    known[k], q_before=segment.joints, time_before=known[k - 1].waypoint.time
+                )
+        return tuple(known[-REPLANNED_POINTS:])
+
+    def _commands_of_ending(
+        self, plan: Plan, start_time: float
+    ) -> tuple[tuple[float, IOCommand], ...]:
+        """
+        Return the commands whose records belong to the ending: the next part places them again.
+
+        Records before the last motion are committed, even if they are due after the motion before
+        it. Of commands for the same output the earlier ones have the earlier records.
+        """
+        ends = _end_times(plan.segments, start_time)
+        commands = [
+            *(
+                (ends[c.waypoint] + c.offset if c.waypoint in ends else end_time, c)
+                for end_time, c in self._before.outputs
+            ),
+            *(
+                (ends.get(c.waypoint, start_time) + c.offset, c)
+                for c in self._appended.io_commands
+            ),
+        ]
+        committed_records = Counter(
+            _output_key(record) for segment in plan.segments[:-1] for record in segment.outputs
+        )
+        still = []
+        for end_time, command in sorted(commands, key=lambda one: one[0]):
+            kind = _output_key(command)
+            if committed_records[kind]:
+                committed_records[kind] -= 1
+            else:
+                still.append((end_time, command))
+        return tuple(still)
+
+    # -- splines ---------------------------------------------------------------------------------
+
+    def append_spline(
+        self, start: SplineState, records_before: int, time_offset: float
+    ) -> AppendPlan:
+        """Return the part of a spline after a state; client time + offset = motion time [s]."""
+        before = self._before = replace(self._before, time_offset=time_offset)
+        goal = self._spline_goal(start)
+        found = plan_spline(
+            start,
+            goal,
+            self._arm,
+            self._T_flange_tcp,
+            self._options,
+            first=before.points,
+            tool_tips=tool_tips(before.goal, before.T_flange_active),
+        )
+        segments, reference, start_time = found.segments, found.reference, start.time
+        if before.replanned_piece is not None:
+            piece, path = before.replanned_piece
+            segments, start_time = (piece, *segments), start.time - piece.duration
+            reference = _join_paths(path, reference)
+        plan = Plan(
+            goal=goal,
+            segments=segments,
+            reference=reference,
+            start=start.q,
+            T_flange_active=before.T_flange_active,
+            T_flange_tcp=before.T_flange_tcp,
+            execution=goal.execution,
+            remarks=found.remarks,
+        )
+        return self.spline_part(plan, found.end, records_before, start_time)
+
+    def _spline_goal(self, start: SplineState) -> Goal:
+        """Return the checked goal of the appended points for the TCP, in motion time."""
+        before, appended = self._before, self._appended
+        # It is checked as a goal of its own: its times count from the last point.
+        goal = replace(
+            before.goal,
+            waypoints=tuple(
+                replace(point, time=round(point.time - before.last_client_time, _DIGITS))
+                for point in appended.waypoints
+            ),
+            segments=appended.segments,
+            io_commands=numbered(appended, before.points),
+            keep_open=not appended.last,
+        )
+        try:
+            check(goal, self._options)
+            goal = retarget_to_tcp(goal, self._state_at_rest(start.q), self._options).goal
+        except GoalRefused as refusal:
+            raise refusal.reworded(_renumber_text(str(refusal), before.points)) from None
+        return replace(
+            goal,
+            waypoints=tuple(
+                replace(point, time=point.time + before.last_client_time + before.time_offset)
+                for point in goal.waypoints
+            ),
+        )
+
+    def spline_part(
+        self, plan: Plan, end: SplineState, records_before: int, start_time: float
+    ) -> AppendPlan:
+        """
+        Return a part whose ending is a stopping piece, if the arm moves at its last point.
+
+        If outputs are due at the last point or later, the piece to that point belongs to the
+        ending too: they follow it on the wire, and their trigger poses depend on the next points.
+        """
+        closing = self._stop(end) if end.is_moving and not self._appended.last else None
+        complete, due_commands = self._place_outputs(plan, closing, start_time)
+        pending = tuple(
+            (time, command)
+            for time, command in due_commands
+            if time >= end.time - SAME_TIME and not self._appended.last
+        )
+        ending = complete.segments[len(plan.segments) - bool(pending) :]
+        time, replanned_piece = end.time, None
+        if pending:
+            piece = plan.segments[-1]
+            time -= piece.duration
+            replanned_piece = piece, _path_from(plan.reference, time)
+        last = complete.segments[-1]
+        next_goal = replace(
+            self._before,
+            time=time,
+            rest_time=end.time + (last.duration if closing else 0.0),
+            q_rest=last.joints if closing else end.q,
+            state=end,
+            outputs=pending,
+            replanned_piece=replanned_piece,
+        )
+        return self._part(complete, records_before, start_time, ending, next_goal, timed=True)
+
+    def _stop(self, end: SplineState) -> tuple[PlannedSegment, ReferencePath]:
+        """Return the piece that brings the arm to rest after the last point, and its path."""
+        piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
+        times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
+        q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(
+            times
+        )
+        segment = PlannedSegment(
+            primitive=piece,
+            waypoint=self._points - 1,
+            length=0.0,
+            angle=0.0,
+            duration=piece.duration,
+            joints=piece.target,
+            report_line='',
+        )
+        return segment, ReferencePath(
+            poses=tcp_rows(self._arm, self._T_flange_tcp, q),
+            time=end.time + times,
+            point=np.full(len(times), self._points - 1, dtype=np.int32),
+        )
+
+    def _place_outputs(
+        self,
+        plan: Plan,
+        closing: tuple[PlannedSegment, ReferencePath] | None,
+        start_time: float,
+    ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
+        """Return a plan of pieces with its stop and outputs, and when each command is due [s]."""
+        pieces, reference = plan.segments, plan.reference
+        segments = [replace(segment, outputs=()) for segment in pieces]
+        if closing is not None:
+            stop, path = closing
+            pieces, reference = (*pieces, stop), _join_paths(reference, path)
+            # It leads to no point: what is due on it is due after the last one.
+            segments.append(replace(stop, waypoint=stop.waypoint + 1))
+        ends = _end_times(segments, start_time)
+        due_commands = [
+            *self._before.outputs,
+            *((ends[c.waypoint] + c.offset, c) for c in self._appended.io_commands),
+        ]
+        commands = []
+        for time, command in due_commands:
+            waypoint = max(command.waypoint, segments[0].waypoint)
+            offset = max(0.0, time - ends[waypoint])
+            commands.append(replace(command, waypoint=waypoint, offset=offset))
+        found = place_outputs(segments, reference, commands, start_time=start_time)
+        segments = [
+            replace(segment, waypoint=piece.waypoint, report_line=piece.report_line)
+            for segment, piece in zip(found, pieces, strict=True)
+        ]
+        return replace(plan, segments=tuple(segments), reference=reference), due_commands
+
+    # -- both ------------------------------------------------------------------------------------
+
+    def _part(
+        self,
+        plan: Plan,
+        records_before: int,
+        start_time: float,
+        ending: Sequence[PlannedSegment],
+        next_goal: AppendableGoal,
+        *,
+        timed: bool,
+    ) -> AppendPlan:
+        """Return a part; its next goal lacks only what follows from the points and records."""
+        last, records = self._appended.last, records_before + _record_count(plan.segments)
+        ending_records = _record_count(ending)
+        # The robot program waits after the last motion for its outputs.
+        delay = max((output.delay for output in plan.segments[-1].outputs), default=0.0)
+        return AppendPlan(
+            plan=replace(plan, goal=replace(plan.goal, keep_open=not last)),
+            records_before=records_before,
+            start_time=start_time,
+            ending_records=0 if last else ending_records,
+            end_time=next_goal.rest_time + delay if timed else None,
+            text=self._text(),
+            next_goal=replace(
+                next_goal,
+                points=self._points,
+                records=records,
+                committed_records=records - ending_records,
+                last_client_time=self._appended.waypoints[-1].time,
+            ),
+        )
+
+    def _state_at_rest(self, q: Joints) -> RobotState:
+        """Return the state of a robot at rest in a configuration of the goal."""
+        T_flange_active = self._before.T_flange_active
+        pose = self._arm.forward(q) @ T_flange_active
+        return RobotState(
+            timestamp=0.0,
+            actual_q=q,
+            target_q=q,
+            actual_tcp_pose=pose,
+            target_tcp_pose=pose,
+            T_flange_tcp=T_flange_active,
+        )
+
+    def _text(self) -> str:
+        """Return the answer, with remarks on fields of appended points that have no effect."""
+        before, appended = self._before, self._appended
+        goal = replace(
+            before.goal,
+            waypoints=appended.waypoints,
+            segments=appended.segments,
+            keep_open=not appended.last,
+        )
+        remarks = point_remarks if goal.execution.traits.is_spline else ignored_remarks
+        count = len(appended.waypoints)
+        points = 'point' if count == 1 else 'points'
+        end = ', these are the last' if appended.last else ''
+        sentences = [
+            f'{count} {points} appended, the goal has {self._points}{end}.',
+            *(f'{text[:1].upper()}{text[1:]}.' for text in remarks(goal, before.points)),
+        ]
+        return ' '.join(sentences)
 
 
-def _pending_commands(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    first: int,
-    pending: int,
-    start_time: float,
-) -> tuple[IOCommand, ...]:
-    """Return the commands of a part, with those before it that are still due."""
-    old = []
-    for end_time, command in appendable.outputs:
-        if command.waypoint == appendable.points - 1:
-            old.append(replace(command, waypoint=command.waypoint - first))
-        elif end_time > start_time and pending:
-            old.append(replace(command, waypoint=pending - 1, offset=end_time - start_time))
-    return (*old, *numbered(appended, first))
-
-
-def _renumber_plan(new_plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
+def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
     """Return a plan without what leads to points before a waypoint, numbers and times shifted."""
-    left_out = [s for s in new_plan.segments if s.waypoint + first < waypoint]
+    left_out = [s for s in plan.segments if s.waypoint + first < waypoint]
     begin = sum(segment.duration for segment in left_out)
-    path = new_plan.reference
+    path = plan.reference
     path = replace(path, time=path.time + (start_time - begin), point=path.point + first)
     return replace(
-        new_plan,
+        plan,
         segments=tuple(
             replace(
                 s, waypoint=s.waypoint + first, report_line=_renumber_text(s.report_line, first)
             )
-            for s in new_plan.segments[len(left_out) :]
+            for s in plan.segments[len(left_out) :]
         ),
         reference=_path_from(path, start_time, 0.5 * SAME_TIME),
     )
 
 
-def _moves_append_plan(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    new_plan: Plan,
-    start_time: float,
-    records_before: int,
-) -> AppendPlan:
-    """Return a part whose last motion is its ending."""
-    *before, last = new_plan.segments
-    count, ending_records = _record_count(new_plan.segments), _record_count((last,))
-    time = start_time + sum(segment.duration for segment in before)
-    end = time + last.duration
-    segments = appended.segments or (Segment(),) * len(appended.waypoints)
-    points = appendable.points + len(appended.waypoints)
-    points_known = list(appendable.replannable) + [
-        ReplannablePoint(
-            waypoint=waypoint,
-            segment=segment,
-            q_before=appendable.q_rest,
-            time_before=appendable.last_client_time,
-        )
-        for waypoint, segment in zip(appended.waypoints, segments, strict=True)
-    ]
-    arrived = {segment.waypoint: segment.joints for segment in new_plan.segments}
-    replannable = [
-        _with_start(points_known, k - len(points_known), arrived, points)
-        for k in range(max(0, len(points_known) - REPLANNED_POINTS), len(points_known))
-    ]
-    last_client_time = appended.waypoints[-1].time
-    timed = any(points_known.waypoint.time != 0.0 for points_known in replannable)
-    next_goal = replace(
-        appendable,
-        points=points,
-        records=records_before + count,
-        committed_records=records_before + count - ending_records,
-        time=time,
-        rest_time=end,
-        last_client_time=last_client_time,
-        q_rest=last.joints,
-        replannable=tuple(replannable),
-        outputs=_commands_of_ending(appendable, appended, new_plan, start_time),
-    )
-    return AppendPlan(
-        plan=replace(new_plan, goal=replace(new_plan.goal, keep_open=not appended.last)),
-        records_before=records_before,
-        start_time=start_time,
-        ending_records=0 if appended.last else ending_records,
-        end_time=end + _output_delay(last) if timed else None,
-        text=_text(appendable, appended),
-        next_goal=next_goal,
-    )
-
-
-def _with_start(
-    points_known: Sequence[ReplannablePoint], k: int, arrived: dict[int, Joints], points: int
-) -> ReplannablePoint:
-    """Return a point (counted from the end) with where the arm was before it, if that is new."""
-    here = points_known[k]
-    q = arrived.get(points + k - 1)
-    if q is None:
-        return here
-    return replace(here, q_before=q, time_before=points_known[k - 1].waypoint.time)
-
-
-def _commands_of_ending(
-    appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
-) -> tuple[tuple[float, IOCommand], ...]:
-    """
-    Return the commands whose records belong to the ending: the next part places them again.
-
-    Records before the last motion are committed, even if they are due after the motion before it.
-    Of commands for the same output the earlier ones have the earlier records.
-    """
-    ends = _end_times(new_plan.segments, start_time)
-    commands = [
-        *(
-            (ends[c.waypoint] + c.offset if c.waypoint in ends else end_time, c)
-            for end_time, c in appendable.outputs
-        ),
-        *((ends.get(c.waypoint, start_time) + c.offset, c) for c in appended.io_commands),
-    ]
-    committed_records = Counter(
-        _output_key(record) for segment in new_plan.segments[:-1] for record in segment.outputs
-    )
-    still = []
-    for end_time, command in sorted(commands, key=lambda one: one[0]):
-        kind = _output_key(command)
-        if committed_records[kind]:
-            committed_records[kind] -= 1
-        else:
-            still.append((end_time, command))
-    return tuple(still)
-
-
-def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
-    return output.output, output.pin, output.value, output.domain
-
-
-# ---- splines ------------------------------------------------------------------------------------
-
-
-def _append_spline(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    arm: Arm,
-    options: PlanningOptions,
-    from_rest: bool,
-) -> AppendPlan:
-    """Return the part after the end of a spline; from rest as soon as the limits allow."""
-    assert appendable.state is not None
-    start, records_before = appendable.state, appendable.committed_records
-    time_offsets = [appendable.time_offset]
-    if from_rest:
-        start = SplineState(time=appendable.rest_time, q=appendable.q_rest)
-        records_before = appendable.records
-        time_offsets = [
-            appendable.rest_time + delay - appendable.last_client_time for delay in START_DELAYS
-        ]
-        appendable = replace(appendable, replanned_piece=None, outputs=())
-    refusals = []
-    for time_offset in time_offsets:
-        try:
-            return _append_spline_from(
-                appendable, appended, start, records_before, time_offset, arm, options
-            )
-        except GoalRefused as refusal:
-            refusals.append(refusal)
-    raise refusals[-1]
-
-
-def _append_spline_from(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    start: SplineState,
-    records_before: int,
-    time_offset: float,
-    arm: Arm,
-    options: PlanningOptions,
-) -> AppendPlan:
-    # Times count from the last point: the first one is the time of its segment.
-    waypoints = tuple(
-        replace(point, time=round(point.time - appendable.last_client_time, _DIGITS))
-        for point in appended.waypoints
-    )
-    goal = replace(
-        appendable.goal,
-        waypoints=waypoints,
-        segments=appended.segments,
-        io_commands=numbered(appended, appendable.points),
-        keep_open=not appended.last,
-    )
-    state = _state_at_rest(appendable, start.q, arm)
-    try:
-        check(goal, options)
-        retargeted = retarget_to_tcp(goal, state, options).goal
-        later = replace(
-            retargeted,
-            waypoints=tuple(
-                replace(point, time=point.time + appendable.last_client_time + time_offset)
-                for point in retargeted.waypoints
-            ),
-        )
-    except GoalRefused as refusal:
-        raise refusal.reworded(_renumber_text(str(refusal), appendable.points)) from None
-    found = plan_spline(
-        start,
-        later,
-        arm,
-        appendable.T_flange_tcp or appendable.T_flange_active,
-        options,
-        first=appendable.points,
-        tool_tips=tool_tips(goal, appendable.T_flange_active),
-    )
-    segments, reference, start_time = found.segments, found.reference, start.time
-    if appendable.replanned_piece is not None:
-        replanned_piece, pending_path = appendable.replanned_piece
-        segments, start_time = (replanned_piece, *segments), start.time - replanned_piece.duration
-        reference = _join_paths(pending_path, reference)
-    new_plan = Plan(
-        goal=later,
-        segments=segments,
-        reference=reference,
-        start=start.q,
-        T_flange_active=appendable.T_flange_active,
-        T_flange_tcp=appendable.T_flange_tcp,
-        execution=appendable.goal.execution,
-        remarks=found.remarks,
-    )
-    return _spline_append_plan(
-        replace(appendable, time_offset=time_offset),
-        appended,
-        new_plan,
-        found.end,
-        records_before,
-        start_time,
-        arm,
-        options,
-    )
-
-
-def _spline_append_plan(
-    appendable: AppendableGoal,
-    appended: AppendedPoints,
-    new_plan: Plan,
-    end: SplineState,
-    records_before: int,
-    start_time: float,
-    arm: Arm,
-    options: PlanningOptions,
-) -> AppendPlan:
-    """
-    Return a part whose ending is a stopping piece, if the arm moves at its last point.
-
-    If outputs are due at the last point or later, the piece to that point belongs to the ending
-    too: they follow it on the wire, and their trigger poses depend on the next points.
-    """
-    point, plan_to_point = appendable.points + len(appended.waypoints) - 1, new_plan
-    rest_time, q_rest = end.time, end.q
-    if end.is_moving and not appended.last:
-        new_plan = _with_stop(new_plan, end, point, arm, appendable, options)
-        rest_time, q_rest = end.time + new_plan.segments[-1].duration, new_plan.segments[-1].joints
-    new_plan, due_commands = _place_outputs(appendable, appended, new_plan, start_time)
-    pending = tuple(
-        (time, command)
-        for time, command in due_commands
-        if time >= end.time - SAME_TIME and not appended.last
-    )
-    committed_records = len(plan_to_point.segments) - (1 if pending else 0)
-    count, ending_records = (
-        _record_count(new_plan.segments),
-        _record_count(new_plan.segments[committed_records:]),
-    )
-    if appended.last:
-        ending_records = 0
-    replanned_piece = (plan_to_point.segments[-1], plan_to_point.reference) if pending else None
-    next_goal = replace(
-        appendable,
-        points=point + 1,
-        records=records_before + count,
-        committed_records=records_before + count - ending_records,
-        time=end.time - (replanned_piece[0].duration if replanned_piece else 0.0),
-        rest_time=rest_time,
-        last_client_time=appended.waypoints[-1].time,
-        q_rest=q_rest,
-        state=end,
-        outputs=pending,
-        replanned_piece=replanned_piece
-        and (
-            replanned_piece[0],
-            _path_from(replanned_piece[1], end.time - replanned_piece[0].duration),
-        ),
-    )
-    return AppendPlan(
-        plan=replace(new_plan, goal=replace(new_plan.goal, keep_open=not appended.last)),
-        records_before=records_before,
-        start_time=start_time,
-        ending_records=ending_records,
-        end_time=rest_time + _output_delay(new_plan.segments[-1]),
-        text=_text(appendable, appended),
-        next_goal=next_goal,
-    )
-
-
-def _place_outputs(
-    appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
-) -> tuple[Plan, list[tuple[float, IOCommand]]]:
-    """Return a plan of pieces with its outputs, and when each command is due [s]."""
-    # A stopping piece leads to no point: what is due on it is due after the last one.
-    last = new_plan.segments[-1]
-    closes = not last.report_line and last.length == 0.0
-    segments = [replace(segment, outputs=()) for segment in new_plan.segments]
-    if closes:
-        segments[-1] = replace(segments[-1], waypoint=last.waypoint + 1)
-    ends = _end_times(segments, start_time)
-    first = segments[0].waypoint
-    due_commands = [
-        *appendable.outputs,
-        *((ends[command.waypoint] + command.offset, command) for command in appended.io_commands),
-    ]
-    found = place_outputs(
-        segments,
-        new_plan.reference,
-        [
-            replace(
-                command,
-                waypoint=max(command.waypoint, first),
-                offset=max(0.0, time - ends[max(command.waypoint, first)]),
-            )
-            for time, command in due_commands
-        ],
-        start_time=start_time,
-    )
-    return replace(
-        new_plan,
-        segments=tuple(
-            replace(segment, waypoint=old.waypoint, report_line=old.report_line)
-            for segment, old in zip(found, new_plan.segments, strict=True)
-        ),
-    ), due_commands
+def _renumber_text(text: str, first: int) -> str:
+    """Return a text whose points are numbered from the start of the goal."""
+    return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
 def _path_from(
@@ -545,61 +535,6 @@ def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
     )
 
 
-def _with_stop(
-    new_plan: Plan,
-    end: SplineState,
-    point: int,
-    arm: Arm,
-    appendable: AppendableGoal,
-    options: PlanningOptions,
-) -> Plan:
-    """Return a plan with the piece that brings the arm to rest."""
-    piece = plan_stop(end, arm, options.keep_open_deceleration)
-    times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)[1:]
-    q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(times)
-    path = new_plan.reference
-    poses = np.concatenate(
-        [path.poses, tcp_rows(arm, appendable.T_flange_tcp or appendable.T_flange_active, q)]
-    )
-    keep_hemisphere(poses)
-    return replace(
-        new_plan,
-        segments=(
-            *new_plan.segments,
-            PlannedSegment(
-                primitive=piece,
-                waypoint=point,
-                length=0.0,
-                angle=0.0,
-                duration=piece.duration,
-                joints=piece.target if isinstance(piece.target, tuple) else end.q,
-                report_line='',
-            ),
-        ),
-        reference=ReferencePath(
-            poses=poses,
-            time=np.concatenate([path.time, end.time + times]),
-            point=np.concatenate([path.point, np.full(len(times), point, dtype=np.int32)]),
-        ),
-    )
-
-
-# ---- both ---------------------------------------------------------------------------------------
-
-
-def _state_at_rest(appendable: AppendableGoal, q: Joints, arm: Arm) -> RobotState:
-    """Return the state of a robot at rest in a configuration of the goal."""
-    pose = arm.forward(q) @ appendable.T_flange_active
-    return RobotState(
-        timestamp=0.0,
-        actual_q=q,
-        target_q=q,
-        actual_tcp_pose=pose,
-        target_tcp_pose=pose,
-        T_flange_tcp=appendable.T_flange_active,
-    )
-
-
 def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:
     """Return when the motion to each waypoint ends [s]."""
     ends, now = {}, start_time
@@ -609,43 +544,9 @@ def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[in
     return ends
 
 
-def _output_delay(last: PlannedSegment) -> float:
-    """Return how long the robot program waits after a motion for its outputs [s]."""
-    return max((output.delay for output in last.outputs), default=0.0)
+def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
+    return output.output, output.pin, output.value, output.domain
 
 
 def _record_count(segments: Sequence[PlannedSegment]) -> int:
     return sum(1 + len(segment.outputs) for segment in segments)
-
-
-def _renumber_text(text: str, first: int) -> str:
-    """Return a text whose points are numbered from the start of the goal."""
-    return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
-
-
-def _text(appendable: AppendableGoal, appended: AppendedPoints) -> str:
-    count = len(appended.waypoints)
-    points = 'point' if count == 1 else 'points'
-    end = ', these are the last' if appended.last else ''
-    return ' '.join(
-        [
-            f'{count} {points} appended, the goal has {appendable.points + count}{end}.',
-            *(
-                f'{remark[:1].upper()}{remark[1:]}.'
-                for remark in _append_remarks(appendable, appended)
-            ),
-        ]
-    )
-
-
-def _append_remarks(appendable: AppendableGoal, appended: AppendedPoints) -> list[str]:
-    """Return remarks on fields of appended points that have no effect."""
-    goal = replace(
-        appendable.goal,
-        waypoints=appended.waypoints,
-        segments=appended.segments,
-        keep_open=not appended.last,
-    )
-    return (point_remarks if goal.execution.traits.is_spline else ignored_remarks)(
-        goal, appendable.points
-    )
