@@ -14,16 +14,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import IDENTITY, N, Pose
 
 #: A float for one pose, or an array with one value per pose of a batch.
-N = TypeVar('N', float, NDArray[np.float64])
 
 # Controllers report pi/2 as 1.570796327. A table that differs from the nominal one only by such
 # rounding (less than a nanometre at the flange) counts as nominal.
@@ -195,6 +194,31 @@ def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> NDArray[np.f
         rx, ry, rz = x - px, y - py, z - pz
         columns.append((ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx, ax, ay, az))
     return np.array(columns).T
+
+
+def pose_error(
+    frames: ChainFramesOf[N], position: tuple[N, N, N], rotation: tuple[N, ...]
+) -> tuple[list[N], N]:
+    """
+    Return the error of the flange: translation [m] and sine of the turn in base axes; 1 + 2 cos.
+
+    The last value is positive up to a third of a turn; beyond that the sine is misleading.
+
+    :param rotation: of the pose, nine numbers by rows.
+    """
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = frames.x, frames.y, frames.z
+    (px, py, pz), (x, y, z) = frames.position, position
+    # Half the sum of axis x target axis.
+    ex = (xy * r31 - xz * r21) + (yy * r32 - yz * r22) + (zy * r33 - zz * r23)
+    ey = (xz * r11 - xx * r31) + (yz * r12 - yx * r32) + (zz * r13 - zx * r33)
+    ez = (xx * r21 - xy * r11) + (yx * r22 - yy * r12) + (zx * r23 - zy * r13)
+    facing = (
+        (xx * r11 + xy * r21 + xz * r31)
+        + (yx * r12 + yy * r22 + yz * r32)
+        + (zx * r13 + zy * r23 + zz * r33)
+    )
+    return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez], facing
 
 
 def pinocchio_model(arm: Arm) -> Any:

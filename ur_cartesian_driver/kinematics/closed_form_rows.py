@@ -23,6 +23,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
     WRIST_SINGULAR,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
+from ur_cartesian_driver.motion.pose import rotation_from_quaternion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -67,20 +68,7 @@ class TargetPoses:
     def of(cls, poses: Floats) -> TargetPoses:
         """Convert rows (n, 7): x y z [m], unit quaternion x y z w."""
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
-        return cls(
-            (px, py, pz),
-            (
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - z * w),
-                2.0 * (x * z + y * w),
-                2.0 * (x * y + z * w),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - x * w),
-                2.0 * (x * z - y * w),
-                2.0 * (y * z + x * w),
-                1.0 - 2.0 * (x * x + y * y),
-            ),
-        )
+        return cls((px, py, pz), rotation_from_quaternion((x, y, z, w)))
 
     def rows(self, index: NDArray[np.int64]) -> TargetPoses:
         """Return the poses at these indices."""

@@ -14,7 +14,7 @@ at d4. All joint housings are cylinders about their own joint's axis, and all tu
 to axis. So each end of a body is a point on an axis, and calibrated arms use the same table.
 
 Sources. Radii and lengths of the housings: measured on the collision meshes of UR3, UR5 and UR10
-in the package example-robot-data (:data:`_SIZES`); a test checks that these cylinders contain
+in the package example-robot-data (:data:`_MEASURED`); a test checks that these cylinders contain
 them, except the cable connector at the base. e-Series arms have the joints of the CB3 arm of
 the same size. The larger ones are a UR10's scaled by the footprints of the data sheets (190 mm;
 UR15 and its relatives 204 mm, UR20 and UR30 245 mm). s and e: the offsets in the configuration
@@ -26,7 +26,7 @@ the housings. The UR10's are the middles of its tubes in the meshes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, dataclass
 from enum import IntEnum
 from math import hypot
 from types import MappingProxyType
@@ -96,85 +96,36 @@ class HousingSizes:
 
     def scaled(self, factor: float) -> HousingSizes:
         """Return the housings of a larger or smaller arm."""
-        return HousingSizes(
-            **{
-                name: factor * value
-                for name, value in zip(self.__slots__, astuple(self), strict=True)
-            }
-        )
+        return HousingSizes(**{name: factor * value for name, value in asdict(self).items()})
 
 
-_UR3 = HousingSizes(
-    base_radius=0.0645,
-    shoulder_radius=0.0468,
-    shoulder_below=0.0665,
-    shoulder_above=0.0575,
-    upper_shoulder_in=0.066,
-    upper_shoulder_out=0.058,
-    upper_elbow_radius=0.0395,
-    upper_elbow_in=0.051,
-    upper_elbow_out=0.058,
-    upper_tube=0.047,
-    elbow_radius=0.0395,
-    elbow_in=0.051,
-    elbow_out=0.047,
-    fore_tube=0.0378,
-    fore_wrist_in=0.0425,
-    fore_wrist_out=0.047,
-    wrist_radius=0.0343,
-    wrist_in=0.047,
-    wrist_out=0.031,
-    wrist_back=0.0484,
-    wrist_front=0.0425,
-    tool_flange_radius=0.0385,
-)
-_UR5 = HousingSizes(
-    base_radius=0.0745,
-    shoulder_radius=0.0608,
-    shoulder_below=0.0655,
-    shoulder_above=0.069,
-    upper_shoulder_in=0.0655,
-    upper_shoulder_out=0.069,
-    upper_elbow_radius=0.0605,
-    upper_elbow_in=0.0655,
-    upper_elbow_out=0.069,
-    upper_tube=0.059,
-    elbow_radius=0.059,
-    elbow_in=0.055,
-    elbow_out=0.0575,
-    fore_tube=0.0448,
-    fore_wrist_in=0.0453,
-    fore_wrist_out=0.0575,
-    wrist_radius=0.0397,
-    wrist_in=0.046,
-    wrist_out=0.04,
-    wrist_back=0.0575,
-    wrist_front=0.048,
-    tool_flange_radius=0.0444,
-)
-_UR10 = HousingSizes(
-    base_radius=0.0952,
-    shoulder_radius=0.0772,
-    shoulder_below=0.0895,
-    shoulder_above=0.0885,
-    upper_shoulder_in=0.0904,
-    upper_shoulder_out=0.0879,
-    upper_elbow_radius=0.0628,
-    upper_elbow_in=0.0601,
-    upper_elbow_out=0.0692,
-    upper_tube=0.0763,
-    elbow_radius=0.0628,
-    elbow_in=0.068,
-    elbow_out=0.07,
-    fore_tube=0.06,
-    fore_wrist_in=0.0537,
-    fore_wrist_out=0.07,
-    wrist_radius=0.0474,
-    wrist_in=0.0545,
-    wrist_out=0.0468,
-    wrist_back=0.0578,
-    wrist_front=0.0625,
-    tool_flange_radius=0.0475,
+#: The housings of UR3, UR5 and UR10 [m].
+_MEASURED: Mapping[str, tuple[float, float, float]] = {
+    'base_radius': (0.0645, 0.0745, 0.0952),
+    'shoulder_radius': (0.0468, 0.0608, 0.0772),
+    'shoulder_below': (0.0665, 0.0655, 0.0895),
+    'shoulder_above': (0.0575, 0.069, 0.0885),
+    'upper_shoulder_in': (0.066, 0.0655, 0.0904),
+    'upper_shoulder_out': (0.058, 0.069, 0.0879),
+    'upper_elbow_radius': (0.0395, 0.0605, 0.0628),
+    'upper_elbow_in': (0.051, 0.0655, 0.0601),
+    'upper_elbow_out': (0.058, 0.069, 0.0692),
+    'upper_tube': (0.047, 0.059, 0.0763),
+    'elbow_radius': (0.0395, 0.059, 0.0628),
+    'elbow_in': (0.051, 0.055, 0.068),
+    'elbow_out': (0.047, 0.0575, 0.07),
+    'fore_tube': (0.0378, 0.0448, 0.06),
+    'fore_wrist_in': (0.0425, 0.0453, 0.0537),
+    'fore_wrist_out': (0.047, 0.0575, 0.07),
+    'wrist_radius': (0.0343, 0.0397, 0.0474),
+    'wrist_in': (0.047, 0.046, 0.0545),
+    'wrist_out': (0.031, 0.04, 0.0468),
+    'wrist_back': (0.0484, 0.0575, 0.0578),
+    'wrist_front': (0.0425, 0.048, 0.0625),
+    'tool_flange_radius': (0.0385, 0.0444, 0.0475),
+}
+_UR3, _UR5, _UR10 = (
+    HousingSizes(**{name: sizes[k] for name, sizes in _MEASURED.items()}) for k in range(3)
 )
 _UR15 = _UR10.scaled(204 / 190)
 _UR20 = _UR10.scaled(245 / 190)

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6
 
 _SAMPLES = 24
 _ITERATIONS = 5
@@ -56,9 +56,7 @@ def ideal_arm_of(arm: Arm) -> IdealArm:
     misfit = 0.0
     if arm.calibrated:
         lengths, offsets, misfit = _fit(arm, lengths)
-    d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
-    o1, o2, o3, o4, o5, o6 = (float(v) for v in offsets)
-    return IdealArm(d1, a2, a3, d4, d5, d6, (o1, o2, o3, o4, o5, o6), misfit)
+    return IdealArm(*vector6(lengths.tolist()), vector6(offsets.tolist()), misfit)
 
 
 def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:

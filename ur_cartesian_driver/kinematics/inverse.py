@@ -16,7 +16,7 @@ from math import ceil, copysign, dist, hypot, inf, pi, remainder, sin, tau
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.closed_form import (
     closed_form,
     wrap,
@@ -27,7 +27,7 @@ from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3, vector6
+from ur_cartesian_driver.motion.vectors import vector6
 
 # Rounding by which a position may exceed its limit [rad].
 _LIMIT_ROUNDING = 1e-9
@@ -230,11 +230,11 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     The squared error damps the step (Levenberg-Marquardt). This keeps the step finite at a
     singularity and costs no accuracy elsewhere.
     """
-    target = _columns(T_base_flange)
+    rotation = rotation_from_quaternion(T_base_flange.quaternion)
     q, failures, previous = start, 0, inf
     for _ in range(_MAX_STEPS):
         frames = arm.frames(q)
-        error = _error(frames, T_base_flange.position, target)
+        error, _ = pose_error(frames, T_base_flange.position, rotation)
         square = sum([e * e for e in error])
         if square < _EXACT:
             break
@@ -249,26 +249,6 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     if not _is_near(arm.forward(q), T_base_flange):
         return None
     return vector6(wrap(angle) for angle in q)
-
-
-def _columns(T_base_flange: Pose) -> tuple[Vector3, Vector3, Vector3]:
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        T_base_flange.quaternion
-    )
-    return (r11, r21, r31), (r12, r22, r32), (r13, r23, r33)
-
-
-def _error(
-    frames: ChainFrames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
-) -> list[float]:
-    """Return the error: translation [m], and half the sum of axis x target axis."""
-    ex = ey = ez = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), target, strict=True):
-        ex += ay * bz - az * by
-        ey += az * bx - ax * bz
-        ez += ax * by - ay * bx
-    (px, py, pz), (x, y, z) = frames.position, position
-    return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez]
 
 
 def _step(q: Joints, frames: ChainFrames, error: list[float], square: float) -> Joints:
@@ -294,15 +274,7 @@ def _same(a: Joints, b: Joints) -> bool:
 
 def _distance_by_turns(a: Joints, b: Joints) -> float:
     """Return the Euclidean distance modulo full turns [rad]."""
-    (a1, a2, a3, a4, a5, a6), (b1, b2, b3, b4, b5, b6) = a, b
-    return hypot(
-        remainder(a1 - b1, tau),
-        remainder(a2 - b2, tau),
-        remainder(a3 - b3, tau),
-        remainder(a4 - b4, tau),
-        remainder(a5 - b5, tau),
-        remainder(a6 - b6, tau),
-    )
+    return hypot(*[remainder(x - y, tau) for x, y in zip(a, b, strict=True)])
 
 
 def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | None:

@@ -15,7 +15,7 @@ from math import asin, cos, sin
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
@@ -38,14 +38,11 @@ def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None
     :param q_before: joint positions of a pose at most centimetres away [rad].
     :returns: None if the iteration does not converge: out of reach, or nearly singular.
     """
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        T_base_flange.quaternion
-    )
-    axes = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
+    rotation = rotation_from_quaternion(T_base_flange.quaternion)
     q = q_before
     for _ in range(_MAX_STEPS):
         frames = arm.frames(q)
-        error, facing = _error(frames, T_base_flange.position, axes)
+        error, facing = pose_error(frames, T_base_flange.position, rotation)
         square = sum([e * e for e in error])
         if facing <= 0.0:
             return None
@@ -68,24 +65,6 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))
     shoulder = ideal.a2 * cos(t2) + ideal.a3 * cos(t2 + t3) + ideal.d5 * sin(t2 + t3 + t4)
     return (asin(min(1.0, abs(sin(t5)))), asin(min(1.0, abs(sin(t3)))), abs(shoulder))
-
-
-def _error(
-    frames: ChainFrames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
-) -> tuple[list[float], float]:
-    """
-    Return the error: translation [m] and sine of the rotation in base axes; and 1 + 2 cos.
-
-    The last value is positive up to a third of a turn; beyond that the sine is misleading.
-    """
-    ex = ey = ez = facing = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), axes, strict=True):
-        ex += ay * bz - az * by
-        ey += az * bx - ax * bz
-        ez += ax * by - ay * bx
-        facing += ax * bx + ay * by + az * bz
-    (px, py, pz), (x, y, z) = frames.position, position
-    return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez], facing
 
 
 def _newton_step(q: Joints, frames: ChainFrames, error: list[float]) -> Joints:

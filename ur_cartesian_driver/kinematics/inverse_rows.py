@@ -19,7 +19,7 @@ from math import tau
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.closed_form_rows import (
     branch_rows,
     BRANCHES,
@@ -211,9 +211,11 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     active = np.arange(len(q))
     for step in range(_STEPS + 1):
         frames = arm.frames_rows(q[active])
-        errors, facing = _errors(frames, targets)
+        error, facing = pose_error(frames, targets.position, targets.rotation)
+        errors = np.array(error)
         squares = np.einsum('in,in->n', errors, errors)
-        done = facing & (squares < _EXACT)
+        # The sines also vanish for half a turn.
+        done = (facing > 1.0) & (squares < _EXACT)
         exact[active[done]] = True
         if step == _STEPS or done.all():
             break
@@ -225,22 +227,8 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     return q, exact
 
 
-def _errors(frames: ChainFramesOf[Floats], targets: TargetPoses) -> tuple[Floats, Flags]:
-    """Return what lacks to the targets (6, n), as for a single pose, and whether they face it."""
-    r = targets.rotation
-    turn, cosines = np.zeros((3, len(r[0]))), np.zeros(len(r[0]))
-    for (ax, ay, az), (bx, by, bz) in zip(
-        (frames.x, frames.y, frames.z), (r[0::3], r[1::3], r[2::3]), strict=True
-    ):
-        turn += (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
-        cosines += ax * bx + ay * by + az * bz
-    shift = np.subtract(targets.position, frames.position)
-    # The sum of the cosines is 1 + 2 cos(angle). The sines also vanish for half a turn.
-    return np.concatenate([shift, 0.5 * turn]), cosines > 1.0
-
-
 def _newton(frames: ChainFramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
-    """Return (J'J + square I)^-1 J' error (n, 6), the largest change of each row limited."""
+    """Return (J'J + square I)^-1 J' error (n, 6), with a bounded largest joint step."""
     jacobian = jacobian_at(frames, frames.position)
     transposed = jacobian.transpose(0, 2, 1)
     normal = transposed @ jacobian

@@ -84,7 +84,7 @@ class DhTable:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class RobotModel:
     """One model of the product line."""
 
@@ -180,22 +180,7 @@ _TABLE = (
 # fmt: on
 
 #: Every model by its name, as the UR ROS 2 driver spells it in ``ur_type``.
-MODELS: Mapping[str, RobotModel] = MappingProxyType(
-    {
-        name: RobotModel(
-            name=name,
-            series=series,
-            geometry=geometry,
-            position_limits=limits,
-            max_joint_speed=speed,
-            max_joint_torque=torque,
-            payload=payload,
-            max_reach=max_reach,
-            wire_type=wire_type,
-        )
-        for name, series, geometry, limits, speed, torque, payload, max_reach, wire_type in _TABLE
-    }
-)
+MODELS: Mapping[str, RobotModel] = MappingProxyType({row[0]: RobotModel(*row) for row in _TABLE})
 
 
 def robot_model(name: str) -> RobotModel:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import acos, atan2, cos, hypot, sin, sqrt
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
+#: One number, or those of a batch.
+N = TypeVar('N', float, NDArray[np.float64])
 
 _SMALL_ANGLE = 1e-9
 
@@ -209,8 +211,8 @@ def rotation_vector_from_quaternion(q: Quaternion) -> Vector3:
     return (x * scale, y * scale, z * scale)
 
 
-def rotation_from_quaternion(q: Quaternion) -> tuple[float, ...]:
-    """Return the rotation matrix of a unit quaternion, nine numbers row by row."""
+def rotation_from_quaternion(q: tuple[N, N, N, N]) -> tuple[N, ...]:
+    """Return the rotation matrix of a unit quaternion (or of a batch), nine numbers by rows."""
     x, y, z, w = q
     return (
         1.0 - 2.0 * (y * y + z * z),
