@@ -270,15 +270,7 @@ class JointLineCurve:
 
     def joints(self, u: float) -> Joints:
         """Return the joint positions at ``u``."""
-        a, b = self.q_start, self.q_end
-        return (
-            a[0] + u * (b[0] - a[0]),
-            a[1] + u * (b[1] - a[1]),
-            a[2] + u * (b[2] - a[2]),
-            a[3] + u * (b[3] - a[3]),
-            a[4] + u * (b[4] - a[4]),
-            a[5] + u * (b[5] - a[5]),
-        )
+        return vector6(x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""

@@ -10,7 +10,7 @@ quintic where accelerations are given too. Both are met exactly at the points.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -126,11 +126,11 @@ class ToolSpline:
     def stretch_times(self, factor: float) -> ToolSpline:
         """Return the same path with all times multiplied by a factor."""
         powers = factor ** -np.arange(6.0)[:, None]
-        return ToolSpline(
+        return replace(
+            self,
             times=self.times[0] + factor * (self.times - self.times[0]),
             positions=self.positions * powers,
             turns=self.turns * powers,
-            orientations=self.orientations,
         )
 
 

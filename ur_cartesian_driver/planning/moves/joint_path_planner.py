@@ -35,8 +35,8 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SAME_POSITION,
     trim_end,
 )
-from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows
-from ur_cartesian_driver.planning.geometry.samples import CurvePiece, segments_of
+from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.planning.geometry.samples import CurvePiece
 from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
 from ur_cartesian_driver.planning.moves.segment_draft import (
@@ -53,11 +53,14 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     solve_joint_path,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
-    describe_miss,
     named_joints,
     TcpKinematics,
 )
-from ur_cartesian_driver.planning.preflight.tightest_margins import near_singularity_refusal
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    first_refusal,
+    near_singularity_refusal,
+    singularity_distance_rows,
+)
 from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
 from ur_cartesian_driver.planning.request.goal_fields import (
     DEFAULT_SEGMENT,
@@ -149,23 +152,11 @@ class JointPathPlanner:
         That is k again if one of them has become a joint move.
         """
         self._make_blends(k, stop)
-        pieces, q_start = self._pieces(k, stop), self._q
-        joint_path = solve_joint_path(self.kinematics, pieces, q_start)
-        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
-        measures = self.path_margins.singularity_distance_rows(joint_path.q)
-        near = near_singularity_refusal(
-            pieces, joint_path, measures, segments, fractions, self.options
-        )
-        refusal, index = joint_path.refusal, joint_path.refused_segment
-        # Beside a singularity joints swing to a limit: the singularity is the cause.
-        if near is not None and (
-            refusal is None
-            or near[1] < index
-            or (near[1] == index and isinstance(refusal, JointLimitExceeded))
-        ):
-            refusal, index = near
+        joint_path = solve_joint_path(self.kinematics, self._pieces(k, stop), self._q)
+        measures = singularity_distance_rows(self.kinematics.arm, joint_path.q)
+        refusal, index = first_refusal(joint_path, measures, self.options)
         drafts = self._drafts[k:stop]
-        arrivals = self._arrivals(drafts, joint_path, segments)
+        arrivals = self._arrivals(drafts, joint_path)
         for draft, joints in zip(drafts, arrivals, strict=True):
             if refusal is not None and draft.index >= index:
                 break
@@ -177,11 +168,15 @@ class JointPathPlanner:
             return k
         for draft, joints in zip(drafts, arrivals, strict=True):
             draft.joints = joints
-        self._finish_run(drafts[-1], joint_path)
-        self.path_margins.add(
-            SolvedPieces(pieces, joint_path, segments, fractions, measures, q_start)
-        )
+        drafts[-1].checked_until = self._end(stop - 1)
+        self._add(joint_path, measures)
         return stop
+
+    def _add(self, joint_path: JointPath, measures: Floats) -> None:
+        """Add what is solved from where the arm is, and move the arm to its end."""
+        self.path_margins.add(SolvedPieces(joint_path, measures, self._q))
+        if len(joint_path.q):
+            self._q = vector6(joint_path.q[-1].tolist())
 
     def _make_blends(self, k: int, stop: int) -> None:
         """Make the blends of a run, including the one into it."""
@@ -238,11 +233,10 @@ class JointPathPlanner:
             return draft.blend_after.leave
         return trim_end(draft.known_curve, draft.radius) if self._is_blended(n) else 1.0
 
-    def _arrivals(
-        self, drafts: list[SegmentDraft], joint_path: JointPath, segments: np.ndarray
-    ) -> list[Joints]:
+    def _arrivals(self, drafts: list[SegmentDraft], joint_path: JointPath) -> list[Joints]:
         """Return the configuration at the waypoint of each segment, as far as solved."""
-        last = np.searchsorted(segments, [draft.index for draft in drafts], side='right') - 1
+        indices = [draft.index for draft in drafts]
+        last = np.searchsorted(joint_path.segments, indices, side='right') - 1
         if not len(joint_path.q):
             return [self._q for _ in drafts]
         q = joint_path.q[np.maximum(last, 0)]
@@ -260,28 +254,20 @@ class JointPathPlanner:
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
         return [(a, b, c, d, e, f) for a, b, c, d, e, f in q.tolist()]
 
-    def _finish_run(self, draft: SegmentDraft, joint_path: JointPath) -> None:
-        draft.checked_until = self._end(draft.index - self._drafts[0].index)
-        if len(joint_path.q):
-            self._q = vector6(joint_path.q[-1].tolist())
-
     def _posture_refusal(self, draft: SegmentDraft, q: Joints) -> InvalidPosture | None:
         """Return the refusal of a line or an arc that misses its posture."""
-        posture = self.goal.waypoints[draft.index].posture
-        if not posture:
-            return None
-        named = named_joints(posture, self.options.tf_prefix)
-        chosen = self.kinematics.solve_posture(
-            draft.known_curve.end, named, q, point_field(draft.index, 'pose')
+        clause = self.kinematics.explain_missed_posture(
+            draft.known_curve.end,
+            self.goal.waypoints[draft.index].posture,
+            q,
+            draft.index,
+            self.options.tf_prefix,
         )
-        clause = describe_miss(q, chosen, named)
         if not clause:
             return None
-        flips = self.kinematics.describe_flips(q, chosen)
         return InvalidPosture(
             f'{point_field(draft.index, "posture")} cannot be reached by a straight or circular '
-            f'move: {clause}{f", which needs {flips}" if flips else ""}; use a JOINT segment, or '
-            'set on_posture_change to movej.'
+            f'move: {clause}; use a JOINT segment, or set on_posture_change to movej.'
         )
 
     def _replace(self, n: int, refusal: GoalRefused) -> None:
@@ -352,22 +338,15 @@ class JointPathPlanner:
         if pieces[0].is_in_joint_space:
             self._add_joint_move(pieces)
             return
-        q_start = self._q
-        joint_path = solve_joint_path(self.kinematics, pieces, q_start)
+        joint_path = solve_joint_path(self.kinematics, pieces, self._q)
         if joint_path.refusal is not None:
             raise joint_path.refusal
-        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
-        measures = np.where(
-            (segments == self._drafts[k].index)[:, None],
-            np.inf,
-            self.path_margins.singularity_distance_rows(joint_path.q),
-        )
-        near = near_singularity_refusal(
-            pieces, joint_path, measures, segments, fractions, self.options
-        )
+        measures = singularity_distance_rows(self.kinematics.arm, joint_path.q)
+        measures[joint_path.segments == self._drafts[k].index] = np.inf
+        near = near_singularity_refusal(joint_path, measures, self.options)
         if near is not None:
             raise near[0]
-        self._q = vector6(joint_path.q[-1].tolist())
+        self._add(joint_path, measures)
         line = self._drafts[k].known_curve
         assert isinstance(line, JointLineCurve)
         joins = line.joints(self._drafts[k].u_join)
@@ -378,18 +357,11 @@ class JointPathPlanner:
                 joins,
                 f'{segment_field(self._drafts[k - 1].index, "blend_radius")}',
             )
-        self.path_margins.add(
-            SolvedPieces(pieces, joint_path, segments, fractions, measures, q_start)
-        )
 
     def _add_joint_move(self, pieces: list[CurvePiece]) -> None:
         joint_path = sample_joint_moves(self.kinematics, pieces)
-        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
-        nothing = np.full((len(joint_path.t), 3), np.inf)  # singularities do not matter here
-        self.path_margins.add(
-            SolvedPieces(pieces, joint_path, segments, fractions, nothing, self._q)
-        )
-        self._q = vector6(joint_path.q[-1].tolist())
+        # Singularities do not matter here.
+        self._add(joint_path, np.full((len(joint_path.t), 3), np.inf))
 
     # -- blends ----------------------------------------------------------------------------------
 

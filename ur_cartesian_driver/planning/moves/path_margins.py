@@ -20,7 +20,6 @@ from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     margins_by_segment,
-    singularity_distance_rows,
     TightestMargin,
 )
 
@@ -30,13 +29,9 @@ _MIN_STEP = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class SolvedPieces:
-    """Consecutive pieces that the arm can follow, with the samples on them."""
+    """The samples on consecutive pieces that the arm can follow."""
 
-    pieces: Sequence[CurvePiece]
     joint_path: JointPath
-    #: (n,) segment of each sample, and the fraction (n,) of it.
-    segments: Ints
-    fractions: Floats
     #: (n, 3) distances from singularities, inf where they do not count.
     measures: Floats
     #: The configuration before the first sample [rad].
@@ -51,10 +46,6 @@ class PathMargins:
         self._arm = arm
         self._solved: list[SolvedPieces] = []
 
-    def singularity_distance_rows(self, q: Floats) -> Floats:
-        """Return how far configurations (n, 6) are from singularities (n, 3)."""
-        return singularity_distance_rows(self._arm, q)
-
     def add(self, solved: SolvedPieces) -> None:
         """Add the next pieces."""
         self._solved.append(solved)
@@ -62,8 +53,8 @@ class PathMargins:
     def samples(self) -> PathSamples:
         """Return all samples."""
         return PathSamples(
-            segment=np.concatenate([solved.segments for solved in self._solved]),
-            fraction=np.concatenate([solved.fractions for solved in self._solved]),
+            segment=np.concatenate([solved.joint_path.segments for solved in self._solved]),
+            fraction=np.concatenate([solved.joint_path.fractions for solved in self._solved]),
             q=np.concatenate([solved.joint_path.q for solved in self._solved]),
             poses=np.concatenate([solved.joint_path.poses for solved in self._solved]),
         )
@@ -120,8 +111,8 @@ class _SpeedSamples(NamedTuple):
 
 def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
     """Return how fast a segment may be at each sample."""
-    joint_path = solved.joint_path
-    begin = np.array([piece.begin for piece in solved.pieces])[joint_path.piece]
+    joint_path, pieces = solved.joint_path, solved.joint_path.pieces
+    begin = np.array([piece.begin for piece in pieces])[joint_path.piece]
     before = np.concatenate([[0.0], joint_path.t[:-1]])
     is_first = np.diff(joint_path.piece, prepend=-1) != 0
     step = joint_path.t - np.where(is_first, begin, before)
@@ -131,8 +122,8 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
     joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
     rate = np.where(step > _MIN_STEP, joint_time / np.maximum(step, _MIN_STEP), 0.0)
     local_time = np.where(step > _MIN_STEP, rate, np.inf)
-    index = np.array([p.index for p in solved.pieces], dtype=np.int32)[joint_path.piece]
-    leaving, joining = (rate[joint_path.piece] for rate in _blend_rates(solved.pieces))
+    index = np.array([p.index for p in pieces], dtype=np.int32)[joint_path.piece]
+    leaving, joining = (rate[joint_path.piece] for rate in _blend_rates(pieces))
     on_blend = np.flatnonzero(joining > 0.0)
     joint_time[on_blend] *= 0.5
     local_time[on_blend] = np.inf
@@ -140,7 +131,7 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
         np.concatenate([index, index[on_blend] + 1]),
         np.concatenate([rate / leaving, rate[on_blend] / joining[on_blend]]),
         np.concatenate([joint, joint[on_blend]]),
-        np.concatenate([solved.fractions, solved.fractions[on_blend]]),
+        np.concatenate([joint_path.fractions, joint_path.fractions[on_blend]]),
         np.concatenate([joint_time, joint_time[on_blend]]),
         np.concatenate([local_time, local_time[on_blend]]),
     )

@@ -28,9 +28,11 @@ from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePiece,
+    Ints,
     PoseSamples,
     sample_parameters,
     sample_poses,
+    segments_of,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -52,9 +54,10 @@ _GROWTH = 8
 
 @dataclass(frozen=True, slots=True)
 class JointPath:
-    """The samples that the arm reaches, with their joint positions."""
+    """The samples on consecutive pieces that the arm reaches, with their joint positions."""
 
-    #: (n,) not decreasing; (n,); (n, 7); (n, 6).
+    pieces: Sequence[CurvePiece]
+    #: (n,) number of the piece, not decreasing; (n,); (n, 7); (n, 6).
     piece: NDArray[np.intp]
     t: Floats
     poses: Floats
@@ -62,32 +65,33 @@ class JointPath:
     #: Why it does not reach all of them, and on which segment; None = it does.
     refusal: GoalRefused | None = None
     refused_segment: int = -1
+    #: (n,) segment of each sample, and the fraction (n,) of it.
+    segments: Ints = field(init=False)
+    fractions: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find the segments."""
+        segments, fractions = segments_of(self.pieces, self.piece, self.t)
+        object.__setattr__(self, 'segments', segments)
+        object.__setattr__(self, 'fractions', fractions)
 
 
-@dataclass(slots=True)
 class _JointPathBuilder:
     """Collects solved samples in blocks."""
 
-    piece: list[NDArray[np.intp]] = field(default_factory=list)
-    t: list[Floats] = field(default_factory=list)
-    poses: list[Floats] = field(default_factory=list)
-    q: list[Floats] = field(default_factory=list)
+    def __init__(self, pieces: Sequence[CurvePiece]) -> None:
+        self._pieces = pieces
+        #: Piece, parameter, pose and joints; the first block has none, as the path may have none.
+        self._blocks = [
+            (np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 7)), np.empty((0, 6)))
+        ]
 
     def append(self, samples: PoseSamples, rows: slice, q: Floats) -> None:
-        self.piece.append(samples.piece[rows])
-        self.t.append(samples.t[rows])
-        self.poses.append(samples.poses[rows])
-        self.q.append(q)
+        self._blocks.append((samples.piece[rows], samples.t[rows], samples.poses[rows], q))
 
     def build(self, refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:
-        return JointPath(
-            np.concatenate([np.empty(0, dtype=np.intp), *self.piece]),
-            np.concatenate([np.empty(0), *self.t]),
-            np.concatenate([np.empty((0, 7)), *self.poses]),
-            np.concatenate([np.empty((0, 6)), *self.q]),
-            refusal,
-            segment,
-        )
+        piece, t, poses, q = (np.concatenate(column) for column in zip(*self._blocks, strict=True))
+        return JointPath(self._pieces, piece, t, poses, q, refusal, segment)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +110,7 @@ def sample_joint_moves(kinematics: TcpKinematics, pieces: Sequence[CurvePiece]) 
     """Return the samples on pieces in joint space."""
     piece, t = sample_parameters(pieces)
     q = np.concatenate([p.joint_rows(t[piece == k]) for k, p in enumerate(pieces)])
-    return JointPath(piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
+    return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
 
 
 def solve_joint_path(
@@ -122,7 +126,7 @@ def solve_joint_path(
     :param samples: those on the pieces; None = evenly along each of them.
     """
     samples = sample_poses(pieces) if samples is None else samples
-    found, q = _JointPathBuilder(), q_start
+    found, q = _JointPathBuilder(pieces), q_start
     row, block = 0, len(samples.t)
     while row < len(samples.t):
         solved, bad = _solve_block(kinematics, samples.poses[row : row + block], q)

@@ -37,6 +37,7 @@ from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: How far a named joint may arrive from the chosen solution, turns included [rad].
 ARRIVAL_TOLERANCE = 0.01
@@ -178,6 +179,22 @@ class TcpKinematics:
             if x != y
         ]
         return ' and '.join(names)
+
+    def explain_missed_posture(
+        self, T_base_tcp: Pose, posture: Posture, q: Joints, index: int, tf_prefix: str
+    ) -> str:
+        """
+        Return a clause that says how a path misses the posture of a point; '' if it does not.
+
+        :param q: where the path arrives; raises as :meth:`nearest`.
+        """
+        named = named_joints(posture, tf_prefix)
+        if not named:
+            return ''
+        chosen = self.solve_posture(T_base_tcp, named, q, point_field(index, 'pose'))
+        clause = describe_miss(q, chosen, named)
+        flips = self.describe_flips(q, chosen) if clause else ''
+        return f'{clause}, which needs {flips}' if flips else clause
 
     def _joint_positions_beyond(
         self, k: int, q: Joints, poses_beyond: Iterable[Pose]

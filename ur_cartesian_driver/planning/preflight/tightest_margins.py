@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import NearSingularity
+from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, NearSingularity
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -110,20 +110,35 @@ def joint_limit_distances(arm: Arm, q: Floats) -> tuple[Floats, NDArray[np.intp]
     return np.take_along_axis(distance, joint[:, None], axis=1)[:, 0], joint
 
 
+def first_refusal(
+    joint_path: JointPath, measures: Floats, options: PlanningOptions
+) -> tuple[GoalRefused | None, int]:
+    """
+    Return the first reason why the arm cannot follow, and the index of its segment.
+
+    :param measures: (n, 3) of the samples solved.
+    """
+    refusal, index = joint_path.refusal, joint_path.refused_segment
+    near = near_singularity_refusal(joint_path, measures, options)
+    # Beside a singularity joints swing to a limit: the singularity is the cause.
+    if near is not None and (
+        refusal is None
+        or near[1] < index
+        or (near[1] == index and isinstance(refusal, JointLimitExceeded))
+    ):
+        return near
+    return refusal, index
+
+
 def near_singularity_refusal(
-    pieces: Sequence[CurvePiece],
-    joint_path: JointPath,
-    measures: Floats,
-    segments: NDArray[np.int32],
-    fractions: Floats,
-    options: PlanningOptions,
+    joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[NearSingularity, int] | None:
     """
     Return the refusal of the first segment too close to a singularity, and its index.
 
     :param measures: (n, 3) of the samples solved.
-    :param segments: (n,) and ``fractions`` (n,) of them.
     """
+    segments = joint_path.segments
     bounds = np.array(
         [float(getattr(options, measure.option)) for measure in SINGULARITY_MEASURES]
     )
@@ -132,7 +147,7 @@ def near_singularity_refusal(
         return None
     for segment in np.unique(segments[near.any(axis=1)]):
         rows = np.flatnonzero(segments == segment)
-        near[rows] &= ~_is_leaving(pieces, joint_path, rows, measures)
+        near[rows] &= ~_is_leaving(joint_path, rows, measures)
         if not near[rows].any():
             continue
         row, k = min(
@@ -141,7 +156,7 @@ def near_singularity_refusal(
         )
         measure, bound = SINGULARITY_MEASURES[k], float(bounds[k])
         value = _format_below(float(measures[rows[row], k]), bound)
-        where = describe_location(int(segment), float(fractions[rows[row]]))
+        where = describe_location(int(segment), float(joint_path.fractions[rows[row]]))
         return NearSingularity(
             f'{where} comes within {value} {measure.unit} of the {measure.name} singularity '
             f'({measure.meaning}), less than {measure.option} = {bound:g} {measure.unit}; keep '
@@ -157,7 +172,7 @@ def _format_below(value: float, bound: float) -> str:
 
 
 def _is_leaving(
-    pieces: Sequence[CurvePiece], joint_path: JointPath, rows: NDArray[np.intp], measures: Floats
+    joint_path: JointPath, rows: NDArray[np.intp], measures: Floats
 ) -> NDArray[np.bool_]:
     """
     Tell which samples (n, 3) of a segment lead out of a singularity in which it starts.
@@ -165,16 +180,17 @@ def _is_leaving(
     The goal does not choose where the robot is: close to a start at rest no distance counts, nor
     does one that only grows from there.
     """
-    piece = pieces[int(joint_path.piece[rows[0]])]
+    number = int(joint_path.piece[rows[0]])
+    piece = joint_path.pieces[number]
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
     if (
         not piece.curve.can_start_at_rest
         or piece.begin > 0.0
-        or int(joint_path.piece[rows[0]]) != _first_of(pieces, piece.index)
+        or number != _first_of(joint_path.pieces, piece.index)
     ):
         return excused  # it comes out of a blend, or is a spline, see is_leaving_rows
     length, angle = piece.size
-    on_it = joint_path.piece[rows] == joint_path.piece[rows[0]]
+    on_it = joint_path.piece[rows] == number
     t = joint_path.t[rows]
     excused |= (on_it & (t * length <= START_LENGTH) & (t * angle <= START_ANGLE))[:, None]
     grows = np.diff(measures[rows], axis=0, prepend=0.0) >= -_ROUNDING

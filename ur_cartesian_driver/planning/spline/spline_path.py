@@ -43,15 +43,11 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     max_path_length,
     solve_joint_path,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
-    describe_miss,
-    named_joints,
-    TcpKinematics,
-)
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    first_refusal,
     is_leaving_rows,
     margins_by_segment,
-    near_singularity_refusal,
     singularity_distance_rows,
     TightestMargin,
 )
@@ -132,9 +128,7 @@ def solve_spline_path(
     angle = _cumulative(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
     measures = singularity_distance_rows(kinematics.arm, joint_path.q)
     leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
-    _check_path(
-        kinematics, pieces, joint_path, np.where(leaving, np.inf, measures), waypoints, options
-    )
+    _check_path(kinematics, joint_path, np.where(leaving, np.inf, measures), waypoints, options)
     return SplinePath(
         spline=spline,
         first=first,
@@ -145,41 +139,34 @@ def solve_spline_path(
         length=length,
         angle=angle,
         tightest_margin=margins_by_segment(
-            kinematics.arm,
-            joint_path.q,
-            measures,
-            first + joint_path.piece.astype(np.int32),
-            joint_path.t,
+            kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
         ),
     )
 
 
 def _check_path(
     kinematics: TcpKinematics,
-    pieces: Sequence[CurvePiece],
     joint_path: JointPath,
     measures: Floats,
     waypoints: Sequence[Waypoint],
     options: PlanningOptions,
 ) -> None:
     """Raise the first reason why the arm cannot follow."""
-    first = pieces[0].index
-    segments = first + joint_path.piece.astype(np.int32)
-    refusal, index = joint_path.refusal, joint_path.refused_segment
-    near = near_singularity_refusal(pieces, joint_path, measures, segments, joint_path.t, options)
-    # Beside a singularity joints swing to a limit: the singularity is the cause.
-    if near is not None and (
-        refusal is None
-        or near[1] < index
-        or (near[1] == index and isinstance(refusal, JointLimitExceeded))
-    ):
-        refusal, index = near
-    for k, point in enumerate(waypoints):
-        if refusal is not None and first + k >= index:
+    refusal, index = first_refusal(joint_path, measures, options)
+    for k, (piece, point) in enumerate(zip(joint_path.pieces, waypoints, strict=True)):
+        if refusal is not None and piece.index >= index:
             break
-        if point.posture:
-            row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
-            _check_posture(kinematics, pieces[k], point, joint_path.q[row], options)
+        if not point.posture:
+            continue
+        row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
+        q = vector6(joint_path.q[row].tolist())
+        if clause := kinematics.explain_missed_posture(
+            piece.pose(1.0), point.posture, q, piece.index, options.tf_prefix
+        ):
+            raise InvalidPosture(
+                f'{point_field(piece.index, "posture")} cannot be reached along the spline: '
+                f'{clause}; start in that configuration, or use PRIMITIVES with a JOINT segment.'
+            )
     if refusal is not None:
         raise _with_spline_advice(refusal)
 
@@ -191,27 +178,6 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
             str(refusal).replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
         )
     return refusal
-
-
-def _check_posture(
-    kinematics: TcpKinematics,
-    piece: CurvePiece,
-    point: Waypoint,
-    q: Floats,
-    options: PlanningOptions,
-) -> None:
-    named = named_joints(point.posture, options.tf_prefix)
-    arrives = vector6(q.tolist())
-    chosen = kinematics.solve_posture(
-        piece.pose(1.0), named, arrives, point_field(piece.index, 'pose')
-    )
-    if clause := describe_miss(arrives, chosen, named):
-        flips = kinematics.describe_flips(arrives, chosen)
-        raise InvalidPosture(
-            f'{point_field(piece.index, "posture")} cannot be reached along the spline: {clause}'
-            f'{f", which needs {flips}" if flips else ""}; start in that configuration, or use '
-            'PRIMITIVES with a JOINT segment.'
-        )
 
 
 def _coarse_samples(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:

@@ -11,6 +11,7 @@ point.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isnan
 
 import numpy as np
@@ -102,9 +103,8 @@ def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
     orientations = normalized_rows(
         multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:])
     )
-    return ToolPoints(
-        times=points.times,
-        quintic=points.quintic,
+    return replace(
+        points,
         twists=turned(points.twists),
         accelerations=turned(points.accelerations),
         poses=np.concatenate([positions, orientations], axis=1),
@@ -120,13 +120,7 @@ def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
         accelerations = np.where(
             np.isnan(accelerations), _chosen_accelerations(points, twists), accelerations
         )
-    return ToolPoints(
-        times=points.times,
-        poses=points.poses,
-        twists=twists,
-        accelerations=accelerations,
-        quintic=points.quintic,
-    )
+    return replace(points, twists=twists, accelerations=accelerations)
 
 
 def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
