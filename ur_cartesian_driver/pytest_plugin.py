@@ -109,6 +109,7 @@ def cartesian_driver(
         'rtde_port': ur_sim.ports.rtde,
         'primary_port': ur_sim.ports.primary,
         'dashboard_port': ur_sim.ports.dashboard,
+        'robot_api_port': ur_sim.ports.robot_api,
         'reverse_port': 0,
         'script_sender_port': 0,
         'trajectory_port': 0,

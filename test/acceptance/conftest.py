@@ -120,6 +120,7 @@ class DriverFactory:
             'rtde_port': self._robot.ports.rtde,
             'primary_port': self._robot.ports.primary,
             'dashboard_port': self._robot.ports.dashboard,
+            'robot_api_port': self._robot.ports.robot_api,
             'reverse_port': 0,
             'script_sender_port': 0,
             'trajectory_port': 0,

@@ -120,7 +120,12 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
         sim.add_argument(f'--{name}-port', type=int, default=port, help='0 = any free port')
-    for name, port in (('secondary', 30002), ('realtime', 30003), ('interpreter', 30020)):
+    for name, port in (
+        ('secondary', 30002),
+        ('realtime', 30003),
+        ('interpreter', 30020),
+        ('robot-api', 8000),
+    ):
         sim.add_argument(
             f'--{name}-port',
             type=int,

@@ -75,6 +75,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         secondary_port=arguments.secondary_port,
         realtime_port=arguments.realtime_port,
         interpreter_port=arguments.interpreter_port,
+        robot_api_port=arguments.robot_api_port,
         power='off' if arguments.power_off else 'running',
         remote_control=not arguments.local,
         has_remote_control=not arguments.no_remote_control,
@@ -116,7 +117,8 @@ def _show_ports(robot: SimulatedRobot) -> None:
         f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
         f'primary {ports.primary}, dashboard {ports.dashboard}, '
         f'secondary {ports.secondary}, real-time {ports.realtime}, '
-        f'interpreter {ports.interpreter}',
+        f'interpreter {ports.interpreter}'
+        + (f', Robot API {ports.robot_api}' if ports.robot_api else ''),
         flush=True,
     )
 

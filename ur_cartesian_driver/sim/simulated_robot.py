@@ -32,6 +32,7 @@ from ur_cartesian_driver.sim.interfaces.interpreter_session import InterpreterSe
 from ur_cartesian_driver.sim.interfaces.primary_session import PrimarySession, ScriptSession
 from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
 from ur_cartesian_driver.sim.interfaces.realtime_stream import RealtimeStream
+from ur_cartesian_driver.sim.interfaces.robot_api_session import FIRST_VERSION, RobotApiSession
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import TcpServer
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
@@ -57,6 +58,8 @@ class Ports:
     secondary: int
     realtime: int
     interpreter: int
+    #: The Robot API of PolyScope X from 10.11 on; 0 for others.
+    robot_api: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,6 +121,7 @@ class SimulatedRobot:
         self._realtime = TcpServer('real-time', lambda: ScriptSession(self.controller))
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
         self._interpreter = TcpServer('interpreter', lambda: InterpreterSession(self.controller))
+        self._robot_api = TcpServer('robot-api', lambda: RobotApiSession(self.controller))
         self._servers: tuple[TcpServer[Any], ...] = (
             self._rtde,
             self._primary,
@@ -125,6 +129,7 @@ class SimulatedRobot:
             self._realtime,
             self._dashboard,
             self._interpreter,
+            self._robot_api,
         )
         self._faults.interfaces = {'sockets': impaired} | {
             server.name.lower().replace('-', ''): server for server in self._servers
@@ -226,6 +231,10 @@ class SimulatedRobot:
         if config.version[0] < POLYSCOPE_X:
             await self._dashboard.listen(host, config.dashboard_port)
             dashboard = self._dashboard.port
+        robot_api = 0
+        if config.version[:2] >= FIRST_VERSION:
+            await self._robot_api.listen(host, config.listening_robot_api_port)
+            robot_api = self._robot_api.port
         await self._secondary.listen(host, config.listening_secondary_port)
         await self._realtime.listen(host, config.listening_realtime_port)
         await self._interpreter.listen(host, config.listening_interpreter_port)
@@ -236,6 +245,7 @@ class SimulatedRobot:
             secondary=self._secondary.port,
             realtime=self._realtime.port,
             interpreter=self._interpreter.port,
+            robot_api=robot_api,
         )
 
     async def _cycles(self) -> None:
@@ -248,6 +258,8 @@ class SimulatedRobot:
                     connection.write(package)
             for client, line in self._interpreter.session_connections:
                 line.write(client.answers())
+            for _, api_client in self._robot_api.session_connections:
+                api_client.poll()
             for message in stream.messages():
                 self._primary.broadcast(message)
             if stream.is_due() and (self._primary.connections or self._secondary.connections):

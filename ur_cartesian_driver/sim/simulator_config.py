@@ -17,6 +17,8 @@ from ur_cartesian_driver.sim.faults.fault_values import Fault
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
 _PRIMARY_PORT = 30001
+#: Not port 80, which only root may open.
+_ROBOT_API_PORT = 8000
 _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 
 
@@ -44,6 +46,8 @@ class SimulatorConfig:
     realtime_port: int | None = None
     #: Port of interpreter mode; None = 30020 or any free one, as above.
     interpreter_port: int | None = None
+    #: Port of the Robot API of PolyScope X, 80 on a real robot; None = 8000 or any free one.
+    robot_api_port: int | None = None
     #: Joint positions at start [rad].
     q: Vector6 = HOME
     power: Literal['running', 'off'] = 'running'
@@ -92,6 +96,7 @@ class SimulatorConfig:
             'secondary_port',
             'realtime_port',
             'interpreter_port',
+            'robot_api_port',
         ):
             port = getattr(self, name)
             if port is not None and not 0 <= port <= 65535:
@@ -138,6 +143,13 @@ class SimulatorConfig:
     def listening_interpreter_port(self) -> int:
         """Return the port for statements in interpreter mode; 0 = any free one."""
         return self._port_beside_primary(self.interpreter_port, 19)
+
+    @property
+    def listening_robot_api_port(self) -> int:
+        """Return the port for the Robot API; 0 = any free one."""
+        if self.robot_api_port is not None:
+            return self.robot_api_port
+        return _ROBOT_API_PORT if self.primary_port == _PRIMARY_PORT else 0
 
     def _port_beside_primary(self, chosen: int | None, distance: int) -> int:
         if chosen is not None:

@@ -14,8 +14,10 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 class DriverConfig(LinkSettings):
     """How to reach the robot, and how to run the loop that does; the defaults fit a real robot."""
 
-    #: Port of the dashboard on the robot; PolyScope X has none.
+    #: Port of the dashboard on the robot; PolyScope X has none, ...
     dashboard_port: int = 29999
+    #: ... but a Robot API, over HTTP.
+    robot_api_port: int = 80
     #: How far the controller's target may be from the plan, except in blends [m], [rad]; 0 = any.
     max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
     max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]

@@ -51,6 +51,7 @@ from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.services.dashboard_service import DashboardPorts
 from ur_cartesian_driver.robot.services.service_calls import DashboardCall
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
@@ -80,7 +81,11 @@ class RobotLoop:
             on_log=self._pipe.log,
             may_upload=configure.may_upload,
         )
-        self._dispatcher = ServiceDispatcher(config, config.dashboard_port, self._link)
+        self._dispatcher = ServiceDispatcher(
+            config,
+            DashboardPorts(dashboard=config.dashboard_port, robot_api=config.robot_api_port),
+            self._link,
+        )
         self._tasks: set[asyncio.Task[None]] = set()
         self._calls = CallRunner(self._dispatcher, self._pipe, self._spawn)
         self._tcp_restorer = TcpRestorer(self._link, self._pipe)

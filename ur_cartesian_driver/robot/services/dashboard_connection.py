@@ -25,6 +25,7 @@ from ur_cartesian_driver.protocol.dashboard import (
 )
 from ur_cartesian_driver.protocol.dashboard import DashboardClientCodec as Codec
 from ur_cartesian_driver.protocol.framing import LineBuffer
+from ur_cartesian_driver.protocol.robot_api import API_COMMANDS, CONFLICT, FORBIDDEN
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
@@ -32,7 +33,7 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
-#: What to use there instead; other commands are done on the pendant.
+#: What to use where its Robot API has no such command; others are done on the pendant.
 REPLACEMENTS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(
@@ -48,6 +49,7 @@ REPLACEMENTS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+UNLOCK = 'unlock protective stop'
 #: Begins the answer to an unlock that comes too early.
 TOO_EARLY = 'Cannot unlock protective stop'
 
@@ -130,10 +132,7 @@ class DashboardConnection:
 def unavailable_reason(command: str, version: ControllerVersion) -> str:
     """Return why the software of a robot does not have a command; empty when it has it."""
     if version.major >= POLYSCOPE_X:
-        return (
-            'PolyScope X has no dashboard server, so this service is not available with '
-            f'software {version}; {REPLACEMENTS.get(command, "do it on the pendant")}.'
-        )
+        return _missing_in_robot_api(command, version)
     spec = COMMAND_SPECS[command]
     if spec.is_available((version.major, version.minor)):
         return ''
@@ -144,6 +143,27 @@ def unavailable_reason(command: str, version: ControllerVersion) -> str:
         f'The dashboard command {command!r} needs software {since[0]}.{since[1]} or newer, '
         f'but the robot runs {version}.'
     )
+
+
+def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
+    """Return why PolyScope X does not have a command; empty when it has it."""
+    since = API_COMMANDS[command][-1].since if command in API_COMMANDS else None
+    if since is not None and (version.major, version.minor) >= since:
+        return ''
+    reason = (
+        'no such command'
+        if since is None
+        else f'it from software {since[0]}.{since[1]} on, but the robot runs {version}'
+    )
+    return (
+        f'PolyScope X has no dashboard server, and its Robot API has {reason}; '
+        f'{REPLACEMENTS.get(command, "do it on the pendant")}.'
+    )
+
+
+def is_too_early(command: str, answer: str) -> bool:
+    """Tell whether an unlock may succeed later; the Robot API does not tell why it cannot."""
+    return TOO_EARLY in answer or (command == UNLOCK and CONFLICT in answer)
 
 
 def explain_refusal(
@@ -163,9 +183,11 @@ def explain_refusal(
 def _reason(
     command: str, answer: str, robot: RobotState | None, remote_control: bool | None
 ) -> str:
-    if remote_control is False:
+    if remote_control is False or answer.startswith(FORBIDDEN):
         return 'It is in local control: switch it to remote control on the pendant.'
-    if answer.startswith(TOO_EARLY):
+    if answer.startswith(TOO_EARLY) or (
+        command == UNLOCK and robot is not None and robot.safety_mode is SafetyMode.PROTECTIVE_STOP
+    ):
         return 'Wait until 5 s have passed since the stop, look for its cause, then try again.'
     if answer.startswith('No program loaded'):
         return 'Load one with load_program, or on the pendant.'

@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Dashboard commands as calls: checked, sent, and confirmed by the robot state."""
+"""
+Dashboard commands as calls: checked, sent, and confirmed by the robot state.
+
+PolyScope X takes them over its Robot API instead.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,14 @@ from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.dashboard_connection import (
     DashboardConnection,
     explain_refusal,
+    POLYSCOPE_X,
     unavailable_reason,
 )
 from ur_cartesian_driver.robot.services.polling import (
     describe_modes,
     wait_for_state,
 )
+from ur_cartesian_driver.robot.services.robot_api_connection import RobotApiConnection
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
@@ -30,6 +36,14 @@ from ur_cartesian_driver.robot.services.service_calls import (
 #: How long the robot may take to do what it is asked for [s]: powering up takes a while.
 POWER_TIMEOUT = 30.0
 EFFECT_TIMEOUT = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DashboardPorts:
+    """Ports on the robot of the dashboard, and of the Robot API that PolyScope X has instead."""
+
+    dashboard: int
+    robot_api: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +88,21 @@ EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
 
 
 class DashboardService:
-    """Calls the dashboard, from one event loop; several calls at a time."""
+    """Calls dashboard or Robot API, from one event loop; several calls at a time."""
 
-    def __init__(self, host: str, port: int, link: RobotLink) -> None:
+    def __init__(self, host: str, ports: DashboardPorts, link: RobotLink) -> None:
         """Prepare; every call connects by itself."""
-        self._client = DashboardConnection(host, port)
+        self._dashboard = DashboardConnection(host, ports.dashboard)
+        self._host, self._ports = host, ports
         self._link = link
+
+    @property
+    def _client(self) -> DashboardConnection | RobotApiConnection:
+        """The connection that serves this robot; both take the same requests."""
+        version = self._link.version
+        if version is None or version.major < POLYSCOPE_X:
+            return self._dashboard
+        return RobotApiConnection(self._host, self._ports.robot_api, version)
 
     async def request(self, call: DashboardCall) -> ServiceAnswer:
         """Give a command, and wait until the robot has done it."""
@@ -108,7 +131,7 @@ class DashboardService:
         version = self._link.version
         if version is not None and (reason := unavailable_reason('quit', version)):
             return failed(reason)
-        return succeeded(await self._client.request_raw(call.line))
+        return succeeded(await self._dashboard.request_raw(call.line))
 
     async def remote_control(self) -> bool | None:
         """Return whether clients may control the robot; None = it cannot be known."""

@@ -10,7 +10,10 @@ from collections.abc import Awaitable, Callable, Mapping
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.robot.link import RobotLink
-from ur_cartesian_driver.robot.services.dashboard_connection import POLYSCOPE_X, TOO_EARLY
+from ur_cartesian_driver.robot.services.dashboard_connection import (
+    is_too_early,
+    unavailable_reason,
+)
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardService,
     EFFECT_TIMEOUT,
@@ -42,8 +45,8 @@ STEP_TIMEOUT = 35.0
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Pause before an unlock that came too early is repeated [s].
-UNLOCK_RETRY_PERIOD = 0.5
+#: Pause before an unlock that came too early is repeated, and how long that goes on [s].
+UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
 #: Dashboard commands of the steps of a recovery; the last one does it.
 STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
@@ -54,7 +57,7 @@ STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
     RecoveryStep.STOP_PROGRAM: ('stop',),
     RecoveryStep.PLAY: ('close popup', 'play'),
 }
-#: The same through the primary interface, where there is no dashboard.
+#: The same through the primary interface, where there is neither dashboard nor Robot API.
 PRIMARY_COMMANDS: Mapping[RecoveryStep, primary.PrimaryCommand] = {
     RecoveryStep.UNLOCK: primary.PrimaryCommand.UNLOCK_PROTECTIVE_STOP,
     RecoveryStep.POWER_ON: primary.PrimaryCommand.POWER_ON,
@@ -159,12 +162,21 @@ class RecoveryRunner:
             return await self._send_program()
         version = self._link.version
         *before, command = STEP_COMMANDS[step]
-        if version is not None and version.major >= POLYSCOPE_X and step in PRIMARY_COMMANDS:
+        if (
+            version is not None
+            and unavailable_reason(command, version)
+            and step in PRIMARY_COMMANDS
+        ):
             return await self._do_without_dashboard(step, EXPECTED_EFFECTS[command])
         for line in before:
             await self._dashboard.request(DashboardCall(command=line))
         answer = await self._dashboard.request(DashboardCall(command=command))
-        while not answer.ok and TOO_EARLY in answer.text:
+        end = asyncio.get_running_loop().time() + UNLOCK_TIMEOUT
+        while (
+            not answer.ok
+            and is_too_early(command, answer.text)
+            and asyncio.get_running_loop().time() < end
+        ):
             await asyncio.sleep(UNLOCK_RETRY_PERIOD)
             answer = await self._dashboard.request(DashboardCall(command=command))
         if (

@@ -21,7 +21,11 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.services import rtde_input_writer
-from ur_cartesian_driver.robot.services.dashboard_service import DashboardService, EFFECT_TIMEOUT
+from ur_cartesian_driver.robot.services.dashboard_service import (
+    DashboardPorts,
+    DashboardService,
+    EFFECT_TIMEOUT,
+)
 from ur_cartesian_driver.robot.services.polling import wait_for_state
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
@@ -80,11 +84,11 @@ INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'}
 class ServiceDispatcher:
     """Answers calls on one event loop: several at a time, but only one recovery."""
 
-    def __init__(self, settings: LinkSettings, dashboard_port: int, link: RobotLink) -> None:
+    def __init__(self, settings: LinkSettings, ports: DashboardPorts, link: RobotLink) -> None:
         """Prepare; nothing is sent before the first call."""
         self._settings = settings
         self._link = link
-        self._dashboard = DashboardService(settings.robot_ip, dashboard_port, link)
+        self._dashboard = DashboardService(settings.robot_ip, ports, link)
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )

@@ -85,6 +85,10 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._impaired.queue_incoming(data, self._server.now)
             self._transport_reading(self._impaired.incoming.size < MAX_UNREAD_BYTES)
 
+    def poll(self) -> None:
+        """Let the session answer what it could not answer at once."""
+        self._handle_incoming(b'')
+
     def _transport_reading(self, wanted: bool) -> None:
         """Pause reading when too much is held back, so that the client has to wait."""
         if self._transport is None or self._transport.is_closing():

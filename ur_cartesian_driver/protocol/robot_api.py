@@ -1,0 +1,197 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The Robot API of PolyScope X: what the dashboard is to other robots, as HTTP requests with JSON.
+
+Commands keep the names that they have on the dashboard, so one call serves every generation;
+:data:`API_COMMANDS` has the request of each. The robot describes its own version of the API at
+``/docs`` and ``/openapi.json`` below :data:`BASE_PATH`, on port 80.
+
+A request that changes the robot is answered when the robot has done it. Its status is 403 unless
+the robot is in remote control, 409 if the robot cannot do it in its present state, 504 if it takes
+too long. An error has the fields ``message`` and ``details``; one in the request ``detail``.
+
+Paths, bodies and first versions are those of Universal Robots' client library 2.14
+(``dashboard_client_implementation_x.cpp``); the statuses are those that it and other clients list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import json
+from types import MappingProxyType
+from typing import Any
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.protocol.dashboard import DashboardReply, DashboardRequest
+
+BASE_PATH = '/universal-robots/robot-api'
+#: The first software with a Robot API; PolyScope X before it has neither that nor a dashboard.
+FIRST_VERSION = (10, 11)
+#: Begins the text of a refusal because the robot is in local control.
+FORBIDDEN = 'HTTP 403'
+#: Begins the text of a refusal because of the robot's state.
+CONFLICT = 'HTTP 409'
+
+_STATE, _PROGRAM = '/robotstate/v1/state', '/program/v1/state'
+_POPUP, _INFORMATION = '/popup/v1', '/system/v1/information'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ApiCommand:
+    """
+    The request of one command.
+
+    :param body: what is sent as JSON; ``{}`` stands for the argument. Empty = nothing is sent.
+    :param value: the field of the answer that holds the value; empty = there is none.
+    :param words: what the dashboard says instead of some values.
+    :param since: the first software that has it.
+    """
+
+    method: str
+    path: str
+    body: Mapping[str, str] = field(default_factory=dict)
+    value: str = ''
+    words: Mapping[str, str] = field(default_factory=dict)
+    since: tuple[int, int] = FIRST_VERSION
+
+
+def _action(path: str, action: str) -> ApiCommand:
+    return ApiCommand(method='PUT', path=path, body={'action': action})
+
+
+def _query(
+    path: str, value: str, since: tuple[int, int], words: Mapping[str, str] | None = None
+) -> ApiCommand:
+    return ApiCommand(method='GET', path=path, value=value, since=since, words=words or {})
+
+
+#: The requests of the dashboard's commands, the newest of each first.
+API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = MappingProxyType(
+    {
+        'power on': (_action(_STATE, 'POWER_ON'),),
+        'power off': (_action(_STATE, 'POWER_OFF'),),
+        'brake release': (_action(_STATE, 'BRAKE_RELEASE'),),
+        'unlock protective stop': (_action(_STATE, 'UNLOCK_PROTECTIVE_STOP'),),
+        'restart safety': (_action(_STATE, 'RESTART_SAFETY'),),
+        'load': (
+            ApiCommand(
+                method='PUT', path='/program/v1/loaded', body={'name': '{}'}, since=(10, 12)
+            ),
+            ApiCommand(method='PUT', path='/program/v1/load', body={'programName': '{}'}),
+        ),
+        'play': (_action(_PROGRAM, 'play'),),
+        'pause': (_action(_PROGRAM, 'pause'),),
+        'stop': (_action(_PROGRAM, 'stop'),),
+        'programState': (_query(_PROGRAM, 'state', FIRST_VERSION),),
+        'running': (
+            _query(
+                _PROGRAM,
+                'state',
+                FIRST_VERSION,
+                {'PLAYING': 'true', 'PAUSED': 'false', 'STOPPED': 'false'},
+            ),
+        ),
+        'robotmode': (_query('/robotstate/v1/robotmode', 'mode', (10, 12)),),
+        'safetymode': (_query('/robotstate/v1/safetymode', 'mode', (10, 12)),),
+        'get loaded program': (_query('/program/v1/loaded', 'name', (10, 12)),),
+        'get operational mode': (_query('/system/v1/operationalmode', 'mode', (10, 12)),),
+        'is in remote control': (
+            _query(
+                '/system/v1/controlmode',
+                'mode',
+                (10, 12),
+                {'REMOTE': 'true', 'LOCAL': 'false'},
+            ),
+        ),
+        'PolyscopeVersion': (_query('/versions/v1', 'marketingVersion', (10, 14)),),
+        'get robot model': (_query(_INFORMATION, 'robotType', (10, 14)),),
+        'get serial number': (_query(_INFORMATION, 'serialNumber', (10, 14)),),
+        'popup': (
+            ApiCommand(
+                method='POST',
+                path=_POPUP,
+                body={'title': 'Message', 'message': '{}'},
+                since=(10, 14),
+            ),
+        ),
+        'close popup': (ApiCommand(method='DELETE', path=_POPUP, since=(10, 14)),),
+        'close safety popup': (
+            ApiCommand(method='DELETE', path=f'{_POPUP}/safety', since=(10, 14)),
+        ),
+        'addToLog': (
+            ApiCommand(
+                method='POST', path='/system/v1/log', body={'message': '{}'}, since=(10, 14)
+            ),
+        ),
+    }
+)
+#: ``play`` of a paused program: the dashboard has one command for both.
+RESUME = _action(_PROGRAM, 'resume')
+
+
+def find_command(name: str, version: tuple[int, int]) -> ApiCommand:
+    """
+    Return the request that a version has for a command.
+
+    :raises LocalProtocolError: it has none.
+    """
+    for command in API_COMMANDS.get(name, ()):
+        if version >= command.since:
+            return command
+    raise LocalProtocolError(
+        f'The Robot API of PolyScope X {version[0]}.{version[1]} has no {name!r}.'
+    )
+
+
+def encode_body(command: ApiCommand, argument: str) -> bytes:
+    """Return the body of a request; empty = it has none."""
+    if not command.body:
+        return b''
+    return json.dumps(
+        {name: text.replace('{}', argument) for name, text in command.body.items()}
+    ).encode()
+
+
+def parse_answer(
+    request: DashboardRequest, command: ApiCommand, status: int, body: bytes
+) -> DashboardReply:
+    """
+    Return the meaning of an answer.
+
+    :raises RemoteProtocolError: a success without the value that was asked for.
+    """
+    fields = _fields(body)
+    if not 200 <= status < 300:
+        said = ': '.join(
+            text for key in ('message', 'details', 'detail') if (text := _text(fields.get(key)))
+        )
+        return DashboardReply(request=request, text=f'HTTP {status} {said}'.rstrip(), value=None)
+    value = ''
+    if command.value:
+        found = fields.get(command.value)
+        if not isinstance(found, str):
+            raise RemoteProtocolError(
+                f'The Robot API answers {request.name!r} without the field {command.value!r}: '
+                f'{body!r:.200}.'
+            )
+        value = command.words.get(found, found)
+    return DashboardReply(request=request, text=_text(fields.get('message')) or 'OK', value=value)
+
+
+def _fields(body: bytes) -> Mapping[str, Any]:
+    """Return the JSON object of an answer; empty if it is none, as a proxy's page of an error."""
+    try:
+        fields = json.loads(body)
+    except ValueError:
+        return {}
+    return fields if isinstance(fields, dict) else {}
+
+
+def _text(value: object) -> str:
+    """Return a text of an answer as one line; other values as JSON."""
+    if value is None:
+        return ''
+    text = value if isinstance(value, str) else json.dumps(value)
+    return ' '.join(text.split())[:300].rstrip('.')

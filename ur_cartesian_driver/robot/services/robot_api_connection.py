@@ -1,0 +1,140 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The Robot API of PolyScope X behind the calls of the dashboard: a request, an answer, no state.
+
+urllib3 speaks HTTP, in a thread for each request, so the robot loop never waits for it. Each
+request connects anew, as to the dashboard: a kept connection would fail the first request after a
+restart of the robot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+import urllib3
+
+from ur_cartesian_driver.protocol.dashboard import DashboardReply, DashboardRequest
+from ur_cartesian_driver.protocol.robot_api import (
+    ApiCommand,
+    BASE_PATH,
+    encode_body,
+    find_command,
+    parse_answer,
+    RESUME,
+)
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
+
+#: How long the robot may take to answer [s]; powering up takes a while, and is waited for.
+ANSWER_TIMEOUT = 10.0
+SLOW_ANSWER_TIMEOUT = 30.0
+SLOW_COMMANDS = frozenset({'power on', 'brake release', 'restart safety'})
+#: Longest answer that is read [bytes].
+MAX_ANSWER_SIZE = 65536
+#: Paths have moved between versions, and the old ones lead to the new ones.
+MAX_REDIRECTS = 3
+#: How long a program may take until the robot names it as loaded [s], and how often it is asked.
+LOAD_TIMEOUT, LOAD_POLL_PERIOD = 5.0, 0.2
+#: The first software that names the loaded program.
+NAMES_LOADED_PROGRAM = (10, 12)
+#: Suffix of programs, which their names in the API do not have.
+PROGRAM_SUFFIX = '.urpx'
+
+
+class RobotApiConnection:
+    """Sends commands of the dashboard to the Robot API, from one event loop; several at a time."""
+
+    def __init__(self, host: str, port: int, version: ControllerVersion) -> None:
+        """
+        Prepare; every request connects by itself.
+
+        :param version: software of the robot, which decides on the requests.
+        """
+        self._where = f'{host} port {port} (Robot API)'
+        self._url = f'http://{f"[{host}]" if ":" in host else host}:{port}{BASE_PATH}'
+        self._version = (version.major, version.minor)
+
+    async def request(self, command: str, argument: str = '') -> DashboardReply:
+        """
+        Give a command and return the answer.
+
+        :raises OSError: the Robot API does not answer, or does not do what it accepted.
+        :raises ProtocolError: it answers nonsense, or does not have the command.
+        """
+        api_command = find_command(command, self._version)
+        if command == 'load':
+            argument = argument.removesuffix(PROGRAM_SUFFIX)
+        if command == 'play' and (await self.request('programState')).value == 'PAUSED':
+            api_command = RESUME
+        request = DashboardRequest(name=command, argument=argument)
+        status, body = await asyncio.to_thread(
+            self._exchange,
+            api_command,
+            encode_body(api_command, argument),
+            SLOW_ANSWER_TIMEOUT if command in SLOW_COMMANDS else ANSWER_TIMEOUT,
+        )
+        reply = parse_answer(request, api_command, status, body)
+        if command == 'load' and reply.ok and self._version >= NAMES_LOADED_PROGRAM:
+            await self._wait_until_loaded(argument)
+        return reply
+
+    async def _wait_until_loaded(self, program: str) -> None:
+        """
+        Wait until the robot names a program as loaded: it accepts to load before it does.
+
+        :raises OSError: it does not in time.
+        """
+        loop = asyncio.get_running_loop()
+        end = loop.time() + LOAD_TIMEOUT
+        while (await self.request('get loaded program')).value != program:
+            if loop.time() >= end:
+                raise OSError(
+                    f'The robot accepts to load {program!r}, but has not after '
+                    f'{LOAD_TIMEOUT:g} s; PolyScope X loads programs only while its screen is '
+                    'shown, on a pendant or in a browser'
+                )
+            await asyncio.sleep(LOAD_POLL_PERIOD)
+
+    def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
+        """Send a request and return status and body of the answer; called in a thread."""
+        try:
+            # Unlike other clients, it takes no proxy from the environment: the robot is near.
+            with urllib3.PoolManager(
+                timeout=urllib3.Timeout(connect=CONNECT_TIMEOUT, read=timeout),
+                retries=urllib3.Retry(total=MAX_REDIRECTS, connect=0, read=0, status=0, other=0),
+            ) as client:
+                response = client.request(
+                    command.method,
+                    self._url + command.path,
+                    body=body or None,
+                    headers={'Accept': 'application/json'}
+                    | ({'Content-Type': 'application/json'} if body else {}),
+                    preload_content=False,
+                )
+                try:
+                    return response.status, response.read(MAX_ANSWER_SIZE)
+                finally:
+                    response.close()
+        except urllib3.exceptions.HTTPError as error:
+            raise OSError(f'{self._where}: {_reason(error, timeout)}') from error
+
+
+def _reason(error: urllib3.exceptions.HTTPError, timeout: float) -> str:
+    """Return what went wrong, as the rest of a sentence."""
+    cause: BaseException | None = error
+    if isinstance(error, urllib3.exceptions.MaxRetryError) and error.reason is not None:
+        cause = error.reason
+    match cause:
+        case urllib3.exceptions.NewConnectionError() if isinstance(cause.__cause__, OSError):
+            return error_reason(cause.__cause__)
+        case urllib3.exceptions.ConnectTimeoutError():
+            return f'no answer within {CONNECT_TIMEOUT:g} s'
+        case urllib3.exceptions.TimeoutError():
+            return f'no answer within {timeout:g} s'
+        case urllib3.exceptions.ResponseError():
+            return f'it redirects more than {MAX_REDIRECTS} times'
+        case urllib3.exceptions.SSLError():
+            return 'it redirects to HTTPS, with a certificate that cannot be checked'
+        case _:
+            return 'it hangs up, or does not speak HTTP'

@@ -1,0 +1,383 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One HTTP client of the Robot API of PolyScope X: what each request reads or changes.
+
+Paths and bodies are written out once more here and not taken from the driver's table: a simulator
+that shares it agrees with its mistakes. Which answers are documented: doc/simulation.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.client import HTTPException, parse_headers
+from io import BytesIO
+import json
+from pathlib import PurePosixPath
+from types import MappingProxyType
+from typing import Any
+
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
+from ur_cartesian_driver.sim.state.controller_state import Popup
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
+
+BASE_PATH = '/universal-robots/robot-api'
+#: The first software that serves it.
+FIRST_VERSION = (10, 11)
+#: Largest request [bytes].
+_MAX_REQUEST_SIZE = 65536
+#: How long an action may take until it is answered 504 [s].
+_ACTION_TIMEOUT = 10.0
+
+_PROGRAM_STATES = {
+    RuntimeState.STOPPING: 'STOPPED',
+    RuntimeState.STOPPED: 'STOPPED',
+    RuntimeState.PLAYING: 'PLAYING',
+    RuntimeState.RESUMING: 'PLAYING',
+    RuntimeState.PAUSING: 'PAUSED',
+    RuntimeState.PAUSED: 'PAUSED',
+}
+#: The API knows five safety modes.
+_SAFETY_MODES = {
+    SafetyMode.ROBOT_EMERGENCY_STOP: 'EMERGENCY_STOP',
+    SafetyMode.SYSTEM_EMERGENCY_STOP: 'EMERGENCY_STOP',
+    SafetyMode.VIOLATION: 'FAULT',
+}
+_FORBIDDEN = {
+    'message': 'Forbidden',
+    'details': 'Not authorized to perform this operation under the current robot control mode.',
+}
+
+
+class Refused(Exception):
+    """A request that is not carried out."""
+
+    def __init__(self, status: HTTPStatus, message: str, **fields: Any) -> None:
+        """Take the answer."""
+        super().__init__(message)
+        self.status, self.fields = status, {'message': message, **fields}
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """An answer that is due when the robot has done what it was asked for."""
+
+    is_done: Callable[[Controller], bool]
+    message: str
+
+
+Body = Mapping[str, Any]
+Fields = dict[str, Any]
+Handler = Callable[[Controller, Body], 'Fields | Waiting']
+
+
+def _refuse_if(refusal: str) -> None:
+    if refusal:
+        raise Refused(HTTPStatus.CONFLICT, 'Conflict', details=refusal)
+
+
+def _power_on(controller: Controller) -> None:
+    if controller.power.mode is not RobotMode.POWER_OFF:
+        raise Refused(HTTPStatus.CONFLICT, 'Conflict', details='The arm is powered already')
+    _refuse_if(controller.power_on())
+
+
+def _restart_safety(controller: Controller) -> None:
+    _refuse_if(controller.safety_event(SafetyEvent.RESTART))
+    controller.power_off()
+
+
+#: Actions on the arm: what they do, and what then is waited for.
+_STATE_ACTIONS: Mapping[
+    str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
+] = MappingProxyType(
+    {
+        'POWER_ON': (_power_on, lambda c: c.power.mode >= RobotMode.IDLE),
+        'POWER_OFF': (Controller.power_off, lambda c: c.power.mode is RobotMode.POWER_OFF),
+        'BRAKE_RELEASE': (
+            lambda c: _refuse_if(c.release_brakes()),
+            lambda c: c.power.mode is RobotMode.RUNNING,
+        ),
+        'UNLOCK_PROTECTIVE_STOP': (
+            lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK)),
+            lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
+        ),
+        'RESTART_SAFETY': (_restart_safety, lambda c: c.safety.mode is SafetyMode.NORMAL),
+    }
+)
+
+
+def _play(controller: Controller, state: RuntimeState) -> None:
+    if controller.programs.state is not state:
+        raise Refused(
+            HTTPStatus.CONFLICT,
+            'Conflict',
+            details=f'The program is {_PROGRAM_STATES[controller.programs.state]}',
+        )
+    _refuse_if(controller.programs.play())
+
+
+#: Actions on the program, in the same form.
+_PROGRAM_ACTIONS: Mapping[
+    str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
+] = MappingProxyType(
+    {
+        'play': (
+            lambda c: _play(c, RuntimeState.STOPPED),
+            lambda c: c.programs.state is RuntimeState.PLAYING,
+        ),
+        'resume': (
+            lambda c: _play(c, RuntimeState.PAUSED),
+            lambda c: c.programs.state is RuntimeState.PLAYING,
+        ),
+        'pause': (
+            lambda c: _refuse_if(c.programs.pause()),
+            lambda c: c.programs.state is RuntimeState.PAUSED,
+        ),
+        'stop': (
+            lambda c: c.programs.stop(),
+            lambda c: c.programs.state is RuntimeState.STOPPED,
+        ),
+    }
+)
+
+
+def _act(
+    actions: Mapping[str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]],
+    controller: Controller,
+    body: Body,
+) -> Waiting:
+    action = _text(body, 'action')
+    if action not in actions:
+        raise ValueError(f'action is {action!r}')
+    act, is_done = actions[action]
+    act(controller)
+    return Waiting(is_done, f'{action} carried out')
+
+
+def _load(field: str) -> Handler:
+    def load(controller: Controller, body: Body) -> Fields:
+        name = _text(body, field)
+        for file, text in controller.config.programs.items():
+            if PurePosixPath(file).stem == name:
+                if error := controller.programs.load(file, text):
+                    raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=error)
+                return {'message': 'Program loaded'}
+        raise Refused(HTTPStatus.INTERNAL_SERVER_ERROR, 'Error', details=f'No program {name!r}')
+
+    return load
+
+
+def _loaded(controller: Controller, _: Body) -> Fields:
+    return {'name': PurePosixPath(controller.programs.loaded).stem or 'Default program'}
+
+
+def _program_state(controller: Controller, _: Body) -> Fields:
+    return {'state': _PROGRAM_STATES[controller.programs.state]}
+
+
+def _safety_mode(controller: Controller, _: Body) -> Fields:
+    mode = controller.safety.mode
+    return {'mode': _SAFETY_MODES.get(mode, mode.name)}
+
+
+def _information(controller: Controller, _: Body) -> Fields:
+    model = controller.config.model.upper().removesuffix('E')
+    return {'robotType': model, 'serialNumber': '20000000000'}
+
+
+def _versions(controller: Controller, _: Body) -> Fields:
+    version = '.'.join(map(str, controller.config.version[:3]))
+    return {'marketingVersion': version, 'baselineVersion': version}
+
+
+def _open_popup(controller: Controller, body: Body) -> Fields:
+    controller.show_popup(Popup(text=_text(body, 'message')))
+    return {'message': 'Popup opened successfully'}
+
+
+def _close_popup(controller: Controller, _: Body) -> Fields:
+    if not controller.popups:
+        raise Refused(HTTPStatus.NOT_FOUND, 'No popup is open', closed=False)
+    controller.close_popups()
+    return {'message': 'Popup closed', 'closed': True}
+
+
+def _close_safety_popup(controller: Controller, _: Body) -> Fields:
+    raise Refused(HTTPStatus.NOT_FOUND, 'No safety popup is open', closed=False)
+
+
+def _log(controller: Controller, body: Body) -> Fields:
+    controller.messages.note(_text(body, 'message'))
+    return {'message': 'Log entry added'}
+
+
+def _openapi(controller: Controller, _: Body) -> Fields:
+    """Tell the version of the API, by which clients decide what they may ask for."""
+    version = controller.config.version[:2]
+    number = '5.0.107' if version >= (10, 14) else '3.1.4' if version >= (10, 12) else '3.0.0'
+    return {'openapi': '3.1.0', 'info': {'title': 'Robot API', 'version': number}}
+
+
+#: Method and path below BASE_PATH: the first software that has it, and what it does.
+_ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
+    {
+        ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),
+        ('PUT', '/robotstate/v1/state'): (
+            FIRST_VERSION,
+            lambda controller, body: _act(_STATE_ACTIONS, controller, body),
+        ),
+        ('GET', '/robotstate/v1/robotmode'): (
+            (10, 12),
+            lambda controller, _: {'mode': controller.power.mode.name},
+        ),
+        ('GET', '/robotstate/v1/safetymode'): ((10, 12), _safety_mode),
+        ('PUT', '/program/v1/state'): (
+            FIRST_VERSION,
+            lambda controller, body: _act(_PROGRAM_ACTIONS, controller, body),
+        ),
+        ('GET', '/program/v1/state'): (FIRST_VERSION, _program_state),
+        ('PUT', '/program/v1/load'): (FIRST_VERSION, _load('programName')),
+        ('PUT', '/program/v1/loaded'): ((10, 12), _load('name')),
+        ('GET', '/program/v1/loaded'): ((10, 12), _loaded),
+        ('GET', '/system/v1/controlmode'): (
+            (10, 12),
+            lambda controller, _: {'mode': 'REMOTE' if controller.remote_control else 'LOCAL'},
+        ),
+        ('GET', '/system/v1/operationalmode'): ((10, 12), lambda *_: {'mode': 'AUTOMATIC'}),
+        ('GET', '/system/v1/information'): ((10, 14), _information),
+        ('POST', '/system/v1/log'): ((10, 14), _log),
+        ('GET', '/versions/v1'): ((10, 14), _versions),
+        ('POST', '/popup/v1'): ((10, 14), _open_popup),
+        ('DELETE', '/popup/v1'): ((10, 14), _close_popup),
+        ('DELETE', '/popup/v1/safety'): ((10, 14), _close_safety_popup),
+    }
+)
+
+
+class RobotApiSession(ClientSession):
+    """Answers one request after the other; an action is answered when it is done."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Wait for requests."""
+        self._controller = controller
+        self._buffer = bytearray()
+        self._waiting: Waiting | None = None
+        self._waits_until = 0.0
+        self._last_request = False
+
+    def feed(self, data: bytes) -> bytes:
+        """Take a part of a request; return what can be answered at once."""
+        self._buffer += data
+        if len(self._buffer) > _MAX_REQUEST_SIZE:
+            raise RemoteProtocolError(f'a request is longer than {_MAX_REQUEST_SIZE} bytes')
+        return self.answers()
+
+    def answers(self) -> bytes:
+        """
+        Return the answers that are due; called in each cycle.
+
+        :raises HangUp: behind the answer to a client that wants no other.
+        """
+        answers = b''
+        while True:
+            if self._waiting is None:
+                if (request := self._next_request()) is None:
+                    return answers
+                answers += self._answer(*request)
+            if self._waiting is not None:
+                if not (answer := self._due_answer(self._waiting)):
+                    return answers
+                answers += answer
+                self._waiting = None
+            if self._last_request:
+                raise HangUp(answers)
+
+    def _due_answer(self, waiting: Waiting) -> bytes:
+        """Return the answer to an action; nothing as long as the robot carries it out."""
+        if waiting.is_done(self._controller):
+            return _response(HTTPStatus.OK, {'message': waiting.message})
+        if self._controller.time >= self._waits_until:
+            return _response(HTTPStatus.GATEWAY_TIMEOUT, {'message': 'Gateway Timeout'})
+        return b''
+
+    def _next_request(self) -> tuple[str, str, bytes] | None:
+        """Return method, path and body of the next whole request."""
+        head, end, rest = bytes(self._buffer).partition(b'\r\n\r\n')
+        if not end:
+            return None
+        line, _, lines = head.partition(b'\r\n')
+        try:
+            method, path, version = line.decode('ascii').split(' ')
+            headers = parse_headers(BytesIO(lines + end))
+            size = int(headers.get('Content-Length', '0'))
+        except (ValueError, HTTPException) as error:
+            raise RemoteProtocolError(f'{line!r:.100} does not begin an HTTP request') from error
+        if 'Transfer-Encoding' in headers or size < 0:
+            raise RemoteProtocolError('a request whose length is not given')
+        if len(rest) < size:
+            return None
+        del self._buffer[: len(head) + len(end) + size]
+        self._last_request = version == 'HTTP/1.0' or headers.get('Connection') == 'close'
+        return method, path, rest[:size]
+
+    def _answer(self, method: str, path: str, body: bytes) -> bytes:
+        """Carry out a request; nothing yet if it takes a while."""
+        route = path.removeprefix(BASE_PATH)
+        version = self._controller.config.version[:2]
+        methods = {m for (m, p), (since, _) in _ROUTES.items() if p == route and version >= since}
+        if route == path or not methods:
+            return self._not_found(path)
+        if method not in methods:
+            return _response(HTTPStatus.METHOD_NOT_ALLOWED, {'detail': 'Method Not Allowed'})
+        if method != 'GET' and not self._controller.remote_control:
+            return _response(HTTPStatus.FORBIDDEN, _FORBIDDEN)
+        try:
+            fields = json.loads(body or b'{}')
+            if not isinstance(fields, dict):
+                raise ValueError('no object')
+            answer = _ROUTES[method, route][1](self._controller, fields)
+        except ValueError as error:
+            return _response(HTTPStatus.UNPROCESSABLE_ENTITY, {'detail': [{'msg': str(error)}]})
+        except Refused as refused:
+            return _response(refused.status, refused.fields)
+        if isinstance(answer, Waiting):
+            self._waiting = answer
+            self._waits_until = self._controller.time + _ACTION_TIMEOUT
+            return b''
+        return _response(HTTPStatus.OK, answer)
+
+    def _not_found(self, path: str) -> bytes:
+        """Redirect a path that ends with a slash too many, as the robot does."""
+        known = {f'{BASE_PATH}{route}/' for _, route in _ROUTES}
+        if path in known:
+            return _response(HTTPStatus.TEMPORARY_REDIRECT, {}, location=path.rstrip('/'))
+        return _response(HTTPStatus.NOT_FOUND, {'detail': 'Not Found'})
+
+
+def _text(body: Body, field: str) -> str:
+    """
+    Return a text of a request.
+
+    :raises ValueError: it is missing, or no text.
+    """
+    value = body.get(field)
+    if not isinstance(value, str):
+        raise ValueError(f'{field} is {value!r}')
+    return value
+
+
+def _response(status: HTTPStatus, fields: Mapping[str, Any], location: str = '') -> bytes:
+    body = json.dumps(fields).encode()
+    head = [
+        f'HTTP/1.1 {status.value} {status.phrase}',
+        'Content-Type: application/json',
+        f'Content-Length: {len(body)}',
+        *([f'Location: {location}'] if location else []),
+    ]
+    return '\r\n'.join([*head, '', '']).encode() + body
