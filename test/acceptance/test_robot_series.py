@@ -9,10 +9,13 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.robot_state import RobotMode
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
 
 READY = 10.0
+X_FROM_POWER_OFF = {'model': 'ur30', 'frequency': 125.0, 'power': 'off', 'unlock_delay': 0.0}
 NOZZLE = Pose((0.01, -0.02, 0.08), (0.0, 0.6, 0.0, 0.8))
 
 
@@ -67,8 +70,8 @@ def test_each_generation_does_all_that_it_can(
     assert driver.dashboard('robotmode').ok == has_dashboard
     if not has_dashboard:
         assert driver.dashboard('brake release').text == (
-            'PolyScope X has no dashboard server, so this service is not available with software '
-            f'{software}; call recover, or do it on the pendant.'
+            'PolyScope X has no dashboard server, and its Robot API has it from software 10.11 on, '
+            f'but the robot runs {software}; call recover, or do it on the pendant.'
         )
 
     ur_sim.protective_stop()
@@ -76,3 +79,50 @@ def test_each_generation_does_all_that_it_can(
     answer = driver.recover()
     assert answer.ok, answer.text
     assert driver.execute(there_and_back(driver, -0.02), timeout=READY).succeeded
+
+
+@pytest.mark.parametrize(
+    'polyscope',
+    [
+        pytest.param(text, marks=pytest.mark.ur_sim(**X_FROM_POWER_OFF, polyscope=text))
+        for text in ('10.11', '10.14')
+    ],
+)
+def test_polyscope_x_works_from_power_off_to_recovery_without_a_person(
+    make_driver, ur_sim, polyscope
+):
+    driver = make_driver()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    if polyscope == '10.14':
+        wait_for(lambda: driver.status.serial_number == '20000000000')
+        assert driver.dashboard('robotmode').text == 'POWER_OFF'
+        assert driver.dashboard('is in remote control').text == 'true'
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    for step in 'switch the arm on', 'release the brakes', 'send the robot program':
+        assert step in answer.text
+    assert driver.execute(there_and_back(driver, -0.02), timeout=READY).succeeded
+
+    ur_sim.protective_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    assert 'unlock the protective stop' in answer.text
+    assert driver.execute(there_and_back(driver, 0.02), timeout=READY).succeeded
+
+    ur_sim.call(lambda controller: controller.safety_event(SafetyEvent.VIOLATION))
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    assert 'restart the safety system' in answer.text
+    assert driver.execute(there_and_back(driver, -0.02), timeout=READY).succeeded
+
+
+@pytest.mark.ur_sim(**X_FROM_POWER_OFF, polyscope='10.12', remote_control=False)
+def test_polyscope_x_in_local_control_leaves_it_to_a_person(make_driver, ur_sim):
+    driver = make_driver()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    for answer in driver.dashboard('power on'), driver.recover():
+        assert not answer.ok
+        assert 'in local control: switch it to remote control' in answer.text
+    assert ur_sim.state().robot_mode is RobotMode.POWER_OFF

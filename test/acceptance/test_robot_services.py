@@ -265,8 +265,28 @@ def test_a_robot_without_force_sensor_refuses_to_zero_it(make_driver):
     assert 'CB3' in answer.text
 
 
-@pytest.mark.ur_sim(frequency=125.0, polyscope='10.11.0', unlock_delay=0.0)
-def test_polyscope_x_has_no_dashboard_and_the_rest_works(make_driver, ur_sim):
+@pytest.mark.ur_sim(frequency=125.0, polyscope='10.12.0', unlock_delay=0.0)
+def test_the_robot_api_loads_plays_pauses_and_stops(make_driver, ur_sim):
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    answer = driver.dashboard('load', 'nothing')
+    assert not answer.ok
+    assert "'load' and says: HTTP 500" in answer.text
+    program = wrap_in_program(fetch_program(driver))
+    assert ur_sim.call(lambda c: c.programs.load('pendant.urpx', program)) == ''
+    assert driver.dashboard('get loaded program').text == 'pendant'
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    assert 'play the loaded program' in answer.text
+    for command, state in ('pause', 'PAUSED'), ('play', 'PLAYING'), ('stop', 'STOPPED'):
+        answer = driver.dashboard(command)
+        assert answer.ok, answer.text
+        assert driver.dashboard('programState').text == state
+    assert driver.dashboard('running').text == 'false'
+
+
+@pytest.mark.ur_sim(frequency=125.0, polyscope='10.8.0', unlock_delay=0.0)
+def test_polyscope_x_before_its_robot_api_refuses_and_the_rest_works(make_driver, ur_sim):
     driver = make_driver()
     driver.wait_ready(READY)
     for command in ACTIONS:

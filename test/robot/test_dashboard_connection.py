@@ -136,10 +136,17 @@ def version(text):
     [
         ('power on', '5.21.0', ''),
         ('power on', '3.15.0', ''),
-        ('power on', '10.11.0', 'PolyScope X has no dashboard server'),
-        ('power on', '10.8.0', 'with software 10.8.0.0; call recover, or do it on the pendant.'),
-        ('robotmode', '10.8.0', '; see the topic robot_mode.'),
-        ('load', '10.8.0', '; do it on the pendant.'),
+        ('power on', '10.11.0', ''),
+        ('load', '10.11.0', ''),
+        ('robotmode', '10.12.0', ''),
+        ('power on', '10.8.0', 'Robot API has it from software 10.11 on, but the robot runs 10.8'),
+        ('power on', '10.8.0', '; call recover, or do it on the pendant.'),
+        (
+            'robotmode',
+            '10.11.0',
+            'from software 10.12 on, but the robot runs 10.11.0.0; see the t',
+        ),
+        ('safetystatus', '10.14.0', 'Robot API has no such command; see the topic safety_mode.'),
         ('is in remote control', '5.5.0', 'needs software 5.6 or newer'),
         ('is in remote control', '3.15.0', 'has no command'),
         ('restart safety', '3.6.0', 'needs software 3.7 or newer'),
@@ -160,6 +167,7 @@ def robot(**fields):
 
 
 STOPPED = robot(safety_mode=SafetyMode.ROBOT_EMERGENCY_STOP)
+PROTECTED = robot(safety_mode=SafetyMode.PROTECTIVE_STOP)
 
 
 @pytest.mark.parametrize(
@@ -175,6 +183,8 @@ STOPPED = robot(safety_mode=SafetyMode.ROBOT_EMERGENCY_STOP)
         ('get loaded program', 'No program loaded', robot(), None, 'Load one'),
         ('load', 'Error', robot(runtime_state=RuntimeState.PLAYING), True, 'stop it first'),
         ('unlock protective stop', TOO_EARLY + ' until 5s', robot(), None, 'Wait until 5 s'),
+        ('unlock protective stop', 'HTTP 409 Conflict', PROTECTED, True, 'Wait until 5 s'),
+        ('power on', 'HTTP 403 Forbidden', robot(), None, 'switch it to remote control'),
     ],
 )
 def test_a_refusal_is_explained(command, answer, state, remote, hint):
