@@ -70,8 +70,9 @@ def test_each_generation_does_all_that_it_can(
     assert driver.dashboard('robotmode').ok == has_dashboard
     if not has_dashboard:
         assert driver.dashboard('brake release').text == (
-            'PolyScope X has no dashboard server, and its Robot API has it from software 10.11 on, '
-            f'but the robot runs {software}; call recover, or do it on the pendant.'
+            'PolyScope X has no dashboard server, and its Robot API has this command from '
+            f'software 10.11 on, but the robot runs {software}; call recover, or do it on the '
+            'pendant.'
         )
 
     ur_sim.protective_stop()

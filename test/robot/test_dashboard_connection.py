@@ -139,7 +139,7 @@ def version(text):
         ('power on', '10.11.0', ''),
         ('load', '10.11.0', ''),
         ('robotmode', '10.12.0', ''),
-        ('power on', '10.8.0', 'Robot API has it from software 10.11 on, but the robot runs 10.8'),
+        ('power on', '10.8.0', 'has this command from software 10.11 on, but the robot runs 10.8'),
         ('power on', '10.8.0', '; call recover, or do it on the pendant.'),
         (
             'robotmode',

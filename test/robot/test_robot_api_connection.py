@@ -6,6 +6,8 @@ The Robot API's client with a server that knows nothing of our code.
 It is Python's own, and answers as the manufacturer's client library and its tests have it.
 """
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import http.server
@@ -36,6 +38,7 @@ class DocumentedRobot(http.server.ThreadingHTTPServer):
 
 class _Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = 'HTTP/1.1'
+    server: DocumentedRobot
 
     def _serve(self):
         body = self.rfile.read(int(self.headers.get('Content-Length', '0')))

@@ -3,8 +3,9 @@
 """The simulated Robot API: each request, the software that has it, and when it is answered."""
 
 import http.client
-import io
 import json
+import socket
+from typing import Any
 
 import pytest
 from robot_ports import FREE, HOST
@@ -27,30 +28,26 @@ def request_bytes(method, path, fields=None, head='', version='1.1'):
     return (lines + head + '\r\n').encode() + body
 
 
-class _Bytes:
-    """Bytes in place of a socket, for the client of the standard library."""
-
-    def __init__(self, data):
-        self._data = data
-
-    def makefile(self, *_):
-        return io.BytesIO(self._data)
-
-
 def parse(data):
-    response = http.client.HTTPResponse(_Bytes(data))
-    response.begin()
-    return response.status, json.loads(response.read()), response
+    """Let the client of the standard library read an answer."""
+    near, far = socket.socketpair()
+    with near, far:
+        far.sendall(data)
+        response = http.client.HTTPResponse(near)
+        response.begin()
+        return response.status, json.loads(response.read()), response
 
 
 class ApiUser:
     """A client without sockets; cycles pass while an answer is not there."""
 
     def __init__(self, **settings):
-        config = {'polyscope': '10.14', 'frequency': 125.0, 'unlock_delay': 0.0}
-        self.controller = assemble(
-            SimulatorConfig(**config | {'programs': {'a.urpx': LOOP}} | settings)
-        ).controller
+        config: dict[str, Any] = {
+            'polyscope': '10.14',
+            'frequency': 125.0,
+            'programs': {'a.urpx': LOOP},
+        }
+        self.controller = assemble(SimulatorConfig(**config | settings)).controller
         self.session = RobotApiSession(self.controller)
         self.cycles = 0
 

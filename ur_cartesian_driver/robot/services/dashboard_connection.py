@@ -153,7 +153,7 @@ def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
     reason = (
         'no such command'
         if since is None
-        else f'it from software {since[0]}.{since[1]} on, but the robot runs {version}'
+        else f'this command from software {since[0]}.{since[1]} on, but the robot runs {version}'
     )
     return (
         f'PolyScope X has no dashboard server, and its Robot API has {reason}; '

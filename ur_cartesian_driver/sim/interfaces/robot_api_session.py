@@ -103,8 +103,9 @@ _STATE_ACTIONS: Mapping[
             lambda c: _refuse_if(c.release_brakes()),
             lambda c: c.power.mode is RobotMode.RUNNING,
         ),
+        # Without the wait of the pendant, as the client library's tests have it.
         'UNLOCK_PROTECTIVE_STOP': (
-            lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK)),
+            lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK_BY_LINE)),
             lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
         ),
         'RESTART_SAFETY': (_restart_safety, lambda c: c.safety.mode is SafetyMode.NORMAL),
