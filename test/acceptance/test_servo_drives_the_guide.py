@@ -72,7 +72,7 @@ def state_of(controller):
         target_tcp_pose=motion.T_base_tcp,
         actual_tcp_twist=motion.tcp_twist,
         target_tcp_twist=motion.tcp_twist,
-        speed_scaling=motion.scaling,
+        effective_speed=motion.scaling,
         runtime_state=controller.programs.state,
     )
 

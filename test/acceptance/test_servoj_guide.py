@@ -41,6 +41,7 @@ OUTPUTS = (
     'actual_q',
     'actual_qd',
     'speed_scaling',
+    'target_speed_fraction',
     'runtime_state',
     'output_int_register_24',
     'output_int_register_25',
@@ -95,10 +96,11 @@ class ExternalController:
             'q': 1,
             'qd': 2,
             'scaling': 3,
-            'state': 4,
-            'mode': 5,
-            'last_sequence': 6,
-            'lag': 7,
+            'slider': 4,
+            'state': 5,
+            'mode': 6,
+            'last_sequence': 7,
+            'lag': 8,
         }
         if name not in fields:
             raise AttributeError(name)
@@ -239,7 +241,7 @@ def test_waypoints_are_buffered_while_the_arm_is_slowed_down_and_none_is_lost(se
     servo.set_slider(0.5)
     servo.stream(path, 1.0)
     # Each waypoint of 2 ms takes 4 ms: half of them wait.
-    assert servo.scaling == pytest.approx(0.5)
+    assert (servo.scaling, servo.slider) == pytest.approx((1.0, 0.5))
     assert servo.lag == pytest.approx(0.5, abs=0.02)
     held = servo.q
     servo.values[SYNC] = EXTERNAL_TO_ROBOT
@@ -258,7 +260,7 @@ def test_client_that_heeds_the_lag_time_keeps_the_buffer_short(servo):
     servo.set_slider(0.4)
     # The guide: slow the trajectory down by what the controller reports.
     servo.stream(swing(servo.q), 1.0, lambda client: 0.2 if client.lag > 0.05 else 1.0)
-    assert servo.scaling == pytest.approx(0.4)
+    assert (servo.scaling, servo.slider) == pytest.approx((1.0, 0.4))
     assert max(packet[7] for packet in servo.packets) < 0.07
     assert not servo.stopped
 

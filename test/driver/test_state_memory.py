@@ -55,6 +55,7 @@ states = st.builds(
     T_flange_tcp=poses,
     speed_scaling=numbers,
     target_speed_fraction=numbers,
+    effective_speed=numbers,
     robot_mode=st.sampled_from(RobotMode),
     safety_mode=st.sampled_from(SafetyMode),
     runtime_state=st.sampled_from(RuntimeState),

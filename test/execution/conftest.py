@@ -96,7 +96,7 @@ class Cell:
                     actual_tcp_acceleration=rate,
                     target_tcp_acceleration=rate,
                     T_flange_tcp=self.T_flange_tcp,
-                    speed_scaling=scale(time),
+                    effective_speed=scale(time),
                     runtime_state=RuntimeState.PLAYING,
                     points_begun=begun,
                 ),

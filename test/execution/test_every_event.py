@@ -101,7 +101,7 @@ PACKETS = st.builds(
     safety_status=st.sampled_from(SAFETY),
     runtime_state=st.sampled_from([RuntimeState.PLAYING] * 4 + list(RuntimeState)),
     robot_mode=st.sampled_from([RobotMode.RUNNING] * 4 + [RobotMode.POWER_OFF]),
-    speed_scaling=st.sampled_from([1.0, 0.0]),
+    effective_speed=st.sampled_from([1.0, 0.0]),
 )
 EVENTS = st.one_of(
     PACKETS.map(lambda state: StateReceived(state=state)),

@@ -371,12 +371,12 @@ def test_a_late_arrival_violates_the_goal_and_names_the_times():
 def test_a_slowed_robot_is_not_late():
     machine = started(due=2.0, goal_time_tolerance=0.1)
     for i in range(1, 41):
-        machine.step(robot(i / 40, timestamp=0.1 * i, speed_scaling=0.5), 0.1 * i)
+        machine.step(robot(i / 40, timestamp=0.1 * i, effective_speed=0.5), 0.1 * i)
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 4.0)
     assert outcome(machine.step(robot(1.0, timestamp=4.1, qd=REST), 4.1)).succeeded
 
 
-def test_a_paused_robot_is_not_late_whatever_it_says_of_its_speed():
+def test_a_paused_robot_is_not_late():
     machine = started(due=2.0, goal_time_tolerance=0.1)
     for i in range(1, 41):
         paused = 10 < i <= 30
@@ -385,6 +385,7 @@ def test_a_paused_robot_is_not_late_whatever_it_says_of_its_speed():
                 0.5 if paused else i / 40,
                 timestamp=0.1 * i,
                 runtime_state=(RuntimeState.PAUSED if paused else RuntimeState.PLAYING),
+                effective_speed=0.0 if paused else 1.0,
             ),
             0.1 * i,
         )
@@ -555,7 +556,6 @@ def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
     'reason',
     [
         {'runtime_state': RuntimeState.PAUSED},
-        {'speed_scaling': 0.0},
         {'target_speed_fraction': 0.0},
     ],
 )

@@ -92,7 +92,7 @@ def robot(joint=0.0, speed=0.0, T_flange_tcp=IDENTITY, **changes):
 def registers(mode=0, sequence=0, lag=0.0, timestamp=0.0, playing=True):
     return ServoFeedback(
         timestamp=timestamp,
-        speed_scaling=1.0,
+        effective_speed=1.0,
         playing=playing,
         mode=mode,
         last_sequence=sequence,
@@ -285,7 +285,7 @@ PACKETS = st.builds(
     safety_status=st.sampled_from(SAFETY),
     runtime_state=st.sampled_from([RuntimeState.PLAYING] * 4 + list(RuntimeState)),
     robot_mode=st.sampled_from([RobotMode.RUNNING] * 4 + [RobotMode.POWER_OFF]),
-    speed_scaling=st.sampled_from([1.0, 0.0]),
+    effective_speed=st.sampled_from([1.0, 0.0]),
 )
 FEEDBACK = st.builds(
     registers,

@@ -76,7 +76,7 @@ class Robot:
                     self.empty += 1
         return ServoFeedback(
             timestamp=60.0 + self.cycles * self.step,
-            speed_scaling=self.scale,
+            effective_speed=self.scale,
             playing=self.playing,
             mode=self.mode,
             last_sequence=self.sequence,

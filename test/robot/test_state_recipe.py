@@ -44,7 +44,7 @@ def test_a_number_that_is_not_finite_is_nonsense_and_named(name, number):
 
 def test_the_count_of_points_is_read_from_the_register_that_the_program_writes():
     """The table of the state stands below the registers, so it has the name as a literal."""
-    (name,) = (row.rtde.name for row in STATE_TABLE if row.name == 'points_begun')
+    (name,) = (row.rtde.name for row in STATE_TABLE if row.rtde and row.name == 'points_begun')
     assert name == registers.register_name(registers.OutputInteger.POINTS_BEGUN)
 
 

@@ -159,7 +159,7 @@ STATE = RobotState(
     actual_tcp_pose=Pose((1.0, 2.0, 3.0)),
     robot_mode=RobotMode.IDLE,
     safety_mode=SafetyMode.PROTECTIVE_STOP,
-    speed_scaling=0.75,
+    effective_speed=0.75,
 )
 
 

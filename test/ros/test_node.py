@@ -72,7 +72,7 @@ def test_the_state_of_the_robot_is_published(single_cell):
     pose = newest['ur_cartesian_driver/tcp_pose']
     assert pose.header.frame_id == 'base'
     assert pose.pose.position.x == pytest.approx(cell.T_base_tcp.position[0])
-    assert newest['ur_cartesian_driver/speed_scaling'].data == 1.0
+    assert newest['ur_cartesian_driver/speed_scaling'].data == 0.0  # at rest
     assert newest['ur_cartesian_driver/robot_mode'].name == 'RUNNING'
     assert newest['ur_cartesian_driver/safety_mode'].name == 'NORMAL'
     status = newest['ur_cartesian_driver/status']

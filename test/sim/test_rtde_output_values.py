@@ -152,6 +152,6 @@ write_output_boolean_register(33, True)""")
         'output_double_register_7': 0.5,
         'output_bit_registers32_to_63': 0b10,
         'target_speed_fraction': 0.3,
-        'speed_scaling': 0.3,
+        'speed_scaling': 0.0,
     }.items():
         assert read(bench, name) == pytest.approx(value), name

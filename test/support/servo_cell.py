@@ -12,14 +12,14 @@ from pathlib import Path
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
-from ur_cartesian_driver.motion.robot_state import RuntimeState
-from ur_cartesian_driver.motion.servo_report import ServoFeedback
+from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataReceived,
     HandshakeDone,
     RtdeClientCodec,
 )
+from ur_cartesian_driver.robot.rtde.servo_connection import feedback_from_rtde, SERVO_FIELDS
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
@@ -28,13 +28,12 @@ from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
 CYCLE = 0.002
 SETTINGS = ServoSettings()
-OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *registers.SERVO_OUTPUTS)
 
 
 class OpenLoopClock(ServoClock):
     """Runs at rate 1, whatever the robot does with the set-points."""
 
-    def advance(self, passed, scaling, in_flight):
+    def advance(self, passed, speed, in_flight):
         super().advance(passed, 1.0, self.target)
 
 
@@ -56,7 +55,7 @@ class GuideCell:
     def __init__(self, program=GUIDE):
         self.controller = assemble(SimulatorConfig()).controller
         self._session = RtdeSession(self.controller, set())
-        self._client = RtdeClientCodec(OUTPUTS, registers.SERVO_INPUTS)
+        self._client = RtdeClientCodec(SERVO_FIELDS, registers.SERVO_INPUTS)
         data, ready = self._client.start(), []
         while not ready:
             ready = [
@@ -66,6 +65,7 @@ class GuideCell:
             ]
             data = self._client.data_to_send()
         self._inputs = ready[0].inputs[0]
+        self._effective_speed = EffectiveSpeed()
         self._inbox, self._outbox = deque(), deque()
         #: Where the arm was in each cycle.
         self.joints = []
@@ -90,7 +90,7 @@ class GuideCell:
         self.joints.append(self.q)
         for event in self._client.feed(b''.join(self._session.packages())):
             if isinstance(event, DataReceived):
-                self._inbox.append(servo_feedback(event.values))
+                self._inbox.append(feedback_from_rtde(event.values, self._effective_speed))
         while len(self._inbox) > delay:
             feedback = self._inbox.popleft()
             row = take(feedback)
@@ -100,21 +100,3 @@ class GuideCell:
     @property
     def time(self):
         return self.controller.time
-
-
-def servo_feedback(values):
-    """Return a packet of :data:`OUTPUTS` as what it means."""
-    timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
-    return ServoFeedback(
-        timestamp=timestamp,
-        speed_scaling=scaling,
-        playing=state == RuntimeState.PLAYING,
-        mode=mode,
-        last_sequence=sequence,
-        lag=lag,
-        setpoints_done=done,
-        repeats=repeats,
-        skipped=skipped,
-        buffer_size=size,
-        overflows=over,
-    )

@@ -4,7 +4,7 @@
 ``ur-cartesian plot``: draw a recorded motion, or write it as a table.
 
 The picture shows on the left the planned and executed path, and on the right over time: deviation
-from the plan, tool speed, speed scaling, and points, outputs and events.
+from the plan, tool speed, effective speed, and points, outputs and events.
 """
 
 from __future__ import annotations
@@ -265,10 +265,10 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
     )
     axes.plot(
         time,
-        100.0 * recording.speed_scaling,
+        100.0 * recording.effective_speed,
         color='#333333',
         linewidth=1.0,
-        label='speed scaling',
+        label='effective speed',
     )
     axes.set_ylabel('speed\n[%]')
     axes.set_ylim(0.0, 108.0)

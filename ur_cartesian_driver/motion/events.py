@@ -108,6 +108,7 @@ class Progress:
     time: float = 0.0
     #: Planned time that is left, at full speed scaling [s].
     time_remaining: float = 0.0
+    #: The effective speed of the controller (:mod:`~.effective_speed`), 0 to 1.
     speed_scaling: float = 1.0
     points_received: int = 0
     #: Motion time of the points that the robot holds and has not begun [s].

@@ -113,8 +113,9 @@ class RobotState:
     Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
 
     This is the only table of these fields: what is read by RTDE, the shared memory and the
-    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come last. A
-    field of the same name in DriverStatus.msg shows it; the simulator computes what it sends.
+    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come after
+    the others, what the driver computes comes last. A field of the same name in DriverStatus.msg
+    shows it; the simulator computes what it sends.
     """
 
     #: The controller's clock [s].
@@ -129,7 +130,7 @@ class RobotState:
     target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
-    #: The actual speed scaling, and the speed slider, both 0 to 1.
+    #: What slows the arm beside the slider, and the slider, both 0 to 1; see ``effective_speed``.
     speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
     target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
     robot_mode: Annotated[RobotMode, Rtde('robot_mode')] = RobotMode.RUNNING
@@ -152,6 +153,9 @@ class RobotState:
     ] = None
     #: How many points of the running trajectory the robot program has begun; 0 = none, or unknown.
     points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
+    #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
+    #: this packet and those before.
+    effective_speed: Annotated[float, None] = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,7 +168,8 @@ class StateField:
     #: Only vectors may.
     may_be_none: bool
     default: Any
-    rtde: Rtde
+    #: None = the driver computes it.
+    rtde: Rtde | None
 
 
 def _state_table() -> Iterator[StateField]:

@@ -34,8 +34,8 @@ class ServoFeedback:
 
     #: The controller's clock [s].
     timestamp: float
-    #: What the controller runs at, 0 to 1, also while its program is paused.
-    speed_scaling: float
+    #: How fast the motion of the program runs, 0 to 1 (:mod:`~.effective_speed`).
+    effective_speed: float
     #: Whether the robot program runs, and is not paused.
     playing: bool
     mode: int
@@ -64,6 +64,7 @@ class ServoReport:
     buffered: float
     #: How far the arm is behind the newest set-point, as nominal time [s].
     lag: float
+    #: The effective speed, 0 to 1.
     speed_scaling: float
     #: Target - actual [rad].
     joint_error: Vector6 = UNKNOWN6

@@ -125,7 +125,7 @@ class Controller:
         self.remote_control = config.remote_control and config.has_remote_control
         #: The speed slider, 0..1.
         self.speed_slider = 1.0
-        #: The speed scaling at which motion runs now, 0..1; it follows slider, pauses and stops.
+        #: The rate at which motion runs now, 0..1; it follows slider, pauses and stops.
         self.scale = 1.0
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(make_builtins(self), self.messages, self)
@@ -148,6 +148,13 @@ class Controller:
     def at_rest(self) -> bool:
         """Whether nothing moves, at the end of a motion or paused on its path."""
         return self.scale == 0.0 or not self.motion.moving
+
+    @property
+    def speed_scaling(self) -> float:
+        """What slows the motion beside the speed slider, 0..1; 0 at rest and in pauses."""
+        if self.at_rest or not self.speed_slider:
+            return 0.0
+        return min(1.0, self.motion.scaling / self.speed_slider)
 
     @property
     def robot_status(self) -> RobotStatus:

@@ -424,7 +424,7 @@ def _snapshot(controller: Controller) -> RobotSnapshot:
         runtime_state=programs.state,
         program=programs.name,
         speed_slider=controller.speed_slider,
-        speed_scaling=motion.scaling,
+        speed_scaling=controller.speed_scaling,
         digital_outputs=controller.io.digital_out.packed(),
         messages=tuple(controller.messages.log),
         popups=tuple(popup.text for popup in controller.popups),

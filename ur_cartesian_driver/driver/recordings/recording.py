@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_format import Event
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
+from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import pose_from_row
 
@@ -74,7 +75,7 @@ class Recording:
     #: (n,) [s] lag behind the set-points sent, and motion that the robot holds; NaN = unknown.
     lag: Floats = field(repr=False)
     buffered: Floats = field(repr=False)
-    #: (n,) 0 to 1: what the controller runs at, and the slider.
+    #: (n,) 0 to 1: what slows the arm beside the slider, and the slider.
     speed_scaling: Floats = field(repr=False)
     slider: Floats = field(repr=False)
     #: (n, 2) [A] or [V]; NaN = unknown.
@@ -112,6 +113,13 @@ class Recording:
     def tool_speed(self) -> Floats:
         """(n,) measured speed of the TCP [m/s]."""
         return np.asarray(np.linalg.norm(self.actual_twist[:, :3], axis=1))
+
+    @property
+    def effective_speed(self) -> Floats:
+        """(n,) how fast the motion of the program ran, 0 to 1."""
+        speed = EffectiveSpeed()
+        rows = (self.time, self.speed_scaling, self.slider, self.runtime_state)
+        return np.array([speed.update(*row) for row in zip(*rows, strict=True)], dtype=np.float64)
 
     @property
     def reference(self) -> ReferencePath:

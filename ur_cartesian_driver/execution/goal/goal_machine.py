@@ -165,6 +165,9 @@ class GoalMachine:
             self.temporary_tcp.observe(packet, now)
         begun, behind = self.feeder.motions_begun(packet)
         self._monitor.update(packet, begun, behind, moving=self.state in RUNNING_STATES)
+        if self.state is GoalState.SETTLING:  # its time is that of the controller
+            self._deadline += self._monitor.held_time
+            self._arrival_due += self._monitor.held_time
 
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
         answer = self.feeder.append(append_job, self.state)

@@ -76,6 +76,9 @@ class GoalMonitor:
         self.latest: RobotState | None = None
         #: Scaled time: time since the start, as the controller's clock ran [s].
         self.scaled_time = 0.0
+        #: By how much the slider or a pause delayed the controller's clock in the newest packet,
+        #: whether the arm moved or not [s].
+        self.held_time = 0.0
 
     # ---- what goes on -------------------------------------------------------------------------
 
@@ -102,17 +105,17 @@ class GoalMonitor:
         """
         before, self.latest = self.latest, state
         self._reported_begun, self._behind = begun, behind
+        passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
+        playing = state.runtime_state is RuntimeState.PLAYING
+        self.held_time = passed * (1.0 - state.target_speed_fraction * playing)
         if not moving:
             return
-        passed = 0.0
-        if before is not None:
-            passed = max(0.0, state.timestamp - before.timestamp)
-            if state.runtime_state is not RuntimeState.PAUSED:
-                self.scaled_time += passed * state.speed_scaling
+        self.scaled_time += passed * state.effective_speed
         self._track(before, state, passed)
         if _stands_still(before, state):
             self._stalled_time += passed
-            self._stalled_scaled += passed * state.speed_scaling
+            # At rest the scaling is 0: only the slider says how fast a wait would pass.
+            self._stalled_scaled += passed * state.target_speed_fraction
         else:
             self._stalled_time = self._stalled_scaled = 0.0
 
@@ -207,7 +210,7 @@ class GoalMonitor:
             actual_q=state.actual_q,
             time=time,
             time_remaining=max(0.0, job.duration - time),
-            speed_scaling=state.speed_scaling,
+            speed_scaling=state.effective_speed,
             points_received=self.records.points,
             buffered=buffered,
             lag=lag,
@@ -340,7 +343,6 @@ def _stands_still(before: RobotState | None, state: RobotState) -> bool:
         before is not None
         and state.target_q == before.target_q
         and state.target_tcp_pose == before.target_tcp_pose
-        and state.speed_scaling > 0.0
         and state.target_speed_fraction > 0.0
         and state.runtime_state is RuntimeState.PLAYING
     )

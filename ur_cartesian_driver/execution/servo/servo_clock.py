@@ -3,10 +3,10 @@
 """
 The clock of streamed set-points, which runs as fast as the robot carries them out.
 
-It uses both feedbacks of the manufacturer's guide: ``speed_scaling`` shows at once how fast the
-robot's time runs; L, the motion time in flight, accumulates what that leaves over::
+It uses both feedbacks of the manufacturer's guide: the effective speed shows at once how fast
+the robot's time runs; L, the motion time in flight, accumulates what that leaves over::
 
-    rate = speed_scaling + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
+    rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
 L is the motion time in the robot's buffer, which the robot reports, plus that of the set-points
 that it had not read when it made the report. So the delay of the wire does not look like a
@@ -50,15 +50,15 @@ class ServoClock:
     rate: float = 0.0
     _pending: float = 0.0
 
-    def advance(self, passed: float, scaling: float, in_flight: float) -> None:
+    def advance(self, passed: float, speed: float, in_flight: float) -> None:
         """
         Let time pass.
 
         :param passed: by the controller's clock [s].
-        :param scaling: speed scaling of the controller, 0 when its program does not run.
+        :param speed: effective speed of the controller, 0 when its program does not run.
         :param in_flight: L, see the module [s].
         """
-        target_rate = scaling + (self.target - in_flight) / CORRECTION_TIME
+        target_rate = speed + (self.target - in_flight) / CORRECTION_TIME
         target_rate = min(max(target_rate, 0.0), MAX_RATE)
         change = MAX_RATE_CHANGE * passed
         self.rate = min(max(target_rate, self.rate - change), self.rate + change)

@@ -254,7 +254,7 @@ class ServoStream:
             buffer_capacity=settings.buffer_depth,
             buffered=state.lag,
             lag=self.lag,
-            speed_scaling=state.speed_scaling,
+            speed_scaling=state.effective_speed,
             joint_error=joint_error,
             underruns=self._underruns,
             overruns=state.overflows,
@@ -368,8 +368,8 @@ class ServoStream:
         """Let the robot's time pass."""
         passed = passed if 0.0 <= passed <= MAX_CLOCK_GAP else 0.0
         if self.phase in STREAMING:
-            scaling = feedback.speed_scaling if feedback.playing else 0.0
-            self._clock.advance(passed, scaling, self.in_flight)
+            speed = feedback.effective_speed if feedback.playing else 0.0
+            self._clock.advance(passed, speed, self.in_flight)
         if self.phase is ServoPhase.SERVOING:
             self._motion_rate = min(1.0, self._motion_rate + RESTART_ACCELERATION * passed)
 

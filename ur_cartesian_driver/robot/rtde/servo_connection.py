@@ -17,6 +17,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, SERVO_OUTPUTS
@@ -24,7 +25,13 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
-SERVO_FIELDS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
+SERVO_FIELDS = (
+    'timestamp',
+    'speed_scaling',
+    'target_speed_fraction',
+    'runtime_state',
+    *SERVO_OUTPUTS,
+)
 #: How long to try to get the inputs, and the pause between two attempts [s].
 OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
@@ -41,6 +48,7 @@ class ServoConnection:
         self._on_feedback = on_feedback
         self._is_open = True
         self._attempt: _Attempt | None = None
+        self._effective_speed = EffectiveSpeed()
 
     async def run(self, host: str, port: int, on_end: Callable[[str], None]) -> None:
         """
@@ -74,7 +82,7 @@ class ServoConnection:
 
     def _on_row(self, _: Sequence[str], values: RtdeValues) -> None:
         if self._is_open:
-            self._on_feedback(feedback_from_rtde(values))
+            self._on_feedback(feedback_from_rtde(values, self._effective_speed))
 
 
 class _Attempt(RtdeConnection):
@@ -111,12 +119,17 @@ class _Attempt(RtdeConnection):
         super().close()
 
 
-def feedback_from_rtde(values: tuple[Any, ...]) -> ServoFeedback:
-    """Return a packet with the values of :data:`SERVO_FIELDS`."""
-    timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
+def feedback_from_rtde(values: Sequence[Any], effective_speed: EffectiveSpeed) -> ServoFeedback:
+    """
+    Return a packet with the values of :data:`SERVO_FIELDS`.
+
+    :param effective_speed: that of the packets before; it takes this one.
+    """
+    (timestamp, scaling, slider, state, *feedback) = values
+    mode, sequence, lag, done, repeats, skipped, size, over = feedback
     return ServoFeedback(
         timestamp=timestamp,
-        speed_scaling=scaling,
+        effective_speed=effective_speed.update(timestamp, scaling, slider, state),
         playing=state == RuntimeState.PLAYING,
         mode=mode,
         last_sequence=sequence,

@@ -28,10 +28,12 @@ from ur_cartesian_driver.motion.robot_state import (
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 
-REQUIRED_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if not row.rtde.optional)
-OPTIONAL_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if row.rtde.optional)
+#: The rows that the robot sends, with their outputs.
+_ROWS = tuple((row, row.rtde) for row in STATE_TABLE if row.rtde is not None)
+REQUIRED_FIELDS = tuple(rtde.name for _, rtde in _ROWS if not rtde.optional)
+OPTIONAL_FIELDS = tuple(rtde.name for _, rtde in _ROWS if rtde.optional)
 #: All names, in the order of the table.
-STATE_FIELDS = tuple(row.rtde.name for row in STATE_TABLE)
+STATE_FIELDS = tuple(rtde.name for _, rtde in _ROWS)
 
 #: What an unknown mode of newer software becomes: the most careful one.
 _UNKNOWN_MODES: Mapping[Any, IntEnum] = {
@@ -58,15 +60,15 @@ def _monitored(*types: DataType) -> tuple[int, ...]:
     """Return the columns of these types that have to be finite."""
     return tuple(
         i
-        for i, row in enumerate(STATE_TABLE)
-        if row.rtde.monitored and OUTPUT_TYPES[row.rtde.name] in types
+        for i, (_, rtde) in enumerate(_ROWS)
+        if rtde.monitored and OUTPUT_TYPES[rtde.name] in types
     )
 
 
 #: What stands for an output that the robot does not have.
 _ABSENT = {
-    row.rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
-    for row in STATE_TABLE
+    rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
+    for row, rtde in _ROWS
 }
 
 
@@ -74,11 +76,11 @@ def _compile() -> Callable[..., RobotState]:
     """Return a function from the values of a packet to the state; as source, for its speed."""
     known: dict[str, Any] = {'RobotState': RobotState}
     arguments = []
-    for row in STATE_TABLE:
+    for row, _ in _ROWS:
         convert = _converter(row.type)
         known[f'convert_{row.name}'] = convert
         arguments.append(row.name if convert is None else f'convert_{row.name}({row.name})')
-    names = ', '.join(row.name for row in STATE_TABLE)
+    names = ', '.join(row.name for row, _ in _ROWS)
     function: Callable[..., RobotState] = eval(
         f'lambda {names}: RobotState({", ".join(arguments)})', known
     )
@@ -101,6 +103,8 @@ def in_recipe_order(names: Sequence[str], values: RtdeValues) -> RtdeValues | tu
 def robot_state_from_rtde(values: Sequence[Any]) -> RobotState:
     """
     Return the state in a packet whose values are in the order of :data:`STATE_FIELDS`.
+
+    What follows from earlier packets too has its default.
 
     :raises RemoteProtocolError: a number is not finite. No comparison with it is ever true, so
         the monitor of a goal would find no fault.

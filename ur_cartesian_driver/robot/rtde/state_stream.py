@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_recipe import (
     in_recipe_order,
@@ -31,5 +33,14 @@ class StateStream(RtdeConnection):
             RtdeClientCodec(
                 outputs=STATE_FIELDS, optional_outputs=OPTIONAL_FIELDS, frequency=frequency
             ),
-            lambda names, values: on_state(robot_state_from_rtde(in_recipe_order(names, values))),
+            self._on_row,
         )
+        self._on_state = on_state
+        self._effective_speed = EffectiveSpeed()
+
+    def _on_row(self, names: Sequence[str], values: RtdeValues) -> None:
+        state = robot_state_from_rtde(in_recipe_order(names, values))
+        state.effective_speed = self._effective_speed.update(
+            state.timestamp, state.speed_scaling, state.target_speed_fraction, state.runtime_state
+        )
+        self._on_state(state)

@@ -94,7 +94,9 @@ def status_message(
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
         if name != 'header':
-            value = getattr(connection if hasattr(connection, name) else state, name, None)
+            # The messages have had this name for the effective speed from the beginning.
+            source = 'effective_speed' if name == 'speed_scaling' else name
+            value = getattr(connection if hasattr(connection, source) else state, source, None)
             if value is None:
                 value = _unknown(name, getattr(message, name))
             setattr(message, name, int(value) if isinstance(value, IntEnum) else value)

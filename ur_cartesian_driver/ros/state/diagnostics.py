@@ -31,7 +31,7 @@ def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> Diagnost
         'safety mode': 'UNKNOWN' if state is None else state.safety_mode.name,
         'program': 'UNKNOWN' if state is None else state.runtime_state.name,
         'robot program connected': str(status.program_running),
-        'speed scaling': '' if state is None else f'{state.speed_scaling:.3f}',
+        'speed scaling': '' if state is None else f'{state.effective_speed:.3f}',
         'robot address': driver.config.robot_ip,
         'robot model': status.robot_model,
         'serial number': status.serial_number,

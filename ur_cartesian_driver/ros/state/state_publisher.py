@@ -141,7 +141,7 @@ class _StateTopics:
         self._joint_states.publish(joint_state_message(state, self._joint_names, stamp))
         self._tcp_pose.publish(tcp_pose_message(state, self._base, stamp))
         self._wrench.publish(wrench_message(state, self._tcp, stamp))
-        self._speed_scaling.publish(Float64(data=state.speed_scaling))
+        self._speed_scaling.publish(Float64(data=state.effective_speed))
         if self._tf is not None:
             self._tf.publish(
                 self._tf_message_type(

@@ -111,7 +111,7 @@ def _mode(controller: Controller) -> RobotModeData:
         program_paused=paused,
         robot_mode=controller.power.mode,
         target_speed_fraction=controller.speed_slider,
-        speed_scaling=controller.motion.scaling,
+        speed_scaling=controller.speed_scaling,
     )
 
 

@@ -131,7 +131,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'tcp_offset': lambda c: (
             ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()
         ),
-        'speed_scaling': lambda c: c.motion.scaling,
+        'speed_scaling': lambda c: c.speed_scaling,
         'target_speed_fraction': lambda c: c.speed_slider,
         'robot_mode': lambda c: c.power.mode,
         'safety_mode': lambda c: c.safety.mode,

@@ -1,0 +1,56 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How fast the motion of the robot program runs, from what the controller reports about it.
+
+The controller reports two factors. ``target_speed_fraction`` is the speed slider;
+``speed_scaling`` is what slows the arm beside it, 1 in an undisturbed motion at any slider and 0
+at rest. The manufacturer's ROS 2 driver and ``ur_rtde`` use their product too, with 0 while the
+program is RESUMING, and let it rise slowly after a pause: the arm speeds up from rest, and the
+controller reports a scaling of 1 before it has done so.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.robot_state import RuntimeState
+
+#: How fast the effective speed rises after a pause, as in the manufacturer's ROS 2 driver [1/s].
+RISE_AFTER_PAUSE = 5.0
+#: In these the program moves the arm, or still brakes it.
+_MOVING = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.STOPPING})
+#: After these the arm speeds up again.
+_HELD = frozenset({RuntimeState.PAUSED, RuntimeState.RESUMING})
+
+
+class EffectiveSpeed:
+    """The effective speed, packet by packet: 1 = as programmed, 0 = held or at rest."""
+
+    def __init__(self) -> None:
+        """Begin with an arm that has not been paused."""
+        self._time = 0.0
+        self._speed = 0.0
+        self._rises = False
+
+    def update(
+        self,
+        timestamp: float,
+        speed_scaling: float,
+        target_speed_fraction: float,
+        runtime_state: int,
+    ) -> float:
+        """
+        Return the effective speed in a packet, 0 to 1.
+
+        :param timestamp: the controller's clock [s].
+        :param speed_scaling: what slows the arm beside the slider, 0 to 1.
+        :param target_speed_fraction: the speed slider, 0 to 1.
+        :param runtime_state: a :class:`RuntimeState`, or its number.
+        """
+        speed = speed_scaling * target_speed_fraction if runtime_state in _MOVING else 0.0
+        if self._rises:
+            risen = self._speed + RISE_AFTER_PAUSE * max(0.0, timestamp - self._time)
+            self._rises = risen < speed
+            speed = min(speed, risen)
+        self._rises = self._rises or runtime_state in _HELD
+        self._time, self._speed = timestamp, speed
+        return speed
