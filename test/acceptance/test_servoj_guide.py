@@ -230,7 +230,7 @@ def test_arm_follows_the_stream_with_the_lookahead_as_its_lag(servo):
 
 def test_no_waypoint_waits_at_full_speed(servo):
     servo.stream(swing(servo.q), 1.0)
-    lags = [packet[7] for packet in servo.packets[-400:]]
+    lags = [packet[8] for packet in servo.packets[-400:]]
     assert min(lags) >= 0.0
     assert max(lags) <= 2 * CYCLE + 1e-9
 
@@ -261,7 +261,7 @@ def test_client_that_heeds_the_lag_time_keeps_the_buffer_short(servo):
     # The guide: slow the trajectory down by what the controller reports.
     servo.stream(swing(servo.q), 1.0, lambda client: 0.2 if client.lag > 0.05 else 1.0)
     assert (servo.scaling, servo.slider) == pytest.approx((1.0, 0.4))
-    assert max(packet[7] for packet in servo.packets) < 0.07
+    assert max(packet[8] for packet in servo.packets) < 0.07
     assert not servo.stopped
 
 
@@ -348,7 +348,7 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
                     inputs = event.inputs[0]
                     primary.sendall(PROGRAM.read_bytes())
                 elif isinstance(event, DataReceived):
-                    _, q, _, _, state, mode, *_ = event.values
+                    _, q, _, _, _, state, mode, *_ = event.values
                     path = path or swing(q)
                     if mode == SERVO:
                         assert state == RuntimeState.PLAYING
