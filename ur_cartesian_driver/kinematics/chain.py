@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.pose import IDENTITY, N, Pose
+from ur_cartesian_driver.motion.vectors import Vector3
 
 #: A float for one pose, or an array with one value per pose of a batch.
 
@@ -56,6 +57,15 @@ class ChainFramesOf(Generic[N]):
     x: tuple[N, N, N]
     y: tuple[N, N, N]
     z: tuple[N, N, N]
+
+    def point(self, in_flange: Vector3) -> tuple[N, N, N]:
+        """Return the position of a point of the flange frame [m]."""
+        a, b, c = in_flange
+        x, y, z = (
+            p + a * x + b * y + c * z
+            for p, x, y, z in zip(self.position, self.x, self.y, self.z, strict=True)
+        )
+        return x, y, z
 
 
 ChainFrames: TypeAlias = ChainFramesOf[float]

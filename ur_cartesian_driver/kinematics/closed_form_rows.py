@@ -113,22 +113,13 @@ def branch_rows(
     """
     shoulder, elbow, wrist = signs
     pan = _pan(ideal, targets, shoulder)
-    flip = _flip(ideal, targets, pan, wrist)
-    lift = _lift(ideal, flip, elbow)
-    theta = np.stack(
-        [
-            pan.theta1,
-            lift.theta2,
-            lift.theta3,
-            flip.theta234 - lift.theta2 - lift.theta3,
-            flip.theta5,
-            flip.theta6,
-        ]
-    )
-    elbow_separation = 2.0 * np.abs(lift.theta3)
+    theta5, theta6, theta234, outward, up = _flip(ideal, targets, pan, wrist)
+    theta2, theta3, exists = _lift(ideal, outward, up, elbow)
+    theta = np.stack([pan.theta1, theta2, theta3, theta234 - theta2 - theta3, theta5, theta6])
+    elbow_separation = 2.0 * np.abs(theta3)
     return BranchSolution(
         theta - np.array(ideal.offsets)[:, None],
-        pan.exists & lift.exists,
+        pan.exists & exists,
         # With the same shoulder, the other wrist has theta6 + pi, so it is never the nearest.
         np.minimum(np.minimum(elbow_separation, tau - elbow_separation), pan.separation),
     )
@@ -143,22 +134,6 @@ class _Pan:
     up: Floats
     exists: Flags
     separation: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class _Flip:
-    theta5: Floats
-    theta6: Floats
-    theta234: Floats
-    outward: Floats
-    up: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class _Lift:
-    theta2: Floats
-    theta3: Floats
-    exists: Flags
 
 
 def _pan(ideal: IdealArm, targets: TargetPoses, sign: int) -> _Pan:
@@ -180,7 +155,10 @@ def _pan(ideal: IdealArm, targets: TargetPoses, sign: int) -> _Pan:
     )
 
 
-def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int) -> _Flip:
+def _flip(
+    ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return theta5, theta6, theta234, and outward and up of wrist 1."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = targets.rotation
     s1, c1 = pan.sin, pan.cos
     along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
@@ -193,7 +171,7 @@ def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int) -> _Flip:
     s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
     c234 = s6 * r31 + c6 * r32
     theta6 = np.where(straight, theta6_straight, np.arctan2(s6, c6))
-    return _Flip(
+    return (
         np.arctan2(sign * s5, c5),
         theta6,
         np.arctan2(s234, c234),
@@ -202,19 +180,18 @@ def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int) -> _Flip:
     )
 
 
-def _lift(ideal: IdealArm, flip: _Flip, sign: int) -> _Lift:
+def _lift(ideal: IdealArm, outward: Floats, up: Floats, sign: int) -> tuple[Floats, Floats, Flags]:
+    """Return theta2, theta3, and whether wrist 1 is in reach."""
     a2, a3 = ideal.a2, ideal.a3
-    square = flip.outward * flip.outward + flip.up * flip.up
+    square = outward * outward + up * up
     folded, not_too_near = _root(square - (a2 - a3) ** 2)
     stretched, not_too_far = _root((a2 + a3) ** 2 - square)
     f2, s2 = folded * folded, stretched * stretched
     c3 = (f2 - s2) / (f2 + s2)
     s3 = 2.0 * sign * folded * stretched / (f2 + s2)
     along, across = a2 + a3 * c3, a3 * s3
-    return _Lift(
-        np.arctan2(
-            flip.up * along - flip.outward * across, flip.outward * along + flip.up * across
-        ),
+    return (
+        np.arctan2(up * along - outward * across, outward * along + up * across),
         2.0 * np.arctan2(sign * stretched, folded),
         not_too_near & not_too_far,
     )

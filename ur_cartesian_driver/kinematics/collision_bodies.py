@@ -191,8 +191,6 @@ class _LinkCylinder:
     start: tuple[int, float]
     end: tuple[int, float]
     radius: float
-    #: Whether its ends lie inside housings, so that the capsule's caps add nothing.
-    tube: bool = False
 
 
 class CollisionBodies:
@@ -270,12 +268,8 @@ class CollisionBodies:
         index, along = self._ends_on_axes
         ends = origins[index] + along[:, :, None, None] * axes[index]  # (2, k, 3, n)
         if self._has_tool:
-            flange = np.array(frames.position)
-            tcp = flange + sum(
-                length * np.array(axis)
-                for length, axis in zip(self._tcp, (frames.x, frames.y, frames.z), strict=True)
-            )
-            ends = np.concatenate([ends, np.stack([flange, tcp])[:, None]], axis=1)
+            tool = np.array([frames.position, frames.point(self._tcp)])
+            ends = np.concatenate([ends, tool[:, None]], axis=1)
         ordered: Floats = ends.transpose(0, 2, 1, 3)
         return ordered
 
@@ -324,39 +318,34 @@ def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
     # The upper arm begins where the forearm ends.
     elbow = min(s - z.upper_elbow_in, e + z.elbow_in)
     return [
-        _LinkCylinder(
-            Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP), z.base_radius
+        _housing(Link.BASE, 0, _BASE_BOTTOM, d1 - z.shoulder_below + _OVERLAP, z.base_radius),
+        _housing(
+            Link.SHOULDER, 0, d1 - z.shoulder_below, d1 + z.shoulder_above, z.shoulder_radius
         ),
-        _LinkCylinder(
-            Link.SHOULDER,
-            (0, d1 - z.shoulder_below),
-            (0, d1 + z.shoulder_above),
-            z.shoulder_radius,
-        ),
-        _LinkCylinder(
-            Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius
-        ),
-        _LinkCylinder(
+        _housing(Link.SHOULDER, 1, 0.0, s - z.upper_shoulder_in + _OVERLAP, z.shoulder_radius),
+        _housing(
             Link.UPPER_ARM,
-            (1, s - z.upper_shoulder_in),
-            (1, s + z.upper_shoulder_out),
+            1,
+            s - z.upper_shoulder_in,
+            s + z.upper_shoulder_out,
             z.shoulder_radius,
         ),
-        _LinkCylinder(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
-        _LinkCylinder(
-            Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out), z.upper_elbow_radius
-        ),
-        _LinkCylinder(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
-        _LinkCylinder(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
-        _LinkCylinder(
-            Link.FOREARM, (3, e - z.fore_wrist_out), (3, d4 - z.fore_wrist_in), z.wrist_radius
-        ),
-        _LinkCylinder(Link.WRIST_1, (3, d4 - z.wrist_in), (3, d4 + z.wrist_out), z.wrist_radius),
-        _LinkCylinder(Link.WRIST_1, (4, -z.wrist_back), (4, z.wrist_front), z.wrist_radius),
-        _LinkCylinder(Link.WRIST_2, (4, d5 - z.wrist_in), (4, d5 + z.wrist_out), z.wrist_radius),
-        _LinkCylinder(Link.WRIST_2, (5, -z.wrist_back), (5, z.wrist_front), z.wrist_radius),
-        _LinkCylinder(Link.WRIST_3, (5, z.wrist_front - _OVERLAP), (5, d6), z.tool_flange_radius),
+        _LinkCylinder(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube),
+        _housing(Link.UPPER_ARM, 2, elbow, s + z.upper_elbow_out, z.upper_elbow_radius),
+        _housing(Link.FOREARM, 2, e - z.elbow_out, e + z.elbow_in, z.elbow_radius),
+        _LinkCylinder(Link.FOREARM, (2, e), (3, e), z.fore_tube),
+        _housing(Link.FOREARM, 3, e - z.fore_wrist_out, d4 - z.fore_wrist_in, z.wrist_radius),
+        _housing(Link.WRIST_1, 3, d4 - z.wrist_in, d4 + z.wrist_out, z.wrist_radius),
+        _housing(Link.WRIST_1, 4, -z.wrist_back, z.wrist_front, z.wrist_radius),
+        _housing(Link.WRIST_2, 4, d5 - z.wrist_in, d5 + z.wrist_out, z.wrist_radius),
+        _housing(Link.WRIST_2, 5, -z.wrist_back, z.wrist_front, z.wrist_radius),
+        _housing(Link.WRIST_3, 5, z.wrist_front - _OVERLAP, d6, z.tool_flange_radius),
     ]
+
+
+def _housing(link: Link, axis: int, begin: float, end: float, radius: float) -> _LinkCylinder:
+    """Return a cylinder about one axis, between two distances along it [m]."""
+    return _LinkCylinder(link, (axis, begin), (axis, end), radius)
 
 
 def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.intp], Floats]:
@@ -378,7 +367,8 @@ def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.int
 def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
     """Return the fraction of the axis cut off at each end, and the radius of the capsule."""
     (axis, begin), (other, end) = body.start, body.end
-    if body.tube or axis != other:
+    if axis != other:
+        # The ends of a tube lie inside housings: the caps of its capsule add nothing.
         return 0.0, body.radius
     length = end - begin
     if length <= 2.0 * _END_FACTOR * body.radius:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import combinations
 import os
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -34,15 +35,8 @@ MODELS_WITH_MESHES = ('ur3', 'ur5', 'ur10')
 
 _DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
 #: Frame names in the robot description, in the order of the links.
-_FRAMES = (
-    'base_link',
-    'shoulder_link',
-    'upper_arm_link',
-    'forearm_link',
-    'wrist_1_link',
-    'wrist_2_link',
-    'wrist_3_link',
-)
+_LINKS: tuple[Link, ...] = tuple(link for link in Link if link is not Link.TOOL)
+_FRAMES = tuple(f'{link.name.lower()}_link' for link in _LINKS)
 
 
 class CollisionMeshes:
@@ -72,11 +66,9 @@ class CollisionMeshes:
                     Link(link).name, link, T_base_joint.inverse() * T_base_link, shape
                 )
             )
-        self._pairs: dict[tuple[Link, Link], int] = {}
-        for a in range(len(_FRAMES)):
-            for b in range(a + 1, len(_FRAMES)):
-                self._pairs[Link(a), Link(b)] = len(self._pairs)
-                self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
+        self._pairs = {pair: k for k, pair in enumerate(combinations(_LINKS, 2))}
+        for a, b in self._pairs:
+            self._geometry.addCollisionPair(pinocchio.CollisionPair(int(a), int(b)))
         self._placement = pinocchio.GeometryData(self._geometry)
 
     @classmethod

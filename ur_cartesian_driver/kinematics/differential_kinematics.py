@@ -60,15 +60,8 @@ def tool_rates(
 
 def _jacobians(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Jacobians:
     frames = arm.frames_rows(q)
-    x, y, z = T_flange_tcp.position
-    tcp = (
-        np.array(frames.position)
-        + x * np.array(frames.x)
-        + y * np.array(frames.y)
-        + z * np.array(frames.z)
-    )
-    jacobian = jacobian_at(frames, (tcp[0], tcp[1], tcp[2]))
-    return _Jacobians(frames, jacobian, tcp)
+    tcp = frames.point(T_flange_tcp.position)
+    return _Jacobians(frames, jacobian_at(frames, tcp), np.array(tcp))
 
 
 def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
