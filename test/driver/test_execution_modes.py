@@ -21,11 +21,7 @@ def test_every_mode_but_auto_is_registered() -> None:
 @pytest.mark.parametrize('mode', EXECUTION_MODES, ids=lambda mode: mode.name)
 def test_every_mode_has_a_planner_and_a_feeder(mode: ExecutionMode) -> None:
     planner, feeder = resolve_name(mode.traits.planner), resolve_name(mode.traits.feeder)
-    assert list(inspect.signature(planner).parameters) == [
-        'planner',
-        'retargeted',
-        'T_flange_active',
-    ]
+    assert list(inspect.signature(planner).parameters) == ['planner']
     assert list(inspect.signature(feeder).parameters) == ['request', 'config']
 
 

@@ -36,8 +36,8 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.spline.joint_polynomials import ANGLE_TOLERANCE_RADIUS
 from ur_cartesian_driver.planning.spline.spline_planner import (
-    ANGLE_TOLERANCE_RADIUS,
     end_state,
     plan_spline,
     plan_stop,

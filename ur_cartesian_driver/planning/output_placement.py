@@ -21,11 +21,9 @@ from ur_cartesian_driver.motion.goal import IOCommand
 from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import subtract, Vector6
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
-from ur_cartesian_driver.planning.request.io_commands import (
-    describe_command,
-)
+from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 
 # Times that differ by less are the same [s].
@@ -225,14 +223,8 @@ class _TimedPath:
             a, b = self._pose(time - half), self._pose(time + half)
             distance, angle = a.distance_to(b), a.angle_to(b)
             if distance > max(_MIN_MOTION, _TURNING * angle):
-                x, y, z = rotate(
-                    conjugate(pose.quaternion),
-                    (
-                        b.position[0] - a.position[0],
-                        b.position[1] - a.position[1],
-                        b.position[2] - a.position[2],
-                    ),
-                )
+                displacement = subtract(b.position, a.position)
+                x, y, z = rotate(conjugate(pose.quaternion), displacement)
                 return (x / distance, y / distance, z / distance, 0.0, 0.0, 0.0)
             if angle > _MIN_MOTION:
                 *_, x, y, z = (a.inverse() @ b).rotation_vector()

@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     Joints,
@@ -54,10 +54,11 @@ from ur_cartesian_driver.planning.moves.segment_draft import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_timing import schedule
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
-from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     describe_miss,
     full_posture,
+    max_joint_change,
     named_joints,
     TcpKinematics,
 )
@@ -97,9 +98,8 @@ _UNTIMED_MOVES: dict[SegmentType, type[MoveP] | type[OptimoveJ] | type[OptimoveL
 }
 
 
-#: A planner in the registry of execution modes. It gets a checked goal for the TCP with which it
-#: runs, how the goal was retargeted, and the TCP that the robot has now.
-PlanGoal: TypeAlias = Callable[['GoalPlanner', RetargetedGoal, Pose], Plan]
+#: A planner in the registry of execution modes.
+PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
 
 
 def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -117,21 +117,26 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     check(goal, options)
     retargeted = retarget_to_tcp(apply_default_tolerances(goal, options), state, options)
-    planner = GoalPlanner(retargeted.goal, retargeted.state, arm, options)
+    planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
-    return plan_goal(planner, retargeted, state.T_flange_tcp)
+    return plan_goal(planner)
 
 
-def plan_moves(planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
-    """
-    Return the plan of a goal whose points are joined by motion commands of the robot.
-
-    :param T_flange_active: the TCP that the robot has now.
-    """
-    goal, state, options = planner.goal, planner.state, planner.options
+def plan_moves(planner: GoalPlanner) -> Plan:
+    """Return the plan of a goal whose points are joined by motion commands of the robot."""
+    goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
     geometries = planner.geometries()
-    clearance_lines = _clearance_lines(planner, tool_tips(goal, T_flange_active))
-    timings = schedule(geometries, options, planner.kinematics.arm.model)
+    samples = planner.samples
+    lines = clearance_lines(
+        arm,
+        tool_tips(goal, planner.T_flange_active),
+        options,
+        samples.q,
+        state.actual_q,
+        samples.segment,
+        samples.fraction,
+    )
+    timings = schedule(geometries, options, arm.model)
     reference = reference_path(state.actual_tcp_pose, geometries, timings)
     segments = place_outputs(
         [
@@ -143,76 +148,49 @@ def plan_moves(planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active
         blend_times=[timing.blend_time for timing in timings],
     )
     remarks = [
-        *retargeted.remarks,
-        *planner.remarks,
         *ignored_remarks(goal),
         *(timing.remark for timing in timings if timing.remark),
-        *clearance_lines,
+        *lines,
         tightest_remark(geometries),
     ]
-    return Plan(
-        goal=goal,
-        segments=segments,
-        start=state.actual_q,
-        remarks=tuple(remarks),
-        reference=reference,
-        T_flange_active=T_flange_active,
-        T_flange_tcp=retargeted.T_flange_tcp,
-        T_tcp_controlled=retargeted.T_tcp_controlled,
-        execution=planner.mode,
-    )
+    return planner.plan(goal, segments, reference, remarks)
 
 
-def _clearance_lines(planner: GoalPlanner, tips: Iterable[Pose]) -> list[str]:
-    """
-    Return the report lines about the clearance with each of some tool tips.
-
-    :raises CollisionPredicted: the arm comes too close to itself or to the workspace.
-    """
-    samples = planner.samples
-    lines = []
-    for T_flange_tip in tips:
-        clearance = Clearance(planner.kinematics.arm, T_flange_tip, planner.options)
-        result = clearance.check(samples.q, planner.state.actual_q)
-        lines += clearance_remarks(result, samples.segment, samples.fraction)
-    return list(dict.fromkeys(lines))  # two tips often have the same line
-
-
-def plan_spline_goal(
-    planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose
-) -> Plan:
+def plan_spline_goal(planner: GoalPlanner) -> Plan:
     """Return the plan of a SPLINE or SERVO goal."""
-    goal, state, options = planner.goal, planner.state, planner.options
+    goal, state = planner.goal, planner.state
     first = planner.first_target()
     found = plan_spline(
         SplineState(q=state.actual_q),
         replace(goal, waypoints=goal.waypoints[first:], segments=goal.segments[first:]),
-        planner.kinematics.arm,
+        planner.arm,
         state.T_flange_tcp,
-        options,
+        planner.options,
         first=first,
-        tool_tips=tool_tips(goal, T_flange_active),
+        tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    return Plan(
-        goal=stretch_times(goal, found.stretch),
-        start=state.actual_q,
-        segments=place_outputs(found.segments, found.reference, goal.io_commands),
-        reference=found.reference,
-        remarks=(*retargeted.remarks, *planner.remarks, *found.remarks),
-        T_flange_active=T_flange_active,
-        T_flange_tcp=retargeted.T_flange_tcp,
-        T_tcp_controlled=retargeted.T_tcp_controlled,
-        execution=planner.mode,
+    segments = place_outputs(found.segments, found.reference, goal.io_commands)
+    return planner.plan(
+        stretch_times(goal, found.stretch), segments, found.reference, found.remarks
     )
 
 
 class GoalPlanner:
-    """Makes the segments of one goal, and collects the remarks of its report."""
+    """
+    Makes the segments of one goal, and collects the remarks of its report.
 
-    def __init__(self, goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> None:
-        self.goal, self.state, self.options = goal, state, options
+    :param retargeted: the checked goal for the TCP with which it runs.
+    :param T_flange_active: the TCP that the robot has now.
+    """
+
+    def __init__(
+        self, retargeted: RetargetedGoal, T_flange_active: Pose, arm: Arm, options: PlanningOptions
+    ) -> None:
+        goal, state = retargeted.goal, retargeted.state
+        self.goal, self.state, self.arm, self.options = goal, state, arm, options
+        self.T_flange_active, self._retargeted = T_flange_active, retargeted
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
-        self.remarks: list[str] = []
+        self.remarks = list(retargeted.remarks)
         #: By point: why its primitive is not the plain one of its segment type.
         self.reasons: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
@@ -258,6 +236,26 @@ class GoalPlanner:
         self.samples = self.joint_path_planner.path_margins.samples()
         return geometries
 
+    def plan(
+        self,
+        goal: Goal,
+        segments: tuple[PlannedSegment, ...],
+        reference: ReferencePath,
+        remarks: Iterable[str],
+    ) -> Plan:
+        """Return the plan; its remarks follow those collected."""
+        return Plan(
+            goal=goal,
+            segments=segments,
+            reference=reference,
+            start=self.state.actual_q,
+            remarks=(*self.remarks, *remarks),
+            T_flange_active=self.T_flange_active,
+            T_flange_tcp=self._retargeted.T_flange_tcp,
+            T_tcp_controlled=self._retargeted.T_tcp_controlled,
+            execution=self.mode,
+        )
+
     def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
         """Return the primitive of a segment and what is expected of it."""
         primitive, reason = adapt_to_dialect(
@@ -282,13 +280,13 @@ class GoalPlanner:
     def _check_robot(self) -> None:
         """Refuse a robot whose TCP is not where the kinematics puts it."""
         state = self.state
-        predicted = self.kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
+        predicted = self.arm.forward(state.actual_q) @ state.T_flange_tcp
         distance = predicted.distance_to(state.actual_tcp_pose)
         angle = predicted.angle_to(state.actual_tcp_pose)
         if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
             raise RobotNotReady(
                 f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
-                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; check '
+                f'where the kinematics of a {self.arm.model.name} puts it; check '
                 'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
                 'field tcp_offset), the TCP has to be the flange.'
             )
@@ -370,10 +368,7 @@ class GoalPlanner:
         if wanted is not None:
             location = point_field(geometry.index, 'pose')
             found = self.kinematics.nearest(self.targets[geometry.index], wanted, location)
-            if (
-                max(abs(a - b) for a, b in zip(found, geometry.joints, strict=True))
-                <= SAME_SOLUTION
-            ):
+            if max_joint_change(found, geometry.joints) <= SAME_SOLUTION:
                 return wanted
         return geometry.joints
 

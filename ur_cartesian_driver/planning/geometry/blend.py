@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose import N, Pose, pose_from_row
 from ur_cartesian_driver.planning.geometry.curves import (
     ARC_CHORD_ERROR,
     Curve,
@@ -102,9 +102,8 @@ class Blend:
 
     def locate(self, s: float) -> tuple[int, float]:
         """Return the curve whose segment ``s`` counts to, 0 or 1, and the ``u`` there."""
-        if s <= 0.5:
-            return 0, self.leave + (1.0 - self.leave) * s * (2.0 - s)
-        return 1, self.join * s * s
+        after = s > 0.5
+        return int(after), crossfade(self.leave, self.join, s)[after]
 
     @property
     def in_joint_space(self) -> bool:
@@ -115,7 +114,7 @@ class Blend:
         """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a blend in joint space."""
         assert isinstance(self.first, JointLineCurve)
         assert isinstance(self.second, JointLineCurve)
-        a, b = crossfade(self.leave, self.join, s)
+        a, b = crossfade(np.array(self.leave), np.array(self.join), s)
         rows: Floats = (
             self.first.joint_rows(a) + self.second.joint_rows(b) - np.array(self.second.q_start)
         )
@@ -128,7 +127,7 @@ class Blend:
         return _crossfade_rows([self], np.zeros(len(s), dtype=np.intp), s)
 
 
-def crossfade(leave: float | Floats, join: float | Floats, s: Floats) -> tuple[Floats, Floats]:
+def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
     """Return the ``u`` of the first curve and that of the second at ``s`` of blends."""
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
@@ -148,20 +147,15 @@ def blends(inputs: Sequence[BlendInput]) -> list[Blend]:
         np.array([m.radius for m in inputs]),
         np.array([m.fillet for m in inputs]),
     )
-    lengths, samples, blend_tolerances = (
-        shapes.lengths(),
-        shapes.samples(),
-        shapes.blend_tolerances(),
-    )
     blends_made = [
         Blend(m.first, m.second, m.radius, m.fillet, leave, join, length, angle, n, (near, turn))
         for m, (leave, join), length, angle, n, (near, turn) in zip(
             inputs,
             ends,
-            lengths.tolist(),
+            shapes.lengths().tolist(),
             shapes.turns.tolist(),
-            samples.tolist(),
-            blend_tolerances.tolist(),
+            shapes.samples().tolist(),
+            shapes.blend_tolerances().tolist(),
             strict=True,
         )
     ]
@@ -297,6 +291,21 @@ def _crossfade_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Flo
         rows[filleted, :3] = _on_fillets(
             start[:, :3], middle[filleted, :3], end[:, :3], radius, s[filleted]
         )
+    return rows
+
+
+def curve_rows(curves: Sequence[Curve], which: NDArray[np.intp], u: Floats) -> Floats:
+    """Return poses (n, 7) of many curves and blends; ``which`` as in :func:`path_rows`."""
+    is_blend = np.array([isinstance(curve, Blend) for curve in curves], dtype=np.bool_)
+    number = np.where(is_blend, np.cumsum(is_blend), np.cumsum(~is_blend)) - 1
+    on_blend = is_blend[which]
+    blends_only = [curve for curve in curves if isinstance(curve, Blend)]
+    paths = [curve for curve in curves if not isinstance(curve, Blend)]
+    rows = np.empty((len(u), 7))
+    if paths:
+        rows[~on_blend] = path_rows(paths, number[which[~on_blend]], u[~on_blend])
+    if blends_only:
+        rows[on_blend] = blend_rows(blends_only, number[which[on_blend]], u[on_blend])
     return rows
 
 

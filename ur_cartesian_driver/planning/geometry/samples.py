@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, crossfade, path_rows
+from ur_cartesian_driver.planning.geometry.blend import Blend, crossfade, curve_rows
 from ur_cartesian_driver.planning.geometry.curves import Curve, JointLineCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 
@@ -134,17 +134,7 @@ class PoseSamples:
 def sample_poses(pieces: Sequence[CurvePiece]) -> PoseSamples:
     """Return the samples on Cartesian pieces; the start of a piece belongs to the one before."""
     piece, t = sample_parameters(pieces)
-    poses = np.empty((len(t), 7))
-    is_blend = np.array([isinstance(p.curve, Blend) for p in pieces], dtype=np.bool_)
-    on_blend = is_blend[piece]
-    number = np.where(is_blend, np.cumsum(is_blend), np.cumsum(~is_blend)) - 1
-    blends = [p.curve for p in pieces if isinstance(p.curve, Blend)]
-    paths = [p.curve for p in pieces if not isinstance(p.curve, Blend)]
-    if paths:
-        poses[~on_blend] = path_rows(paths, number[piece[~on_blend]], t[~on_blend])
-    if blends:
-        poses[on_blend] = blend_rows(blends, number[piece[on_blend]], t[on_blend])
-    return PoseSamples(piece, t, poses)
+    return PoseSamples(piece, t, curve_rows([p.curve for p in pieces], piece, t))
 
 
 def sample_parameters(pieces: Sequence[CurvePiece]) -> tuple[NDArray[np.intp], Floats]:

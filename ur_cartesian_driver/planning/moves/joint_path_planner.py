@@ -53,6 +53,7 @@ from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     solve_joint_path,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
+    max_joint_change,
     named_joints,
     TcpKinematics,
 )
@@ -136,14 +137,9 @@ class JointPathPlanner:
     # -- runs ------------------------------------------------------------------------------------
 
     def _end_of_run(self, k: int, limit: int) -> int:
-        stop = k + 1
-        while (
-            stop < len(self._drafts)
-            and stop - k < limit
-            and self._drafts[stop].kind not in JOINT_SPACE_TYPES
-        ):
-            stop += 1
-        return stop
+        stop = min(k + limit, len(self._drafts))
+        joint_moves = (n for n in range(k, stop) if self._drafts[n].kind in JOINT_SPACE_TYPES)
+        return next(joint_moves, stop)
 
     def _run(self, k: int, stop: int) -> int:
         """
@@ -315,9 +311,7 @@ class JointPathPlanner:
         if k == 0:
             return self._q_start
         before = self._drafts[k - 1]
-        if before.checked_until == 1.0:
-            return before.known_joints
-        if isinstance(before.known_curve, JointLineCurve):
+        if before.checked_until == 1.0 or isinstance(before.known_curve, JointLineCurve):
             return before.known_joints
         # A blended waypoint may be out of reach, but not one at which a joint line begins: the
         # robot needs the joints in which the rest of the segment would arrive.
@@ -350,7 +344,7 @@ class JointPathPlanner:
         line = self._drafts[k].known_curve
         assert isinstance(line, JointLineCurve)
         joins = line.joints(self._drafts[k].u_join)
-        if max(abs(x - y) for x, y in zip(self._q, joins, strict=True)) > _MAX_LINE_OFFSET:
+        if max_joint_change(self._q, joins) > _MAX_LINE_OFFSET:
             raise self.kinematics.discontinuity_error(
                 line.pose(self._drafts[k].u_join),
                 self._q,
@@ -388,10 +382,8 @@ class JointPathPlanner:
     # -- segments --------------------------------------------------------------------------------
 
     def _geometries(self, times: Sequence[float | None]) -> Iterator[SegmentGeometry]:
-        speed_bounds, margins = (
-            self.path_margins.joint_speed_bounds(),
-            self.path_margins.tightest_margin(),
-        )
+        speed_bounds = self.path_margins.joint_speed_bounds()
+        margins = self.path_margins.tightest_margin()
         for draft, time in zip(self._drafts, times, strict=True):
             i = draft.index
             geometry = SegmentGeometry(

@@ -130,10 +130,10 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
     return _SpeedSamples(
         np.concatenate([index, index[on_blend] + 1]),
         np.concatenate([rate / leaving, rate[on_blend] / joining[on_blend]]),
-        np.concatenate([joint, joint[on_blend]]),
-        np.concatenate([joint_path.fractions, joint_path.fractions[on_blend]]),
-        np.concatenate([joint_time, joint_time[on_blend]]),
-        np.concatenate([local_time, local_time[on_blend]]),
+        *(
+            np.concatenate([column, column[on_blend]])
+            for column in (joint, joint_path.fractions, joint_time, local_time)
+        ),
     )
 
 

@@ -61,13 +61,10 @@ def _extent(geometry: SegmentGeometry) -> str:
 
 def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
     about = 'about ' if is_optimized(geometry.kind) else ''
+    amount, unit = geometry.curve.angle, 'rad/s mean'
     if geometry.curve.length > 1e-6:
-        speed = f'{geometry.curve.length / max(timing.duration, 1e-9):.3f} m/s mean'
+        amount, unit = geometry.curve.length, 'm/s mean'
     elif isinstance(geometry.curve, JointLineCurve):  # another posture of the same pose
-        speed = (
-            f'{geometry.curve.joint_travel / max(timing.duration, 1e-9):.3f} rad/s mean of the '
-            'leading joint'
-        )
-    else:
-        speed = f'{geometry.curve.angle / max(timing.duration, 1e-9):.3f} rad/s mean'
+        amount, unit = geometry.curve.joint_travel, 'rad/s mean of the leading joint'
+    speed = f'{amount / max(timing.duration, 1e-9):.3f} {unit}'
     return f'{about}{timing.duration:.3f} s ({speed})'

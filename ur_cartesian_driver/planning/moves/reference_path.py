@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, path_rows
+from ur_cartesian_driver.planning.geometry.blend import Blend, curve_rows
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
@@ -46,7 +46,9 @@ def reference_path(
             for section in sections
         ]
     )[of]
-    poses = np.concatenate([[start.row()], _poses(sections, is_blend, of, at)])
+    poses = np.concatenate(
+        [[start.row()], curve_rows([section.curve for section in sections], of, at)]
+    )
     keep_hemisphere(poses)
     return ReferencePath(
         poses=poses,
@@ -114,21 +116,6 @@ def _times(sections: Sequence[_PathSection], of: NDArray[np.intp], at: Floats) -
     ].T
     times: Floats = now + second * times_at([x.profile for x in sections], of, rate * (at - begin))
     return times
-
-
-def _poses(
-    sections: Sequence[_PathSection], is_blend: NDArray[np.bool_], of: NDArray[np.intp], at: Floats
-) -> Floats:
-    """Return the poses (n, 7) of all rows."""
-    number = np.where(is_blend, np.cumsum(is_blend), np.cumsum(~is_blend)) - 1
-    on_blend = is_blend[of]
-    paths = [section.curve for section in sections if not isinstance(section.curve, Blend)]
-    blends = [section.curve for section in sections if isinstance(section.curve, Blend)]
-    poses = np.empty((len(at), 7))
-    poses[~on_blend] = path_rows(paths, number[of[~on_blend]], at[~on_blend])
-    if blends:
-        poses[on_blend] = blend_rows(blends, number[of[on_blend]], at[on_blend])
-    return poses
 
 
 def _row_parameters(geometry: SegmentGeometry, timing: SegmentTiming) -> list[float]:

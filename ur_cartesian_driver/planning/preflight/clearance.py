@@ -11,7 +11,7 @@ until it is clear; from then on it is treated like all others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TypeAlias
@@ -147,6 +147,30 @@ def clearance_remarks(
     return lines
 
 
+def clearance_lines(
+    arm: Arm,
+    tool_tips: Iterable[Pose],
+    options: PlanningOptions,
+    q: Floats,
+    q_start: Joints,
+    segment: NDArray[np.int32],
+    fraction: Floats,
+) -> list[str]:
+    """
+    Return the report lines about the clearance with each of some tool tips.
+
+    Parameters and errors are those of :meth:`Clearance.check` and :func:`clearance_remarks`.
+    """
+    lines = (
+        line
+        for T_flange_tip in tool_tips
+        for line in clearance_remarks(
+            Clearance(arm, T_flange_tip, options).check(q, q_start), segment, fraction
+        )
+    )
+    return list(dict.fromkeys(lines))  # two tips often have the same line
+
+
 class _InitialViolations:
     """The pairs that were too close at the start and are not clear yet; a column for each pair."""
 
@@ -266,11 +290,7 @@ class _PlaneChecker:
         """Return the heights of all links and the TCP above the planes, (n, columns), twice."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
-        frames = self._arm.frames_rows(q)
-        tcp = np.array(frames.position) + sum(
-            length * np.array(axis)
-            for length, axis in zip(self._tcp, (frames.x, frames.y, frames.z), strict=True)
-        )
+        tcp = np.array(self._arm.frames_rows(q).point(self._tcp))
         heights = np.concatenate([links, (self._normals @ tcp).T[:, :, None]], axis=2)
         distances = (heights - self._offsets[:, None]).reshape(len(q), -1)
         return distances, distances

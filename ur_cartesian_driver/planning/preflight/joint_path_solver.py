@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning.geometry.samples import (
     sample_poses,
     segments_of,
 )
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: Samples are added until no joint turns more than this from one to the next [rad] ...
@@ -192,7 +192,7 @@ def _refine(
         if end - t > min_step and (q_next is None or _may_leave_line(kinematics, q, q_next)):
             ends.append(0.5 * (t + end))
             continue
-        if q_next is None or _max_joint_change(q, q_next) > _MAX_JUMP:
+        if q_next is None or max_joint_change(q, q_next) > _MAX_JUMP:
             return _Refinement(found.t, found.poses, found.q, end, q_next)
         t, q = end, q_next
         found.t.append(t)
@@ -250,14 +250,10 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
     Beside a singularity another branch may be closer after a long step, while in small steps the
     arm swings round and stays on its own.
     """
-    if _max_joint_change(q, q_next) > _MAX_STEP:
+    if max_joint_change(q, q_next) > _MAX_STEP:
         return True
     before, after = branch_measures(kinematics.arm, np.array([q, q_next])).branch
     return bool(before != after)
-
-
-def _max_joint_change(a: Joints, b: Joints) -> float:
-    return max(abs(y - x) for x, y in zip(a, b, strict=True))
 
 
 def _joints(row: Floats) -> Joints:

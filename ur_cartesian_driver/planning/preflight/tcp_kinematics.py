@@ -167,18 +167,14 @@ class TcpKinematics:
     def describe_flips(self, q: Joints, q_other: Joints) -> str:
         """Return what has to flip between two configurations; '' if nothing does."""
         first, second = branch_measures(self.arm, np.array([q, q_other])).branch
-        a, b = BRANCHES[first], BRANCHES[second]
-        names = [
-            name
+        flipped = [
+            f'a flip of the {name}'
             for name, x, y in zip(
-                ('a flip of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
-                a,
-                b,
-                strict=True,
+                ('shoulder', 'elbow', 'wrist'), BRANCHES[first], BRANCHES[second], strict=True
             )
             if x != y
         ]
-        return ' and '.join(names)
+        return ' and '.join(flipped)
 
     def explain_missed_posture(
         self, T_base_tcp: Pose, posture: Posture, q: Joints, index: int, tf_prefix: str
@@ -218,12 +214,14 @@ class TcpKinematics:
 
         every = (around(found) for found in solutions(self.arm, self.flange(T_base_tcp), q))
         found = min(every, key=lambda found: dist(found, q), default=None)
-        if (
-            found is None
-            or max(abs(b - a) for a, b in zip(q, found, strict=True)) > _MAX_CONTINUED_STEP
-        ):
+        if found is None or max_joint_change(q, found) > _MAX_CONTINUED_STEP:
             return None
         return found
+
+
+def max_joint_change(a: Joints, b: Joints) -> float:
+    """Return how far the joint turns that turns farthest between two configurations [rad]."""
+    return max(abs(y - x) for x, y in zip(a, b, strict=True))
 
 
 def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
@@ -236,9 +234,7 @@ def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
 
 def full_posture(named: dict[int, float]) -> Joints | None:
     """Return the configuration of a posture that names all joints, else None."""
-    if len(named) < 6:
-        return None
-    return (named[0], named[1], named[2], named[3], named[4], named[5])
+    return vector6(named[k] for k in range(6)) if len(named) == 6 else None
 
 
 def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:

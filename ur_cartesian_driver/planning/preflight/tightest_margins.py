@@ -36,39 +36,25 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class SingularityMeasure:
-    """A distance from a singularity, with its name and its parameter."""
+    """A distance from a singularity."""
 
     name: str
     unit: str
-    option: str
     #: The configuration, for a reader.
     meaning: str
     #: Distances are compared as fractions of this.
     scale: float
 
+    @property
+    def option(self) -> str:
+        """Its parameter."""
+        return f'singularity_margin_{self.name}'
+
 
 SINGULARITY_MEASURES = (
-    SingularityMeasure(
-        'wrist',
-        'rad',
-        'singularity_margin_wrist',
-        'axes 4 and 6 parallel',
-        1.0,
-    ),
-    SingularityMeasure(
-        'elbow',
-        'rad',
-        'singularity_margin_elbow',
-        'arm stretched or folded',
-        1.0,
-    ),
-    SingularityMeasure(
-        'shoulder',
-        'm',
-        'singularity_margin_shoulder',
-        'wrist centre above or below the shoulder',
-        0.3,
-    ),
+    SingularityMeasure('wrist', 'rad', 'axes 4 and 6 parallel', 1.0),
+    SingularityMeasure('elbow', 'rad', 'arm stretched or folded', 1.0),
+    SingularityMeasure('shoulder', 'm', 'wrist centre above or below the shoulder', 0.3),
 )
 _SCALES = np.array([*(measure.scale for measure in SINGULARITY_MEASURES), 1.0])
 

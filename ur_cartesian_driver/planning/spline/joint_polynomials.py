@@ -27,6 +27,8 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 #: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
 TICK = 1e-6
+#: An angular tolerance of a tool spline is its linear one at this distance [m].
+ANGLE_TOLERANCE_RADIUS = 0.1
 #: Pieces are not halved below this [s]: one cycle of the fastest controllers.
 _MIN_PIECE_TIME = 0.002
 # Digits of joint rates that are more than rounding.
@@ -59,18 +61,17 @@ def fit_joint_polynomials(
     start: MotionRows,
     quintic: bool,
     tolerance: float,
-    angle_tolerance: float,
 ) -> JointPolynomials:
     """
     Return the pieces for a spline path.
 
     :param start: the joints at its start (1, 6).
-    :param tolerance: maximum deviation of the tool [m], and ``angle_tolerance`` [rad].
+    :param tolerance: maximum deviation of the tool [m]; a turn counts as its arc at
+        ANGLE_TOLERANCE_RADIUS.
     :raises TooFast: pieces as short as a controller cycle are not enough.
     """
-    return _PieceRefinement(kinematics, path, start, quintic).refine_within(
-        tolerance, angle_tolerance
-    )
+    bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
+    return _PieceRefinement(kinematics, path, start, quintic).refine_within(bounds)
 
 
 class _PieceRefinement:
@@ -93,8 +94,8 @@ class _PieceRefinement:
         self.pending = np.ones(n, dtype=np.bool_)
         self.deviation = np.zeros((n, 2))
 
-    def refine_within(self, tolerance: float, angle_tolerance: float) -> JointPolynomials:
-        bounds = np.array([tolerance, angle_tolerance])
+    def refine_within(self, bounds: Floats) -> JointPolynomials:
+        """Halve pieces until the tool keeps within (distance [m], angle [rad])."""
         while True:
             rows = np.flatnonzero(self.pending)
             self.deviation[rows] = self._deviations(rows)

@@ -27,41 +27,10 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 _ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LimitExcess:
-    """The quantity that exceeds its limit most."""
-
-    #: Times multiplied by this keep the limit.
-    factor: float
-    #: The segment, and the fraction of its time.
-    point: int
-    fraction: float
-    #: What it is, its peak, its limit, and the unit of both.
-    what: str
-    needed: float
-    allowed: float
-    unit: str
-    #: Name of the limit.
-    name: str
-
-    def refusal(self, *, may_slow: bool = True) -> TooFast:
-        """
-        Return the refusal of the goal.
-
-        :param may_slow: whether the driver could give it more time.
-        """
-        return TooFast(
-            point_field(self.point, 'time_from_start'),
-            f'gives too little time: at {100.0 * self.fraction:.0f} % of it {self.what} needs '
-            f'{self.needed:.3f} {self.unit}, more than {self.name} = {self.allowed:.3f} '
-            f'{self.unit}',
-            f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt twists and '
-            f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
-        )
-
-
 @dataclass(frozen=True, slots=True)
-class _Quantity:
+class LimitedQuantity:
+    """A quantity along a spline, and its limit."""
+
     what: str
     #: (m,) its values, the limit, and 1 for speeds, 2 for accelerations.
     values: Floats
@@ -69,6 +38,34 @@ class _Quantity:
     power: int
     unit: str
     name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitExcess:
+    """The quantity that exceeds its limit most."""
+
+    quantity: LimitedQuantity
+    #: Times multiplied by this keep the limit.
+    factor: float
+    #: The segment, the fraction of its time, and the value there.
+    point: int
+    fraction: float
+    needed: float
+
+    def refusal(self, *, may_slow: bool = True) -> TooFast:
+        """
+        Return the refusal of the goal.
+
+        :param may_slow: whether the driver could give it more time.
+        """
+        of = self.quantity
+        return TooFast(
+            point_field(self.point, 'time_from_start'),
+            f'gives too little time: at {100.0 * self.fraction:.0f} % of it {of.what} needs '
+            f'{self.needed:.3f} {of.unit}, more than {of.name} = {of.limit:.3f} {of.unit}',
+            f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt twists and '
+            f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
+        )
 
 
 def worst_excess(
@@ -82,21 +79,18 @@ def worst_excess(
         factor = (peak / quantity.limit) ** (1.0 / quantity.power)
         if factor > max(1.0 + _ROUNDING, worst.factor if worst else 0.0):
             worst = LimitExcess(
+                quantity=quantity,
                 factor=factor,
                 point=int(path.points[row]),
                 fraction=float(path.u[row]),
-                what=quantity.what,
                 needed=peak,
-                allowed=quantity.limit,
-                unit=quantity.unit,
-                name=quantity.name,
             )
     return worst
 
 
 def _quantities(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
-) -> Iterator[_Quantity]:
+) -> Iterator[LimitedQuantity]:
     begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
     tool = path.spline.rows(path.piece, path.u * (end - begin))
     qd, qdd = joint_rates(
@@ -105,18 +99,18 @@ def _quantities(
     v, a = _norms(tool.twists[:, :3]), _norms(tool.accelerations[:, :3])
     e = _norms(tool.accelerations[:, 3:])
     if options.max_tool_speed > 0.0:
-        yield _Quantity('the tool', v, options.max_tool_speed, 1, 'm/s', 'max_tool_speed')
+        yield LimitedQuantity('the tool', v, options.max_tool_speed, 1, 'm/s', 'max_tool_speed')
     for values, name, unit in (
         (a, 'max_linear_acceleration', 'm/s^2'),
         (e, 'max_angular_acceleration', 'rad/s^2'),
     ):
-        yield _Quantity('the tool', values, getattr(options, name), 2, unit, name)
+        yield LimitedQuantity('the tool', values, getattr(options, name), 2, unit, name)
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
     for k, (joint, limit) in enumerate(
         zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
-        yield _Quantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
-        yield _Quantity(joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name)
+        yield LimitedQuantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
+        yield LimitedQuantity(joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name)
 
 
 def _norms(vectors: Floats) -> Floats:

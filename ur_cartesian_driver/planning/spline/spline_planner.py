@@ -32,7 +32,7 @@ from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
@@ -43,8 +43,6 @@ from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
-#: An angular tolerance of a tool spline is its linear one at this distance [m].
-ANGLE_TOLERANCE_RADIUS = 0.1
 # Samples of a stopping piece, and how much shorter the next try is.
 _SAMPLES = 17
 _SHORTENING = 0.8
@@ -63,8 +61,10 @@ class SplineState:
     qdd: Vector6 = ZERO6
 
     @classmethod
-    def after(cls, piece: Spline, time: float) -> SplineState:
+    def after(cls, segment: PlannedSegment, time: float) -> SplineState:
         """Return the state at the end of a piece that ends at a time [s]."""
+        piece = segment.primitive
+        assert isinstance(piece, Spline)
         return cls(
             time=time, q=piece.target, qd=piece.velocities, qdd=piece.accelerations or ZERO6
         )
@@ -140,17 +140,10 @@ def plan_spline(
     )
     path, stretch, remarks_made = _fit_to_limits(kinematics, path, start, goal, options)
     polynomials = fit_joint_polynomials(
-        kinematics,
-        path,
-        start.rows(),
-        points.quintic,
-        options.spline_tolerance,
-        options.spline_tolerance / ANGLE_TOLERANCE_RADIUS,
+        kinematics, path, start.rows(), points.quintic, options.spline_tolerance
     )
     segments = tuple(_segments(path, polynomials, goal))
-    piece = segments[-1].primitive
-    assert isinstance(piece, Spline)
-    end = SplineState.after(piece, float(polynomials.times[-1]))
+    end = SplineState.after(segments[-1], float(polynomials.times[-1]))
     remarks_made += _clearance_remarks(
         path, end, arm, tool_tips or (T_flange_tcp,), start, options
     )
@@ -170,9 +163,7 @@ def plan_spline(
 
 def end_state(plan: Plan) -> SplineState:
     """Return where a plan of spline pieces ends."""
-    piece = plan.segments[-1].primitive
-    assert isinstance(piece, Spline)
-    return SplineState.after(piece, float(plan.reference.time[-1]))
+    return SplineState.after(plan.segments[-1], float(plan.reference.time[-1]))
 
 
 def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
@@ -232,25 +223,22 @@ def _fit_to_limits(
     in_parts = start.is_moving or goal.keep_open
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
-    path = path.stretch_times(found.factor)
+    path, of = path.stretch_times(found.factor), found.quantity
     longest = int(np.argmax(np.diff(path.spline.times)))
     time = float(np.diff(path.spline.times)[longest])
     if time > options.max_segment_time:
         raise InvalidGoal(
             point_field(path.first + longest, 'time_from_start'),
-            f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
+            f'would take {time:.0f} s because of {of.name}, more than max_segment_time = '
             f'{options.max_segment_time:.0f} s',
             'move the path away from there',
         )
-    return (
-        path,
-        found.factor,
-        [
-            f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
-            f'{found.allowed:.3f} {found.unit} ({found.what}, on the segment to point '
-            f'{found.point}): {path.spline.times[-1]:.3f} s in total'
-        ],
+    remark = (
+        f'all times are stretched by {found.factor:.4g}, because of {of.name} = '
+        f'{of.limit:.3f} {of.unit} ({of.what}, on the segment to point '
+        f'{found.point}): {path.spline.times[-1]:.3f} s in total'
     )
+    return path, found.factor, [remark]
 
 
 def _segments(
@@ -268,20 +256,15 @@ def _segments(
         polynomials.qd[1:],
         polynomials.qdd[1:],
     )
-    time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
+    done, count = [0.0, 0.0, 0.0], 0
     for k, is_last, metres, radians, duration, q, qd, qdd in zip(
         *(column.tolist() for column in columns), strict=True
     ):
-        time_done, length_done, angle_done, count = (
-            time_done + duration,
-            length_done + metres,
-            angle_done + radians,
-            count + 1,
-        )
-        line = ''
+        done = [a + b for a, b in zip(done, (metres, radians, duration), strict=True)]
+        count, line = count + 1, ''
         if is_last:
-            line = _segment_line(path, goal, k, count, (length_done, angle_done, time_done))
-            time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
+            line = _segment_line(path, goal, k, count, done)
+            done, count = [0.0, 0.0, 0.0], 0
         yield PlannedSegment(
             primitive=Spline(
                 target=tuple(q),
@@ -298,9 +281,7 @@ def _segments(
         )
 
 
-def _segment_line(
-    path: SplinePath, goal: Goal, k: int, count: int, done: tuple[float, float, float]
-) -> str:
+def _segment_line(path: SplinePath, goal: Goal, k: int, count: int, done: Sequence[float]) -> str:
     """Return the line of the segment to a point: ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
@@ -336,14 +317,7 @@ def _clearance_remarks(
         q = np.concatenate([q, on])
         points = np.concatenate([points, np.full(len(on), points[-1])])
         u = np.concatenate([u, np.ones(len(on))])
-    remarks_made = (
-        line
-        for T_flange_tcp in tool_tips
-        for line in clearance_remarks(
-            Clearance(arm, T_flange_tcp, options).check(q, start.q), points, u
-        )
-    )
-    return list(dict.fromkeys(remarks_made))
+    return clearance_lines(arm, tool_tips, options, q, start.q, points, u)
 
 
 def _reference(path: SplinePath) -> ReferencePath:
