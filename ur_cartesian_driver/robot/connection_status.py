@@ -132,6 +132,11 @@ def required_action(
             if tcp_restore_pending
             else ''
         )
+    return _needed_to_start(headless_mode, foreign_program)
+
+
+def _needed_to_start(headless_mode: bool, foreign_program: bool) -> str:
+    """Return the sentence that says how our program gets to run."""
     if foreign_program:
         return (
             'Another program runs on the robot, maybe that of another driver. Let it end, or '
