@@ -440,7 +440,7 @@ def test_the_reason_names_the_joint_and_its_limits():
     arm = limited(UR5E, 0, 1.0, 1.2)
     clause = explain_unreachable(arm, arm.forward(READY))
     assert clause == (
-        'shoulder_pan_joint would be at 0.3000 rad, and its limits are 1.0000 to 1.2000 rad'
+        'shoulder_pan_joint would be at 0.3000 rad, outside its range of 1.0000 to 1.2000 rad'
     )
 
 

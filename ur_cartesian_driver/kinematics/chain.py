@@ -256,7 +256,7 @@ def pinocchio_model(arm: Arm) -> Any:
         joint = model.addJoint(
             joint,
             pinocchio.JointModelRZ(),
-            link * _turn_z(pinocchio, geometry.theta[i]),
+            link * pinocchio.SE3(pinocchio.utils.rotate('z', geometry.theta[i]), np.zeros(3)),
             name,
             np.array([torque[i]]),
             np.array([arm.model.max_joint_speed[i]]),
@@ -269,10 +269,6 @@ def pinocchio_model(arm: Arm) -> Any:
         )
     model.addFrame(pinocchio.Frame('tool0', joint, 0, link, pinocchio.FrameType.OP_FRAME))
     return model
-
-
-def _turn_z(pinocchio: Any, angle: float) -> Any:
-    return pinocchio.SE3(pinocchio.utils.rotate('z', angle), np.zeros(3))
 
 
 def _links(geometry: DhTable) -> tuple[_Link, ...]:

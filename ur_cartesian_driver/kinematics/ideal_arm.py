@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames
-from ur_cartesian_driver.kinematics.robot_models import DhTable
+from ur_cartesian_driver.kinematics.robot_models import dh_table
 from ur_cartesian_driver.motion.pose import (
     conjugate,
     multiply,
@@ -73,7 +73,7 @@ def _fit(
     offsets = np.zeros(6)
     misfit = 0.0
     for _ in range(_ITERATIONS):
-        ideal = _arm_with_lengths(arm, lengths)
+        ideal = Arm(arm.model, dh_table(*vector6(lengths.tolist())))
         frames = [ideal.frames(q + offsets) for q in samples]
         rows = np.concatenate([_derivatives(f) for f in frames])
         errors = np.concatenate(
@@ -87,11 +87,6 @@ def _fit(
         misfit = sqrt(float(np.sum(left**2)) / _SAMPLES)
         lengths, offsets = lengths + step[:6], offsets + step[6:]
     return lengths, offsets, misfit
-
-
-def _arm_with_lengths(arm: Arm, lengths: NDArray[np.float64]) -> Arm:
-    d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
-    return Arm(arm.model, DhTable(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6)))
 
 
 def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:

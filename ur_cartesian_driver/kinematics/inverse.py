@@ -274,7 +274,15 @@ def _same(a: Joints, b: Joints) -> bool:
 
 def _distance_by_turns(a: Joints, b: Joints) -> float:
     """Return the Euclidean distance modulo full turns [rad]."""
-    return hypot(*[remainder(x - y, tau) for x, y in zip(a, b, strict=True)])
+    (a1, a2, a3, a4, a5, a6), (b1, b2, b3, b4, b5, b6) = a, b
+    return hypot(
+        remainder(a1 - b1, tau),
+        remainder(a2 - b2, tau),
+        remainder(a3 - b3, tau),
+        remainder(a4 - b4, tau),
+        remainder(a5 - b5, tau),
+        remainder(a6 - b6, tau),
+    )
 
 
 def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | None:
@@ -359,7 +367,7 @@ def _explain_outside_limits(found: list[Joints], limits: PositionLimits) -> str:
     low, high = limits[joint]
     value, _ = format_distinct(angle, low if angle < low else high)
     return (
-        f'{JOINT_NAMES[joint]} would be at {value} rad, and its limits are {low:.4f} to '
+        f'{JOINT_NAMES[joint]} would be at {value} rad, outside its range of {low:.4f} to '
         f'{high:.4f} rad'
     )
 

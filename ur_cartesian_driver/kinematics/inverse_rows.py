@@ -114,7 +114,9 @@ def solve_path(
 
 def _path_solution(q: Floats, q_start: Joints) -> PathSolution:
     found = ~np.isnan(q[:, 0])
-    return PathSolution(q=q, found=found, step=_steps(q, found, q_start))
+    step = np.full(len(q), np.nan)
+    step[found] = _max_joint_change(np.diff(q[found], axis=0, prepend=np.array([q_start])))
+    return PathSolution(q=q, found=found, step=step)
 
 
 def _solve_certain(arm: Arm, poses: Floats, before: Joints) -> Floats:
@@ -178,12 +180,6 @@ def _within_limits(arm: Arm, q: Floats, q_near: Floats, max_step: Floats) -> tup
     inside = (q >= low - _LIMIT_ROUNDING) & (q <= high + _LIMIT_ROUNDING)
     clipped: Floats = np.clip(q, low, high)
     return clipped, certain & inside.all(axis=1)
-
-
-def _steps(q: Floats, found: Flags, q_start: Joints) -> Floats:
-    steps = np.full(len(q), np.nan)
-    steps[found] = _max_joint_change(np.diff(q[found], axis=0, prepend=np.array([q_start])))
-    return steps
 
 
 def _max_joint_change(changes: Floats) -> Floats:

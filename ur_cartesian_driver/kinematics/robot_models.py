@@ -3,7 +3,7 @@
 """
 The robots: geometry and limits of every model, in one table.
 
-Every arm of the series has the same shape, six lengths tell the models apart::
+All arms have the same shape; six lengths tell the models apart::
 
     i   theta   d    a    alpha
     1   0       d1   0    pi/2     shoulder pan
@@ -20,7 +20,7 @@ table, in which all 24 numbers may differ.
 
 Sources: the lengths are those that Universal Robots publishes in its article on DH parameters and
 in the configuration files of its ROS 2 description package; speeds and torques are from the
-latter. UR7e and UR12e are mechanically the UR5e and the UR10e.
+latter. UR7e and UR12e have the mechanics of UR5e and UR10e.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class DhTable:
         for name, column in self.columns().items():
             if len(column) != 6 or not all(isfinite(value) for value in column):
                 raise ValueError(
-                    f'The column {name} of a DH table must hold six finite numbers, '
-                    f'not {column!r}.'
+                    f'The column {name} of a DH table must hold six finite numbers, one for each '
+                    f'joint, not {column!r}.'
                 )
 
     def columns(self) -> dict[str, Vector6]:
@@ -108,7 +108,8 @@ class RobotModel:
     wire_type: int
 
 
-def _lengths(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> DhTable:
+def dh_table(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> DhTable:
+    """Return the table of an arm without calibration from its six lengths [m]."""
     return DhTable(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6))
 
 
@@ -139,21 +140,21 @@ _TORQUE_10E = _torques(330, 330, 150, 54)
 _TORQUE_20 = _torques(738, 738, 433, 107)
 
 # Models that share all their lengths.
-_UR5E = _lengths(0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996)
-_UR10E = _lengths(0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655)
+_UR5E = dh_table(0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996)
+_UR10E = dh_table(0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655)
 
 # fmt: off
 #       name       series  d1        a2        a3        d4        d5       d6
 _TABLE = (
     # CB3
-    ('ur3',     'CB3', _lengths(0.1519,   -0.24365, -0.21325, 0.11235,  0.08535, 0.0819),
+    ('ur3',     'CB3', dh_table(0.1519,   -0.24365, -0.21325, 0.11235,  0.08535, 0.0819),
      _ENDLESS_WRIST, _SPEED_3,  _TORQUE_3,   3.0,  0.500, 3),
-    ('ur5',     'CB3', _lengths(0.089159, -0.425,   -0.39225, 0.10915,  0.09465, 0.0823),
+    ('ur5',     'CB3', dh_table(0.089159, -0.425,   -0.39225, 0.10915,  0.09465, 0.0823),
      _LIMITS,        _SPEED_5,  _TORQUE_5,   5.0,  0.850, 1),
-    ('ur10',    'CB3', _lengths(0.1273,   -0.612,   -0.5723,  0.163941, 0.1157,  0.0922),
+    ('ur10',    'CB3', dh_table(0.1273,   -0.612,   -0.5723,  0.163941, 0.1157,  0.0922),
      _LIMITS,        _SPEED_10, _TORQUE_10,  10.0, 1.300, 2),
     # e-Series
-    ('ur3e',    'e',   _lengths(0.15185,  -0.24355, -0.2132,  0.13105,  0.08535, 0.0921),
+    ('ur3e',    'e',   dh_table(0.15185,  -0.24355, -0.2132,  0.13105,  0.08535, 0.0921),
      _ENDLESS_WRIST, _SPEED_3,  _TORQUE_3E,  3.0,  0.500, 3),
     ('ur5e',    'e',   _UR5E,
      _LIMITS,        _SPEED_5,  _TORQUE_5,   5.0,  0.850, 1),
@@ -163,18 +164,18 @@ _TABLE = (
      _LIMITS,        _SPEED_10, _TORQUE_10E, 12.5, 1.300, 2),
     ('ur12e',   'e',   _UR10E,
      _LIMITS,        _SPEED_10, _TORQUE_10E, 12.5, 1.300, 2),
-    ('ur16e',   'e',   _lengths(0.1807,   -0.4784,  -0.36,    0.17415,  0.11985, 0.11655),
+    ('ur16e',   'e',   dh_table(0.1807,   -0.4784,  -0.36,    0.17415,  0.11985, 0.11655),
      _LIMITS,        _SPEED_10, _TORQUE_10E, 16.0, 0.900, 4),
     # UR Series
-    ('ur15',    'UR',  _lengths(0.2186,   -0.6475,  -0.5164,  0.1824,   0.1361,  0.1434),
+    ('ur15',    'UR',  dh_table(0.2186,   -0.6475,  -0.5164,  0.1824,   0.1361,  0.1434),
      _LIMITS,        _SPEED_20, None,        15.0, 1.300, 9),
-    ('ur18',    'UR',  _lengths(0.2186,   -0.475,   -0.3389,  0.1824,   0.1361,  0.1434),
+    ('ur18',    'UR',  dh_table(0.2186,   -0.475,   -0.3389,  0.1824,   0.1361,  0.1434),
      _LIMITS,        _SPEED_20, None,        18.0, 0.950, 5),
-    ('ur8long', 'UR',  _lengths(0.2186,   -0.8989,  -0.7149,  0.1824,   0.1361,  0.1434),
+    ('ur8long', 'UR',  dh_table(0.2186,   -0.8989,  -0.7149,  0.1824,   0.1361,  0.1434),
      _LIMITS,        _SPEED_20, None,        8.0,  1.750, 6),
-    ('ur20',    'UR',  _lengths(0.2363,   -0.862,   -0.7287,  0.201,    0.1593,  0.1543),
+    ('ur20',    'UR',  dh_table(0.2363,   -0.862,   -0.7287,  0.201,    0.1593,  0.1543),
      _LIMITS,        _SPEED_20, _TORQUE_20,  20.0, 1.750, 7),
-    ('ur30',    'UR',  _lengths(0.2363,   -0.637,   -0.5037,  0.201,    0.1593,  0.1543),
+    ('ur30',    'UR',  dh_table(0.2363,   -0.637,   -0.5037,  0.201,    0.1593,  0.1543),
      _LIMITS,        _SPEED_20, _TORQUE_20,  30.0, 1.300, 8),
 )
 # fmt: on

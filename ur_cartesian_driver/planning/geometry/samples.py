@@ -108,11 +108,6 @@ class CurvePiece:
         after, fraction = self.curve.locate(t)
         return self.index + after, fraction
 
-    @property
-    def size(self) -> tuple[float, float]:
-        """Length [m] and turn [rad] of its curve."""
-        return self.curve.length, self.curve.angle
-
 
 def _sample_count(length: float, angle: float) -> int:
     steps = max(length / STEP_LENGTH, angle / STEP_ANGLE)

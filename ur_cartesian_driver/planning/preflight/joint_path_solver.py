@@ -135,7 +135,7 @@ def solve_joint_path(
             stop = begin + index
             if stop > row:
                 found.append(samples, slice(row, stop), solved[row - begin : index])
-                q, row = _joints(solved[index - 1]), stop
+                q, row = vector6(solved[index - 1].tolist()), stop
             if index == len(solved):
                 block *= _GROWTH
                 break
@@ -181,7 +181,7 @@ def _refine(
     piece = pieces[int(samples.piece[row])]
     is_first = row == 0 or samples.piece[row - 1] != samples.piece[row]
     t = piece.begin if is_first else float(samples.t[row - 1])
-    length, angle = piece.size
+    length, angle = piece.curve.length, piece.curve.angle
     min_step = min(1.0, _MIN_LENGTH / max(length, 1e-300), _MIN_ANGLE / max(angle, 1e-300))
     found = _Refinement([], [], [])
     ends = [float(samples.t[row])]
@@ -254,10 +254,6 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
         return True
     before, after = branch_measures(kinematics.arm, np.array([q, q_next])).branch
     return bool(before != after)
-
-
-def _joints(row: Floats) -> Joints:
-    return vector6(row.tolist())
 
 
 def max_path_length(kinematics: TcpKinematics) -> float:

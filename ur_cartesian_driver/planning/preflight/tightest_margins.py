@@ -64,8 +64,8 @@ class TightestMargin:
     """The smallest distance of a segment from a singularity or a joint limit."""
 
     name: str
-    value: float
     unit: str
+    value: float
     fraction: float
     #: The value as a fraction of the scale of its quantity.
     normalized: float
@@ -175,7 +175,7 @@ def _is_leaving(
         or number != _first_of(joint_path.pieces, piece.index)
     ):
         return excused  # it comes out of a blend, or is a spline, see is_leaving_rows
-    length, angle = piece.size
+    length, angle = piece.curve.length, piece.curve.angle
     on_it = joint_path.piece[rows] == number
     t = joint_path.t[rows]
     excused |= (on_it & (t * length <= START_LENGTH) & (t * angle <= START_ANGLE))[:, None]
@@ -231,18 +231,15 @@ def margins_by_segment(
         least[first],
     )
     return {
-        segment: TightestMargin(_name(k, j), value, _unit(k), fraction, normalized)
+        segment: TightestMargin(*_quantity(k, j), value, fraction, normalized)
         for segment, k, j, value, fraction, normalized in zip(
             *(column.tolist() for column in columns), strict=True
         )
     }
 
 
-def _name(kind: int, joint: int) -> str:
+def _quantity(kind: int, joint: int) -> tuple[str, str]:
+    """Return what a margin is to, and its unit."""
     if kind == len(SINGULARITY_MEASURES):
-        return f'the limit of {JOINT_NAMES[joint]}'
-    return f'the {SINGULARITY_MEASURES[kind].name} singularity'
-
-
-def _unit(kind: int) -> str:
-    return 'rad' if kind == len(SINGULARITY_MEASURES) else SINGULARITY_MEASURES[kind].unit
+        return f'the limit of {JOINT_NAMES[joint]}', 'rad'
+    return f'the {SINGULARITY_MEASURES[kind].name} singularity', SINGULARITY_MEASURES[kind].unit

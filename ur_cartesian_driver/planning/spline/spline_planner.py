@@ -152,12 +152,7 @@ def plan_spline(
         reference=_reference(path),
         end=end,
         stretch=stretch,
-        remarks=(
-            *point_remarks(goal, first),
-            *remarks_made,
-            _precision(polynomials),
-            _tightest_remark(path),
-        ),
+        remarks=(*point_remarks(goal, first), *remarks_made, *_remarks(path, polynomials)),
     )
 
 
@@ -326,17 +321,15 @@ def _reference(path: SplinePath) -> ReferencePath:
     return ReferencePath(poses=poses, point=path.points, time=path.times)
 
 
-def _precision(polynomials: JointPolynomials) -> str:
+def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]:
+    """Return the remarks on the precision and on the tightest margin."""
     kind = 'quintic' if polynomials.quintic else 'cubic'
+    point, margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
     return (
         f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
-        f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline'
+        f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
+        f'tightest margin: {margin} of the segment to point {point}',
     )
-
-
-def _tightest_remark(path: SplinePath) -> str:
-    point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
-    return f'tightest margin: {tightest_margin} of the segment to point {point}'
 
 
 def stretch_times(goal: Goal, factor: float) -> Goal:
