@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable
+from random import Random
 from typing import Any
 
 from hypothesis import given, settings
@@ -406,3 +407,81 @@ def test_quotient_and_remainder_belong_together(a: int, b: int) -> None:
     q, r = running.variables['q'], running.variables['r']
     assert q == int(a / b)
     assert q * b + r == a
+
+
+# How threads are scheduled otherwise
+
+
+def scheduled(
+    body: str, *, delay: int = 0, seed: int | None = None, budget: int = 100_000
+) -> ScriptInterpreter:
+    return ScriptInterpreter(
+        parse(f'def f():\n{body}\nend\n'),
+        {'sync': sync},
+        thread_delay=delay,
+        interleaving=None if seed is None else Random(seed),
+        instruction_budget=budget,
+    )
+
+
+@pytest.mark.parametrize('delay', [0, 1, 3])
+@pytest.mark.parametrize('seed', [None, 1])
+def test_a_new_thread_begins_later(delay: int, seed: int | None) -> None:
+    running = scheduled(
+        'n = 0\nbegun = -1\nthread t():\nbegun = n\nend\n'
+        'run t()\nwhile n < 9:\nsync()\nn = n + 1\nend',
+        delay=delay,
+        seed=seed,
+    )
+    frames_until_the_end(running)
+    # At random, the main thread may have counted the frame already.
+    assert running.variables['begun'] in {delay - 1, delay}
+
+
+def count_in_two_threads(change: str, seed: int | None) -> int:
+    loop = f'local i = 0\nwhile i < 100:\n{change}\ni = i + 1\nend\n'
+    running = scheduled(
+        f'n = 0\nthread t():\n{loop}end\nh = run t()\nthread u():\n{loop}end\n'
+        'k = run u()\njoin h\njoin k',
+        seed=seed,
+    )
+    frames_until_the_end(running)
+    assert running.error is None
+    count = running.variables['n']
+    assert isinstance(count, int)
+    return count
+
+
+def test_threads_that_take_turns_at_random_lose_counts() -> None:
+    assert count_in_two_threads('n = n + 1', None) == 200
+    assert count_in_two_threads('n = n + 1', seed=1) < 200
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_critical_section_keeps_counts(seed: int) -> None:
+    change = 'enter_critical\nn = n + 1\nexit_critical'
+    assert count_in_two_threads(change, seed) == 200
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_thread_that_waits_in_a_critical_section_lets_others_run(seed: int) -> None:
+    running = scheduled(
+        'n = 0\nthread t():\nwhile True:\nenter_critical\nn = n + 1\nexit_critical\nsync()\nend\n'
+        'end\nrun t()\nenter_critical\nsync()\nsync()\nsync()\nexit_critical',
+        seed=seed,
+    )
+    assert frames_until_the_end(running) == 4
+    assert running.variables['n'] in {3, 4}
+
+
+def test_a_seed_repeats_the_turns() -> None:
+    counts = [count_in_two_threads('n = n + 1', seed) for seed in (1, 2, 3, 1, 2, 3)]
+    assert counts[:3] == counts[3:]
+    assert len(set(counts)) > 1
+
+
+def test_an_endless_loop_ends_at_its_budget_however_threads_take_turns() -> None:
+    running = scheduled('i = 0\nwhile True:\ni = i + 1\nend', seed=1, budget=1000)
+    running.step()
+    assert running.error is not None
+    assert running.error.text == BUDGET_EXCEEDED

@@ -128,7 +128,13 @@ class Controller:
         #: The rate at which motion runs now, 0..1; it follows slider, pauses and stops.
         self.scale = 1.0
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
-        self.programs: ProgramRunner = ProgramRunner(make_builtins(self), self.messages, self)
+        self.programs: ProgramRunner = ProgramRunner(
+            make_builtins(self),
+            self.messages,
+            self,
+            thread_delay=config.thread_delay,
+            interleaving_seed=config.interleaving_seed,
+        )
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         if config.program and (refusal := self.load_program(config.program)):

@@ -72,6 +72,11 @@ class SimulatorConfig:
     #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
+    #: Cycles after which a new thread of a program begins.
+    thread_delay: int = 0
+    #: Seed of random switches between the threads of a program; None = they are switched only
+    #: where one takes time.
+    interleaving_seed: int | None = None
     #: Programs that the dashboard can load: file name -> URScript.
     programs: Mapping[str, str] = field(default_factory=dict)
     #: The one that is loaded from the start; empty = an empty one without a name.
@@ -87,6 +92,8 @@ class SimulatorConfig:
             raise ValueError(f'program is {self.program!r}; programs has {known}.')
         if self.frequency is not None and not 1.0 <= self.frequency <= 1000.0:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
+        if self.thread_delay < 0:
+            raise ValueError(f'thread_delay is {self.thread_delay} cycles; use 0 or more.')
         if self.rate < 0.0:
             raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
         for name in (

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from functools import lru_cache
 import logging
+from random import Random
 from typing import Protocol
 
 from ur_cartesian_driver.motion.robot_state import RuntimeState
@@ -70,8 +71,23 @@ class ProgramArm(Protocol):
 class ProgramRunner:
     """The primary program, its state, and the secondary programs of this cycle."""
 
-    def __init__(self, builtins: Builtins, messages: ControllerMessages, arm: ProgramArm) -> None:
-        """Begin with no program."""
+    def __init__(
+        self,
+        builtins: Builtins,
+        messages: ControllerMessages,
+        arm: ProgramArm,
+        *,
+        thread_delay: int = 0,
+        interleaving_seed: int | None = None,
+    ) -> None:
+        """
+        Begin with no program.
+
+        :param thread_delay: cycles after which a new thread of a program begins.
+        :param interleaving_seed: seed of the random switches between threads; None = no switches.
+        """
+        self._thread_delay = thread_delay
+        self._interleaving = None if interleaving_seed is None else Random(interleaving_seed)
         self._builtins = builtins
         self._secondary_builtins = refuse_timed_functions(builtins)
         self._messages = messages
@@ -114,8 +130,10 @@ class ProgramRunner:
         try:
             program = _parse_cached(text)
             secondary = program.kind == 'sec'
-            interpreter = ScriptInterpreter(
-                program, self._secondary_builtins if secondary else self._builtins
+            interpreter = (
+                ScriptInterpreter(program, self._secondary_builtins)
+                if secondary
+                else self._compile(program)
             )
         except CompileError as error:
             self._messages.exception(error.line - line_offset, error.column, error.text)
@@ -140,11 +158,19 @@ class ProgramRunner:
             return 'a program is running'
         try:
             self._loaded = _parse_cached(text)
-            ScriptInterpreter(self._loaded, self._builtins)
+            self._compile(self._loaded)
         except CompileError as error:
             return str(error)
         self.loaded = name
         return ''
+
+    def _compile(self, program: ScriptProgram) -> ScriptInterpreter:
+        return ScriptInterpreter(
+            program,
+            self._builtins,
+            thread_delay=self._thread_delay,
+            interleaving=self._interleaving,
+        )
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:
         if self.running:
@@ -176,7 +202,7 @@ class ProgramRunner:
         elif self.state is RuntimeState.STOPPED:
             if self._loaded is None:
                 return 'no program is loaded'
-            self._queue_start(self.loaded, ScriptInterpreter(self._loaded, self._builtins))
+            self._queue_start(self.loaded, self._compile(self._loaded))
         return ''
 
     def pause(self) -> str:

@@ -22,13 +22,16 @@ from ur_cartesian_driver.urscript.script_values import ThreadHandle, Value
 MAX_CALL_DEPTH = 100
 
 StackFrame = list[Any]
-ScriptSteps = Generator[None, None, Value]
+ScriptSteps = Generator[Any, None, Value]
 RunFunction = Callable[[StackFrame], Any]
 
 # Signals of statements.
 BREAK = 'break'
 CONTINUE = 'continue'
 RETURN = 'return'
+
+#: What a thread yields to let another one go on in the same frame; None = it takes time.
+SWITCH = object()
 
 
 class _Unset:
@@ -47,6 +50,7 @@ class Thread(Protocol):
 
     depth: int
     location: tuple[int, int]
+    in_critical_section: bool
 
 
 class Runtime(Protocol):
@@ -55,6 +59,8 @@ class Runtime(Protocol):
     fuel: int
     paused: bool
     globals: list[Any]
+    #: Whether threads may be switched between any two statements.
+    interleaves: bool
 
     @property
     def thread(self) -> Thread:
@@ -62,6 +68,9 @@ class Runtime(Protocol):
 
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
         """Raise: the thread used up its budget without yielding."""
+
+    def switches_now(self) -> bool:
+        """Tell whether another thread goes on before the next statement."""
 
     def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
         """Start a thread."""

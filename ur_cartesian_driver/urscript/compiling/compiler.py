@@ -24,6 +24,7 @@ from ur_cartesian_driver.urscript.compiling.closures import (
     ScriptSteps,
     sequence,
     StackFrame,
+    SWITCH,
     UNSET,
 )
 from ur_cartesian_driver.urscript.compiling.expression_compiler import ExpressionCompiler
@@ -44,18 +45,18 @@ def compile_program(
     :param procedures: existing functions by the identity of their scopes; the program's functions
         are added.
     """
-    procedures |= {id(scope): _procedure(scope) for scope in root.walk()}
+    procedures |= {id(scope): _procedure(scope, runtime.interleaves) for scope in root.walk()}
     for scope in root.walk():
         compiler = _Compiler(scope, builtins, runtime, procedures)
         compiler.fill(procedures[id(scope)])
     return procedures.pop(id(root))
 
 
-def _procedure(scope: Scope) -> CompiledFunction:
+def _procedure(scope: Scope, interleaves: bool) -> CompiledFunction:
     """Return a function without its body, because functions call each other."""
     return CompiledFunction(
         name=scope.definition.name if scope.definition else '',
-        suspends=scope.suspends,
+        suspends=scope.suspends or interleaves,
         template=[None] + [UNSET] * len(scope.locals),
     )
 
@@ -101,6 +102,20 @@ class _Compiler(ExpressionCompiler):
                     return signal
             return None
 
+        def interleaved_steps(frame: StackFrame) -> ScriptSteps:
+            runtime.fuel -= weight
+            if runtime.fuel < 0:
+                runtime.raise_budget_exceeded(*call_location)
+            for run, suspends in pairs:
+                if runtime.switches_now():
+                    yield SWITCH
+                signal = (yield from run(frame)) if suspends else run(frame)
+                if signal is not None:
+                    return signal
+            return None
+
+        if runtime.interleaves:
+            return CompiledNode(interleaved_steps, True, 0)
         suspends = any(code.suspends for code in codes)
         return CompiledNode(steps if suspends else plain, suspends, 0)
 
@@ -132,11 +147,19 @@ class _Compiler(ExpressionCompiler):
             case tree.KillStatement():
                 kill = self._runtime.kill
                 yield sequence([self.expression(node.handle)], lambda frame, found: kill(*found))
-            case tree.CriticalStatement() | tree.LabelStatement() | tree.FunctionDefinition():
-                # Threads switch only where one takes time, so nothing can interleave with the
-                # statements of a critical section. A thread that takes time inside one lets the
-                # others run, as on the robot.
+            case tree.CriticalStatement():
+                yield self._critical(node)
+            case tree.LabelStatement() | tree.FunctionDefinition():
                 return
+
+    def _critical(self, node: tree.CriticalStatement) -> CompiledNode:
+        """Compile a mark; a thread that takes time in a critical section lets the others run."""
+        runtime, enter = self._runtime, node.enter
+
+        def plain(frame: StackFrame) -> None:
+            runtime.thread.in_critical_section = enter
+
+        return CompiledNode(plain)
 
     def _call_statement(self, node: tree.CallStatement) -> CompiledNode:
         call = self.expression(node.call)
@@ -156,7 +179,7 @@ class _Compiler(ExpressionCompiler):
             return self._assign_part(node)
         slot, is_local = self._slot(node.target.identifier, node.qualifier)
         value = self.copied_expression(node.value)
-        run, shared = value.run, self._runtime.globals
+        run, runtime, shared = value.run, self._runtime, self._runtime.globals
 
         def plain_local(frame: StackFrame) -> None:
             frame[slot] = run(frame)
@@ -169,6 +192,15 @@ class _Compiler(ExpressionCompiler):
             (frame if is_local else shared)[slot] = found
             return None
 
+        def interleaved_steps(frame: StackFrame) -> ScriptSteps:
+            found = (yield from run(frame)) if value.suspends else run(frame)
+            if runtime.switches_now():
+                yield SWITCH
+            shared[slot] = found
+            return None
+
+        if runtime.interleaves and not is_local:
+            return CompiledNode(interleaved_steps, True, 1 + value.weight)
         return choose_runner(plain_local if is_local else plain_global, steps, [value])
 
     def _assign_part(self, node: tree.AssignStatement) -> CompiledNode:

@@ -3,12 +3,16 @@
 """
 Runs one program, a controller cycle (frame) at a time.
 
-Threads are cooperative. In each frame every live thread runs, in the order in which they were
-started, until it takes time: it calls a builtin that yields, waits in `join`, or ends. A new
-thread runs in the same frame, after the earlier ones. Nothing else switches threads, and that is
-how critical sections work: their statements cannot interleave, and a thread that takes time inside
-one lets the others run. A killed thread holds nothing that must be released. A thread that
-evaluates more nodes than its budget in one frame ends the program.
+In each frame every live thread runs, in the order in which they were started, until it takes
+time: it calls a builtin that yields, waits in `join`, or ends. A new thread runs in the same
+frame, after the earlier ones. Nothing else switches threads. A thread that evaluates more nodes
+than its budget in one frame ends the program.
+
+The manual promises less, so two settings take more liberties. With `thread_delay` a new thread
+begins some frames later. With `interleaving` threads take turns at random: in a random order,
+between any two statements, and before an assignment stores its value in a global variable, except
+in a critical section. A thread that takes time in a critical section lets the others run, which
+may have their own. A killed thread holds nothing that must be released.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
 by itself, the threads that it started go on; when it is killed, they are killed, too.
@@ -16,8 +20,9 @@ by itself, the threads that it started go on; when it is killed, they are killed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from random import Random
 from typing import Any, NoReturn
 
 from ur_cartesian_driver.urscript.compiling.closures import (
@@ -25,6 +30,7 @@ from ur_cartesian_driver.urscript.compiling.closures import (
     ProgramHalted,
     recursion_error,
     ScriptSteps,
+    SWITCH,
     UNSET,
 )
 from ur_cartesian_driver.urscript.compiling.compiler import compile_program
@@ -40,6 +46,8 @@ BUDGET_EXCEEDED = (
 )
 #: The manual gives no limit; threads that start threads would soon use all time and memory.
 MAX_THREADS = 256
+#: How often threads are switched where they may be.
+SWITCH_PROBABILITY = 0.1
 
 
 class _ThreadKilled(BaseException):
@@ -56,6 +64,12 @@ class _Thread:
     depth: int = 0
     location: tuple[int, int] = (0, 0)
     alive: bool = True
+    in_critical_section: bool = False
+    #: Frames until it begins.
+    delay: int = 0
+    #: Nodes that it may still evaluate in this frame, and whether it has taken the time of it.
+    fuel: int = 0
+    took_time: bool = False
 
     def descends_from(self, other: _Thread) -> bool:
         """Tell whether the other thread is this one or started it, also indirectly."""
@@ -74,6 +88,8 @@ class ScriptInterpreter:
         generator function each bare `yield` gives up the rest of the frame, and its return value
         is the value of the call. Arguments are passed by position and name as in Python.
     :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
+    :param thread_delay: frames after which a new thread begins.
+    :param interleaving: draws where threads are switched; None = only where one takes time.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -83,6 +99,8 @@ class ScriptInterpreter:
         builtins: Mapping[str, Builtin],
         *,
         instruction_budget: int = 100_000,
+        thread_delay: int = 0,
+        interleaving: Random | None = None,
     ) -> None:
         #: Called with the id of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
@@ -91,6 +109,9 @@ class ScriptInterpreter:
         #: The runtime exception that ended the program.
         self.error: RuntimeException | None = None
         self.fuel = 0
+        self.interleaves = interleaving is not None
+        self._random = interleaving
+        self._thread_delay = thread_delay
         self._budget = instruction_budget
         self._is_secondary = program.kind == 'sec'
         self._current: _Thread | None = None
@@ -142,13 +163,36 @@ class ScriptInterpreter:
         """Run one frame: every live thread until it yields or ends."""
         if self.paused:
             return
-        for thread in self._threads:  # grows while threads are started
-            if thread.alive:
-                self._resume(thread)
+        for thread in self._threads:
+            thread.fuel, thread.took_time = self._budget, False
+            thread.delay -= 1
+        for thread in self._runnable_threads():
+            self._resume(thread)
             if self._halted:
                 self.stop()
                 return
         self._threads = [thread for thread in self._threads if thread.alive]
+
+    def _runnable_threads(self) -> Iterator[_Thread]:
+        """Yield each thread that can run until it has taken the time of this frame."""
+        if self._random is None:
+            for thread in self._threads:  # grows while threads are started
+                if thread.alive and thread.delay <= 0:
+                    yield thread
+            return
+        waiting: list[_Thread] = []
+        known = 0
+        while True:
+            waiting += self._threads[known:]
+            known = len(self._threads)
+            waiting = [
+                thread
+                for thread in waiting
+                if thread.alive and thread.delay <= 0 and not thread.took_time
+            ]
+            if not waiting:
+                return
+            yield self._random.choice(waiting)
 
     def resume(self) -> None:
         """Go on after `pause`."""
@@ -171,11 +215,11 @@ class ScriptInterpreter:
 
     def _resume(self, thread: _Thread) -> None:
         """Let one thread run up to its next yield."""
-        self.fuel = self._budget
+        self.fuel = thread.fuel
         self._current = thread
         ended = True
         try:
-            next(thread.steps)
+            thread.took_time = next(thread.steps) is not SWITCH
             ended = False
         except StopIteration:
             self._halted = self._halted or thread.parent is None
@@ -189,6 +233,7 @@ class ScriptInterpreter:
             self.error, self._halted = recursion_error(*thread.location), True
         finally:
             self._current = None
+            thread.fuel = self.fuel
         if ended:
             self._end(thread)
 
@@ -211,13 +256,27 @@ class ScriptInterpreter:
         """Raise: the thread used up its budget without yielding."""
         raise RuntimeException(BUDGET_EXCEEDED, line, column)
 
+    def switches_now(self) -> bool:
+        """Tell whether another thread goes on before the next statement."""
+        return (
+            self._random is not None
+            and not self.thread.in_critical_section
+            and self._random.random() < SWITCH_PROBABILITY
+        )
+
     def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
-        """Start a thread; it runs in this frame, after all earlier ones."""
+        """Start a thread; without a delay it can run in this frame."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
         if len(self._threads) >= MAX_THREADS:
             raise RuntimeException(f'More than {MAX_THREADS} threads run at once.')
-        thread = _Thread(self.threads_started, procedure.steps(), self.thread)
+        thread = _Thread(
+            self.threads_started,
+            procedure.steps(),
+            self.thread,
+            delay=self._thread_delay,
+            fuel=self._budget,
+        )
         self.threads_started += 1
         self._threads.append(thread)
         return ThreadHandle(thread.number)
