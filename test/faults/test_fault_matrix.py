@@ -1,8 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
+"""
+Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time.
 
-from typing import Any
+A sample of its cells also runs on controllers that schedule the threads of our program otherwise:
+new threads begin later, or threads take turns at random. It is drawn anew in each run; the seed is
+printed, and ``THREAD_SEED=N`` draws it again. The whole matrix runs on such a controller with
+``THREADS='delay 3'`` or ``THREADS='seed 7'``.
+"""
+
+import os
+from random import Random
+from typing import Any, cast
 
 from fault_cell import run_scenario
 from fault_goals import BlendGoal, GOALS
@@ -51,6 +60,25 @@ def test_a_goal_ends_as_the_table_says_and_the_next_one_works(kind, phases, row,
             await run_scenario(cell, row.at(phase), phase, kind)
 
     run_cell(all_phases, **settings)
+
+
+THREAD_SEED = os.environ.get('THREAD_SEED') or str(Random().randrange(10**6))
+#: Cells in the sample.
+SAMPLES = 30
+
+
+@pytest.mark.parametrize('sample', range(SAMPLES))
+def test_threads_may_be_scheduled_otherwise(sample):
+    draw = Random(f'{THREAD_SEED} {sample}')
+    kind, phases, row, settings = cast(tuple[Any, ...], draw.choice(CASES).values)
+    phase = draw.choice(list(row.phases or phases))
+    threads = draw.choice(['delay 1', 'delay 3', f'seed {draw.randrange(10**6)}'])
+    print(f'THREAD_SEED={THREAD_SEED}: {threads}, {kind.__name__}, {row.fault}, {phase}')
+
+    async def one_phase(cell):
+        await run_scenario(cell, row.at(phase), phase, kind)
+
+    run_cell(one_phase, threads=threads, **settings)
 
 
 def test_every_fault_that_can_be_injected_is_in_the_table():

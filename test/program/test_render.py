@@ -145,10 +145,21 @@ def test_a_fraction_after_an_int_is_found(widened):
 def test_handles_of_threads_are_killed_and_not_compared():
     """What a controller makes of a handle beside a number is written nowhere."""
     handles = re.findall(r'(\w+) = run ', text())
-    assert len(handles) == 6
+    assert len(handles) == 5
     for handle in handles:
         assert re.search(rf'kill {handle}\b', text())
         assert not re.search(rf'\b{handle} *[!=]=|[!=]= *{handle}\b', text())
+
+
+def test_one_function_stops_the_motion_of_another_thread_in_one_critical_section():
+    lines = [line.strip() for line in text(allow_freedrive=True).splitlines()]
+    assert sum('stopj(' in line for line in lines) == 1
+    begin = lines.index('def stop_arm():')
+    section = lines[begin : lines.index('exit_critical', begin)]
+    assert section[1] == 'enter_critical'
+    assert section[-1] == 'brake()'
+    for mover in ('motion_thread', 'servo_control_thread'):
+        assert lines.count(f'kill {mover}') == section.count(f'kill {mover}') == 1
 
 
 @pytest.mark.parametrize('host', ['', '1.2.3.4"', 'a b', 'x\n'])

@@ -6,6 +6,9 @@ A cell in virtual time: simulated controller, robot loop, and its owner, in one 
 The robot loop is the one of the driver with all its sockets, the controller the one behind
 ``ur-cartesian sim``; only time and network are those of :mod:`virtual_network`. Cycles take 8 ms,
 as those of a CB3 robot, because each costs computing time.
+
+With the environment variable ``THREADS='delay N'`` new threads of the robot program begin N cycles
+later, and with ``THREADS='seed N'`` its threads take turns at random.
 """
 
 from __future__ import annotations
@@ -139,9 +142,9 @@ class Owner:
 class RobotCell:
     """Simulated controller, robot loop and owner; used inside :func:`run_cell`."""
 
-    def __init__(self, loop, *, headless, settings):
+    def __init__(self, loop, *, headless, settings, threads=''):
         self.loop, self.headless = loop, headless
-        self._settings = settings
+        self._threads, self._settings = threads, settings
         self.owner = Owner()
         self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None
@@ -162,6 +165,7 @@ class RobotCell:
                 secondary_port=30002,
                 realtime_port=30003,
                 interpreter_port=30020,
+                **thread_schedule(self._threads),
             )
         )
         self.config = DriverConfig(
@@ -290,20 +294,37 @@ class RobotCell:
         self.owner.send(ResendProgram())
 
 
+def thread_schedule(text: str) -> dict[str, Any]:
+    """Return settings of the simulator for 'delay N', 'seed N' or nothing."""
+    match text.split():
+        case []:
+            return {}
+        case ['delay', count]:
+            return {'thread_delay': int(count)}
+        case ['seed', number]:
+            return {'interleaving_seed': int(number)}
+    raise ValueError(f"THREADS is {text!r}; use 'delay N' or 'seed N'.")
+
+
 def run_cell(
     scenario: Callable[[RobotCell], Coroutine[Any, Any, T]],
     *,
     headless: bool = True,
+    threads: str = os.environ.get('THREADS', ''),
     **settings: Any,
 ) -> T:
-    """Run ``scenario(cell)`` in a cell that is ready for goals; return its result."""
+    """
+    Run ``scenario(cell)`` in a cell that is ready for goals; return its result.
+
+    :param threads: how the controller schedules threads, see :func:`thread_schedule`.
+    """
     loop = VirtualLoop()
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
-        return runner.run(_run(loop, scenario, headless, settings))
+        return runner.run(_run(loop, scenario, headless, threads, settings))
 
 
-async def _run(loop, scenario, headless, settings):
-    cell = RobotCell(loop, headless=headless, settings=settings)
+async def _run(loop, scenario, headless, threads, settings):
+    cell = RobotCell(loop, headless=headless, threads=threads, settings=settings)
     try:
         await cell.start()
         return await scenario(cell)
