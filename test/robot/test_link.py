@@ -104,7 +104,7 @@ def test_a_program_that_was_told_to_end_takes_no_goal_until_it_has(ur_sim):
             ear.link.stop_program('a test')
             ear.link.set_executing(False)
             assert ear.link.status.state is ConnectionState.CONNECTED
-            assert 'told to end' in ear.link.not_ready()
+            assert 'told to end' in ear.link.status.not_ready()
 
     asyncio.run(run())
 

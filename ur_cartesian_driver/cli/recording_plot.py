@@ -18,7 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES, PART_SUFFIX
+from ur_cartesian_driver.driver.recordings.recording_format import (
+    EXECUTED_DTYPE,
+    OUTPUT_NAMES,
+    PART_SUFFIX,
+)
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 
 #: Largest number of packets in a picture.
@@ -66,33 +70,13 @@ def newest_recording(path: Path) -> Path:
 def write_table(recording: Recording, file: Path) -> None:
     """Write all packets as comma-separated values, and the deviation from the plan."""
     deviation = recording.deviation()
+    executed = {name: getattr(recording, name) for name in EXECUTED_DTYPE.names or ()}
     columns: dict[str, NDArray[Any]] = {'time': recording.time}
-    for name, axes in (
-        ('actual_pose', _POSE),
-        ('target_pose', _POSE),
-        ('actual_twist', _TWIST),
-        ('target_twist', _TWIST),
-        ('actual_q', '012345'),
-        ('target_q', '012345'),
-        ('actual_qd', '012345'),
-        ('target_qd', '012345'),
-        ('analog_output', '01'),
-    ):
-        values = getattr(recording, name)
-        columns |= {f'{name}_{axis}': values[:, i] for i, axis in enumerate(axes)}
-    for name in (
-        'lag',
-        'buffered',
-        'speed_scaling',
-        'slider',
-        'digital_output',
-        'points_begun',
-        'waypoint',
-        'robot_mode',
-        'safety_mode',
-        'runtime_state',
-    ):
-        columns[name] = getattr(recording, name)
+    for name, values in executed.items():
+        if values.ndim > 1:
+            axes = _AXIS_NAMES.get(name.rpartition('_')[2], '012345')
+            columns |= {f'{name}_{axes[i]}': column for i, column in enumerate(values.T)}
+    columns |= {name: values for name, values in executed.items() if values.ndim == 1}
     columns |= {
         'deviation_position': deviation.position,
         'deviation_angle': deviation.angle,
@@ -104,8 +88,11 @@ def write_table(recording: Recording, file: Path) -> None:
         writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
 
-_POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
-_TWIST = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+#: Names of the columns of a pose and of a twist; those of other rows have numbers.
+_AXIS_NAMES = {
+    'pose': ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw'),
+    'twist': ('x', 'y', 'z', 'rx', 'ry', 'rz'),
+}
 
 
 # ---- the picture ----------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.sim import SimulatorConfig
 
 
@@ -69,8 +70,7 @@ def validate(arguments: argparse.Namespace) -> int:
 
 def stationary_state(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
     """Return the state of an arm at rest."""
-    a, b, c, d, e, f = q
-    joints = (a, b, c, d, e, f)
+    joints = vector6(q)
     pose = arm.forward(joints) @ T_flange_tcp
     return RobotState(
         timestamp=0.0,

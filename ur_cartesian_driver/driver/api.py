@@ -16,7 +16,6 @@ import contextlib
 from dataclasses import replace
 import itertools
 import threading
-from types import TracebackType
 
 from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.driver.callbacks import LOG, run_callback
@@ -157,12 +156,7 @@ class Driver(RobotServices, InteractiveMotions):
         self.open()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 

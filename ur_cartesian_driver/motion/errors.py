@@ -34,7 +34,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
-from types import MappingProxyType
 from typing import ClassVar, TypeVar
 
 _Error = TypeVar('_Error', bound='DriverError')
@@ -238,15 +237,13 @@ class RemoteProtocolError(ProtocolError):
 
 #: The error of every code but SUCCESSFUL: the direct subclasses of :class:`GoalRefused`, raised
 #: before the motion, and of :class:`ExecutionEnded`, which end it.
-ERRORS: Mapping[ErrorCode, type[DriverError]] = MappingProxyType(
-    {
-        error.code: error
-        for error in sorted(
-            [*GoalRefused.__subclasses__(), *ExecutionEnded.__subclasses__()],
-            key=lambda error: -error.code,
-        )
-    }
-)
+ERRORS: Mapping[ErrorCode, type[DriverError]] = {
+    error.code: error
+    for error in sorted(
+        [*GoalRefused.__subclasses__(), *ExecutionEnded.__subclasses__()],
+        key=lambda error: -error.code,
+    )
+}
 
 
 def error_of_outcome(code: ErrorCode, text: str, report: tuple[str, ...] = ()) -> DriverError:

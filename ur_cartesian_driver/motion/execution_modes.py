@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from types import MappingProxyType
 
 
 class ExecutionMode(IntEnum):
@@ -55,31 +54,29 @@ class ModeTraits:
 
 
 #: All modes but AUTO.
-EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = MappingProxyType(
-    {
-        ExecutionMode.PRIMITIVES: ModeTraits(
-            planner='ur_cartesian_driver.planning.planner:plan_moves',
-            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
-            is_spline=False,
-            streams_setpoints=False,
-            switches_outputs=True,
-            can_keep_open=True,
-        ),
-        ExecutionMode.SPLINE: ModeTraits(
-            planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
-            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
-            is_spline=True,
-            streams_setpoints=False,
-            switches_outputs=True,
-            can_keep_open=True,
-        ),
-        ExecutionMode.SERVO: ModeTraits(
-            planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
-            feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:servo_feeder',
-            is_spline=True,
-            streams_setpoints=True,
-            switches_outputs=False,
-            can_keep_open=False,
-        ),
-    }
-)
+EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
+    ExecutionMode.PRIMITIVES: ModeTraits(
+        planner='ur_cartesian_driver.planning.planner:plan_moves',
+        feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
+        is_spline=False,
+        streams_setpoints=False,
+        switches_outputs=True,
+        can_keep_open=True,
+    ),
+    ExecutionMode.SPLINE: ModeTraits(
+        planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
+        feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:point_feeder',
+        is_spline=True,
+        streams_setpoints=False,
+        switches_outputs=True,
+        can_keep_open=True,
+    ),
+    ExecutionMode.SERVO: ModeTraits(
+        planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
+        feeder='ur_cartesian_driver.driver.loop.goal_machine_factory:servo_feeder',
+        is_spline=True,
+        streams_setpoints=True,
+        switches_outputs=False,
+        can_keep_open=False,
+    ),
+}

@@ -124,28 +124,26 @@ def required_action(
                 'The robot program was told to end but is still connected; if it stays, stop it '
                 'on the pendant.'
             )
-        return (
-            (
+        if tcp_restore_pending:
+            return (
                 'The TCP of the last goal is still active and will be restored; if this takes '
                 'long, set the right one on the robot.'
             )
-            if tcp_restore_pending
-            else ''
-        )
+        return ''
     return _needed_to_start(headless_mode, foreign_program)
 
 
 def _needed_to_start(headless_mode: bool, foreign_program: bool) -> str:
     """Return the sentence that says how our program gets to run."""
     if foreign_program:
+        remedy = (
+            'call resend_robot_program'
+            if headless_mode
+            else 'play a program whose External Control node calls this computer'
+        )
         return (
             'Another program runs on the robot, maybe that of another driver. Let it end, or '
-            'stop it; then '
-            + (
-                'call resend_robot_program.'
-                if headless_mode
-                else 'play a program whose External Control node calls this computer.'
-            )
+            f'stop it; then {remedy}.'
         )
     if headless_mode:
         return 'The robot program does not run; call resend_robot_program when the arm may move.'

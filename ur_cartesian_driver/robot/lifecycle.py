@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import auto, Enum, IntEnum
-from types import MappingProxyType
 
 
 class ConnectionState(IntEnum):
@@ -56,43 +55,39 @@ class ConnectionEvent(Enum):
 S, E = ConnectionState, ConnectionEvent
 
 #: An event that a state does not name leaves it unchanged.
-TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = (
-    MappingProxyType(
-        {
-            S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
-            S.CONNECTING: {
-                E.ROBOT_ACCEPTED: S.CONNECTED,
-                E.ROBOT_REFUSED: S.REFUSED,
-                E.ROBOT_LOST: S.DISCONNECTED,
-            },
-            S.CONNECTED: {
-                E.PROGRAM_CONNECTED: S.READY,
-                E.ROBOT_STOPPED: S.STOPPED,
-                E.ROBOT_LOST: S.DISCONNECTED,
-            },
-            S.READY: {
-                E.GOAL_STARTED: S.EXECUTING,
-                E.PROGRAM_PAUSED: S.CONNECTED,
-                E.PROGRAM_LOST: S.CONNECTED,
-                E.TCP_RESTORE_PENDING: S.CONNECTED,
-                E.ROBOT_STOPPED: S.STOPPED,
-                E.ROBOT_LOST: S.DISCONNECTED,
-            },
-            S.EXECUTING: {
-                E.GOAL_ENDED: S.READY,
-                E.PROGRAM_LOST: S.CONNECTED,
-                E.TCP_RESTORE_PENDING: S.CONNECTED,
-                E.ROBOT_STOPPED: S.STOPPED,
-                E.ROBOT_LOST: S.DISCONNECTED,
-            },
-            S.STOPPED: {
-                E.STOP_CLEARED: S.CONNECTED,
-                E.ROBOT_LOST: S.DISCONNECTED,
-            },
-            S.REFUSED: {E.ROBOT_LOST: S.DISCONNECTED},
-        }
-    )
-)
+TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = {
+    S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
+    S.CONNECTING: {
+        E.ROBOT_ACCEPTED: S.CONNECTED,
+        E.ROBOT_REFUSED: S.REFUSED,
+        E.ROBOT_LOST: S.DISCONNECTED,
+    },
+    S.CONNECTED: {
+        E.PROGRAM_CONNECTED: S.READY,
+        E.ROBOT_STOPPED: S.STOPPED,
+        E.ROBOT_LOST: S.DISCONNECTED,
+    },
+    S.READY: {
+        E.GOAL_STARTED: S.EXECUTING,
+        E.PROGRAM_PAUSED: S.CONNECTED,
+        E.PROGRAM_LOST: S.CONNECTED,
+        E.TCP_RESTORE_PENDING: S.CONNECTED,
+        E.ROBOT_STOPPED: S.STOPPED,
+        E.ROBOT_LOST: S.DISCONNECTED,
+    },
+    S.EXECUTING: {
+        E.GOAL_ENDED: S.READY,
+        E.PROGRAM_LOST: S.CONNECTED,
+        E.TCP_RESTORE_PENDING: S.CONNECTED,
+        E.ROBOT_STOPPED: S.STOPPED,
+        E.ROBOT_LOST: S.DISCONNECTED,
+    },
+    S.STOPPED: {
+        E.STOP_CLEARED: S.CONNECTED,
+        E.ROBOT_LOST: S.DISCONNECTED,
+    },
+    S.REFUSED: {E.ROBOT_LOST: S.DISCONNECTED},
+}
 
 
 def next_state(state: ConnectionState, event: ConnectionEvent) -> ConnectionState:

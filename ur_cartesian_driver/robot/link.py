@@ -247,10 +247,6 @@ class RobotLink:
             return 'wire_dialect says that the robot has an older one; play that on the pendant'
         return ''
 
-    def not_ready(self) -> str:
-        """Return why no goal can run now; empty when one can."""
-        return self.status.not_ready()
-
     # ---- connection ---------------------------------------------------------------------------
 
     async def _stay_connected(self) -> NoReturn:

@@ -17,7 +17,6 @@ from pathlib import Path
 import signal
 import threading
 from time import monotonic
-from types import TracebackType
 from typing import Any, TypeAlias
 
 from action_msgs.msg import GoalStatus
@@ -190,12 +189,7 @@ class GoalClient:
         """Return the client."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the client."""
         self.close()
 

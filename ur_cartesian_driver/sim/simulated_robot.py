@@ -15,7 +15,6 @@ from concurrent.futures import Future
 import contextlib
 from dataclasses import dataclass
 import threading
-from types import TracebackType
 from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.pose import Pose
@@ -178,12 +177,7 @@ class SimulatedRobot:
         """Start."""
         return self.start()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 

@@ -54,14 +54,12 @@ class DriverConfig(LinkSettings):
         :raises ValueError: names the field, its value and the bound.
         """
         LinkSettings.__post_init__(self)  # super() does not work in a class with slots
-        if self.robot_loop not in ('process', 'thread'):
-            raise ValueError(
-                f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'."
-            )
-        if self.on_robot_stop not in ('abort', 'continue'):
-            raise ValueError(
-                f"on_robot_stop is {self.on_robot_stop!r}, it has to be 'abort' or 'continue'."
-            )
+        for name, first, second in (
+            ('robot_loop', 'process', 'thread'),
+            ('on_robot_stop', 'abort', 'continue'),
+        ):
+            if (value := getattr(self, name)) not in (first, second):
+                raise ValueError(f'{name} is {value!r}, it has to be {first!r} or {second!r}.')
         self._require_positive(
             'feedback_rate', 'node_timeout', 'keep_open_margin', 'record_max_size'
         )
@@ -72,11 +70,8 @@ class DriverConfig(LinkSettings):
             )
         self._require_within('servo_target_lag', 0.008, 0.2)
         self._require_within('servo_max_divergence', 0.01, 3.0)
-        if not self.keep_open_timeout >= 0.0:
-            raise ValueError(
-                f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.'
-            )
         for name in (
+            'keep_open_timeout',
             'max_plan_deviation',
             'max_plan_deviation_angle',
             'max_calibration_difference',

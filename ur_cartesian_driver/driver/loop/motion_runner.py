@@ -146,7 +146,7 @@ class MotionRunner:
             return 'Another motion is running; wait for its end or cancel it.'
         if self._is_changing_settings():
             return 'TCP or payload is being set; send the goal again.'
-        if reason := self._link.not_ready():
+        if reason := self._link.status.not_ready():
             return reason
         state = self._newest.latest
         if state is None or same_tcp(state.T_flange_tcp, job.T_flange_active):

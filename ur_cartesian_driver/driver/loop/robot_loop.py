@@ -45,7 +45,6 @@ from ur_cartesian_driver.driver.loop.newest_state import NewestState
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
-from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.events import CancelRequested, Tick
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
@@ -76,7 +75,7 @@ class RobotLoop:
             on_state=self._newest.keep,
             on_event=lambda event: self._motion.handle_event(event),
             on_status=self._status_changed,
-            on_geometry=self._geometry_known,
+            on_geometry=lambda dh: self._pipe.send(GeometryReceived(geometry=dh)),
             on_signals=self._signals_changed,
             on_log=self._pipe.log,
             may_upload=configure.may_upload,
@@ -209,9 +208,6 @@ class RobotLoop:
         answer = await self._dispatcher.dispatch(DashboardCall(command='get serial number'))
         if answer.ok:
             self._link.set_serial_number(answer.text)
-
-    def _geometry_known(self, geometry: DhTable) -> None:
-        self._pipe.send(GeometryReceived(geometry=geometry))
 
     def _signals_changed(self, signals: Signals) -> None:
         self._motion.record_signals(signals)

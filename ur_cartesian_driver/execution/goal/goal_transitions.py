@@ -52,7 +52,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
-from types import MappingProxyType
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -117,14 +116,12 @@ RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
 #: Signals that stop the arm in every state but ENDED, and the code with which the goal ends where
 #: none is decided yet.
-STOP_SIGNALS: Mapping[GoalSignal, ErrorCode] = MappingProxyType(
-    {
-        GoalSignal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
-        GoalSignal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
-        GoalSignal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
-        GoalSignal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
-    }
-)
+STOP_SIGNALS: Mapping[GoalSignal, ErrorCode] = {
+    GoalSignal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
+    GoalSignal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
+    GoalSignal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
+    GoalSignal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,100 +170,94 @@ _ON_USER_STOP = {
 }
 
 #: How a trajectory that runs is stopped, or ends by itself.
-_WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
-    {
-        **_ON_STOP,
-        GoalSignal.CANCELED: _decide(ErrorCode.EXECUTION_FAILED),
-        GoalSignal.FAILURE: _decide(ErrorCode.EXECUTION_FAILED),
-        GoalSignal.CANCEL: Transition(GoalState.CANCELLING, ErrorCode.CANCELLED),
-        GoalSignal.PREEMPT: Transition(GoalState.CANCELLING, ErrorCode.PREEMPTED),
-        GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
-        GoalSignal.DEVIATION: Transition(GoalState.CANCELLING, ErrorCode.EXECUTION_FAILED),
-        GoalSignal.STALLED: _end(ErrorCode.EXECUTION_FAILED),
-    }
-)
+_WHILE_RUNNING: Mapping[GoalSignal, Transition] = {
+    **_ON_STOP,
+    GoalSignal.CANCELED: _decide(ErrorCode.EXECUTION_FAILED),
+    GoalSignal.FAILURE: _decide(ErrorCode.EXECUTION_FAILED),
+    GoalSignal.CANCEL: Transition(GoalState.CANCELLING, ErrorCode.CANCELLED),
+    GoalSignal.PREEMPT: Transition(GoalState.CANCELLING, ErrorCode.PREEMPTED),
+    GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+    GoalSignal.DEVIATION: Transition(GoalState.CANCELLING, ErrorCode.EXECUTION_FAILED),
+    GoalSignal.STALLED: _end(ErrorCode.EXECUTION_FAILED),
+}
 
 #: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED,
 #: RESTORED, AT_REST, TIMEOUT and UNANSWERED cannot happen in the states that do not list them.
-TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyType(
-    {
-        GoalState.ARMING: {
-            **_ON_STOP,
-            # Of a goal before this one.
-            **_ignore(GoalState.ARMING, *_RESULTS),
-            GoalSignal.ARMED: Transition(GoalState.MOVING),
-            **_ON_USER_STOP,
-            GoalSignal.TIMEOUT: _decide(ErrorCode.ROBOT_NOT_READY),
-        },
-        GoalState.MOVING: {
-            **_WHILE_RUNNING,
-            GoalSignal.SUCCESS: Transition(GoalState.SETTLING),
-            GoalSignal.STARVING: Transition(GoalState.RUNNING_OUT),
-        },
-        GoalState.RUNNING_OUT: {
-            **_WHILE_RUNNING,
-            GoalSignal.SUCCESS: Transition(GoalState.AWAITING_POINTS),
-        },
-        GoalState.AWAITING_POINTS: {
-            **_ON_STOP,
-            **_ignore(GoalState.AWAITING_POINTS, *_RESULTS),
-            GoalSignal.APPENDED: Transition(GoalState.MOVING),
-            GoalSignal.NO_MORE_POINTS: Transition(GoalState.SETTLING),
-            **_ON_USER_STOP,
-            GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
-            GoalSignal.TIMEOUT: _decide(ErrorCode.CANCELLED),
-        },
-        GoalState.SETTLING: {
-            **_ON_STOP,
-            **_ignore(GoalState.SETTLING, *_RESULTS),
-            **_ON_USER_STOP,
-            GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
-            GoalSignal.SETTLED: _decide(ErrorCode.SUCCESSFUL),
-            GoalSignal.TIMEOUT: _decide(ErrorCode.GOAL_TOLERANCE_VIOLATED),
-        },
-        GoalState.CANCELLING: {
-            **_ON_STOP,
-            **_ignore(GoalState.CANCELLING, GoalSignal.SUCCESS, GoalSignal.FAILURE, *_USER_STOPS),
-            GoalSignal.CANCELED: Transition(GoalState.COMING_TO_REST),
-            GoalSignal.UNANSWERED: Transition(GoalState.ENDED),
-            GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
-        },
-        GoalState.COMING_TO_REST: {
-            **_ON_STOP,
-            **_ignore(GoalState.COMING_TO_REST, *_RESULTS, *_USER_STOPS),
-            GoalSignal.AT_REST: Transition(GoalState.RESTORING),
-            GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
-        },
-        GoalState.RESTORING: {
-            **{signal: Transition(GoalState.ENDED) for signal in STOP_SIGNALS},
-            **_ignore(GoalState.RESTORING, *_RESULTS, *_USER_STOPS),
-            GoalSignal.RESTORED: Transition(GoalState.ENDED),
-            GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
-        },
-        GoalState.PROGRAM_LOST: {
-            **_ON_STOP,
-            **_ignore(GoalState.PROGRAM_LOST, *_RESULTS, *_USER_STOPS, GoalSignal.PROGRAM_STOPPED),
-            GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
-        },
-        GoalState.ENDED: {},
-    }
-)
+TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
+    GoalState.ARMING: {
+        **_ON_STOP,
+        # Of a goal before this one.
+        **_ignore(GoalState.ARMING, *_RESULTS),
+        GoalSignal.ARMED: Transition(GoalState.MOVING),
+        **_ON_USER_STOP,
+        GoalSignal.TIMEOUT: _decide(ErrorCode.ROBOT_NOT_READY),
+    },
+    GoalState.MOVING: {
+        **_WHILE_RUNNING,
+        GoalSignal.SUCCESS: Transition(GoalState.SETTLING),
+        GoalSignal.STARVING: Transition(GoalState.RUNNING_OUT),
+    },
+    GoalState.RUNNING_OUT: {
+        **_WHILE_RUNNING,
+        GoalSignal.SUCCESS: Transition(GoalState.AWAITING_POINTS),
+    },
+    GoalState.AWAITING_POINTS: {
+        **_ON_STOP,
+        **_ignore(GoalState.AWAITING_POINTS, *_RESULTS),
+        GoalSignal.APPENDED: Transition(GoalState.MOVING),
+        GoalSignal.NO_MORE_POINTS: Transition(GoalState.SETTLING),
+        **_ON_USER_STOP,
+        GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.TIMEOUT: _decide(ErrorCode.CANCELLED),
+    },
+    GoalState.SETTLING: {
+        **_ON_STOP,
+        **_ignore(GoalState.SETTLING, *_RESULTS),
+        **_ON_USER_STOP,
+        GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.SETTLED: _decide(ErrorCode.SUCCESSFUL),
+        GoalSignal.TIMEOUT: _decide(ErrorCode.GOAL_TOLERANCE_VIOLATED),
+    },
+    GoalState.CANCELLING: {
+        **_ON_STOP,
+        **_ignore(GoalState.CANCELLING, GoalSignal.SUCCESS, GoalSignal.FAILURE, *_USER_STOPS),
+        GoalSignal.CANCELED: Transition(GoalState.COMING_TO_REST),
+        GoalSignal.UNANSWERED: Transition(GoalState.ENDED),
+        GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
+    },
+    GoalState.COMING_TO_REST: {
+        **_ON_STOP,
+        **_ignore(GoalState.COMING_TO_REST, *_RESULTS, *_USER_STOPS),
+        GoalSignal.AT_REST: Transition(GoalState.RESTORING),
+        GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
+    },
+    GoalState.RESTORING: {
+        **{signal: Transition(GoalState.ENDED) for signal in STOP_SIGNALS},
+        **_ignore(GoalState.RESTORING, *_RESULTS, *_USER_STOPS),
+        GoalSignal.RESTORED: Transition(GoalState.ENDED),
+        GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
+    },
+    GoalState.PROGRAM_LOST: {
+        **_ON_STOP,
+        **_ignore(GoalState.PROGRAM_LOST, *_RESULTS, *_USER_STOPS, GoalSignal.PROGRAM_STOPPED),
+        GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
+    },
+    GoalState.ENDED: {},
+}
 
 
 #: The robot program's result of a trajectory, with a clause for the outcome's text.
-RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = MappingProxyType(
-    {
-        TrajectoryResult.SUCCESS: (GoalSignal.SUCCESS, ''),
-        TrajectoryResult.CANCELED: (
-            GoalSignal.CANCELED,
-            'the robot program cancelled the trajectory by itself',
-        ),
-        TrajectoryResult.FAILURE: (
-            GoalSignal.FAILURE,
-            'the robot program reported a failure; its log on the pendant says why',
-        ),
-    }
-)
+RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = {
+    TrajectoryResult.SUCCESS: (GoalSignal.SUCCESS, ''),
+    TrajectoryResult.CANCELED: (
+        GoalSignal.CANCELED,
+        'the robot program cancelled the trajectory by itself',
+    ),
+    TrajectoryResult.FAILURE: (
+        GoalSignal.FAILURE,
+        'the robot program reported a failure; its log on the pendant says why',
+    ),
+}
 
 
 _EMERGENCY_STOPS = int(

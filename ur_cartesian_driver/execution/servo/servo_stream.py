@@ -35,7 +35,6 @@ from dataclasses import dataclass
 from enum import auto, Enum
 from itertools import pairwise
 from math import ceil, inf
-from types import MappingProxyType
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
@@ -97,33 +96,31 @@ class ServoEvent(Enum):
 _STOPS = {ServoEvent.STOP: ServoPhase.LEAVING, ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT}
 
 #: Events that are not listed leave the phase unchanged.
-TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = MappingProxyType(
-    {
-        ServoPhase.OPENING: {
-            ServoEvent.OPENED: ServoPhase.ENTERING,
-            ServoEvent.STOP: ServoPhase.LEFT,
-        },
-        ServoPhase.ENTERING: {
-            ServoEvent.ANSWERED: ServoPhase.READY,
-            ServoEvent.STOP: ServoPhase.LEAVING,
-        },
-        ServoPhase.READY: {
-            ServoEvent.BEGUN: ServoPhase.FILLING,
-            ServoEvent.STOP: ServoPhase.LEAVING,
-        },
-        ServoPhase.FILLING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
-        ServoPhase.SERVOING: {
-            ServoEvent.AT_END: ServoPhase.DRAINING,
-            ServoEvent.EMPTY: ServoPhase.HOLDING,
-            **_STOPS,
-        },
-        ServoPhase.HOLDING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
-        ServoPhase.DRAINING: {ServoEvent.DONE: ServoPhase.ARRIVED, **_STOPS},
-        ServoPhase.ARRIVED: {**_STOPS},
-        ServoPhase.LEAVING: {ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT},
-        ServoPhase.LEFT: {},
-    }
-)
+TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = {
+    ServoPhase.OPENING: {
+        ServoEvent.OPENED: ServoPhase.ENTERING,
+        ServoEvent.STOP: ServoPhase.LEFT,
+    },
+    ServoPhase.ENTERING: {
+        ServoEvent.ANSWERED: ServoPhase.READY,
+        ServoEvent.STOP: ServoPhase.LEAVING,
+    },
+    ServoPhase.READY: {
+        ServoEvent.BEGUN: ServoPhase.FILLING,
+        ServoEvent.STOP: ServoPhase.LEAVING,
+    },
+    ServoPhase.FILLING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
+    ServoPhase.SERVOING: {
+        ServoEvent.AT_END: ServoPhase.DRAINING,
+        ServoEvent.EMPTY: ServoPhase.HOLDING,
+        **_STOPS,
+    },
+    ServoPhase.HOLDING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
+    ServoPhase.DRAINING: {ServoEvent.DONE: ServoPhase.ARRIVED, **_STOPS},
+    ServoPhase.ARRIVED: {**_STOPS},
+    ServoPhase.LEAVING: {ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT},
+    ServoPhase.LEFT: {},
+}
 
 #: Phases in which set-points lead the arm.
 STREAMING = frozenset(
@@ -135,15 +132,13 @@ STREAMING = frozenset(
         ServoPhase.ARRIVED,
     }
 )
-_ACTIVITIES: Mapping[ServoPhase, ServoActivity] = MappingProxyType(
-    {
-        ServoPhase.FILLING: ServoActivity.FILLING,
-        ServoPhase.SERVOING: ServoActivity.SERVOING,
-        ServoPhase.HOLDING: ServoActivity.HOLDING,
-        ServoPhase.DRAINING: ServoActivity.DRAINING,
-        ServoPhase.ARRIVED: ServoActivity.DRAINING,
-    }
-)
+_ACTIVITIES: Mapping[ServoPhase, ServoActivity] = {
+    ServoPhase.FILLING: ServoActivity.FILLING,
+    ServoPhase.SERVOING: ServoActivity.SERVOING,
+    ServoPhase.HOLDING: ServoActivity.HOLDING,
+    ServoPhase.DRAINING: ServoActivity.DRAINING,
+    ServoPhase.ARRIVED: ServoActivity.DRAINING,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
@@ -34,20 +33,16 @@ ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
 #: What to use where its Robot API has no such command; others are done on the pendant.
-REPLACEMENTS: Mapping[str, str] = MappingProxyType(
-    {
-        **dict.fromkeys(
-            ('power on', 'brake release', 'unlock protective stop'),
-            'call recover, or do it on the pendant',
-        ),
-        'robotmode': 'see the topic robot_mode',
-        **dict.fromkeys(('safetymode', 'safetystatus'), 'see the topic safety_mode'),
-        **dict.fromkeys(('running', 'programState'), 'see the diagnostics'),
-        **dict.fromkeys(
-            ('PolyscopeVersion', 'version', 'get robot model'), 'see the topic status'
-        ),
-    }
-)
+REPLACEMENTS: Mapping[str, str] = {
+    **dict.fromkeys(
+        ('power on', 'brake release', 'unlock protective stop'),
+        'call recover, or do it on the pendant',
+    ),
+    'robotmode': 'see the topic robot_mode',
+    **dict.fromkeys(('safetymode', 'safetystatus'), 'see the topic safety_mode'),
+    **dict.fromkeys(('running', 'programState'), 'see the diagnostics'),
+    **dict.fromkeys(('PolyscopeVersion', 'version', 'get robot model'), 'see the topic status'),
+}
 
 UNLOCK = 'unlock protective stop'
 #: Begins the answer to an unlock that comes too early.

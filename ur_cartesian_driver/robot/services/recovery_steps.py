@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
-from types import MappingProxyType
 
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -39,68 +38,62 @@ class RecoveryStep(Enum):
 
 
 #: The step in a sentence, as an imperative.
-STEP_NAMES: Mapping[RecoveryStep, str] = MappingProxyType(
-    {
-        RecoveryStep.UNLOCK: 'unlock the protective stop',
-        RecoveryStep.RESTART_SAFETY: 'restart the safety system',
-        RecoveryStep.POWER_ON: 'switch the arm on',
-        RecoveryStep.RELEASE_BRAKES: 'release the brakes',
-        RecoveryStep.STOP_PROGRAM: 'stop the paused program',
-        RecoveryStep.SEND_PROGRAM: 'send the robot program',
-        RecoveryStep.PLAY: 'play the loaded program',
-    }
-)
+STEP_NAMES: Mapping[RecoveryStep, str] = {
+    RecoveryStep.UNLOCK: 'unlock the protective stop',
+    RecoveryStep.RESTART_SAFETY: 'restart the safety system',
+    RecoveryStep.POWER_ON: 'switch the arm on',
+    RecoveryStep.RELEASE_BRAKES: 'release the brakes',
+    RecoveryStep.STOP_PROGRAM: 'stop the paused program',
+    RecoveryStep.SEND_PROGRAM: 'send the robot program',
+    RecoveryStep.PLAY: 'play the loaded program',
+}
 
 _GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
 _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
 _ENABLE = 'An enabling device is in use: release it, or choose automatic mode.'
 
 #: The step for each safety mode; a sentence = a person has to act, None = no step.
-SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
-    {
-        SafetyMode.NORMAL: None,
-        SafetyMode.REDUCED: None,
-        SafetyMode.PROTECTIVE_STOP: RecoveryStep.UNLOCK,
-        SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
-        SafetyMode.SAFEGUARD_STOP: _GUARD,
-        SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
-        SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
-        SafetyMode.VIOLATION: RecoveryStep.RESTART_SAFETY,
-        SafetyMode.FAULT: RecoveryStep.RESTART_SAFETY,
-        SafetyMode.VALIDATE_JOINT_ID: (
-            'A joint has to be identified: follow the instructions on the pendant.'
-        ),
-        SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is unknown: check the pendant.',
-        SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
-        SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
-        SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
-        SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
-        SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
-        SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: (
-            'The safety system waits for the PROFIsafe controller: start it.'
-        ),
-        SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
-        SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
-        SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,
-        SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
-    }
-)
+SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = {
+    SafetyMode.NORMAL: None,
+    SafetyMode.REDUCED: None,
+    SafetyMode.PROTECTIVE_STOP: RecoveryStep.UNLOCK,
+    SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
+    SafetyMode.SAFEGUARD_STOP: _GUARD,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.VIOLATION: RecoveryStep.RESTART_SAFETY,
+    SafetyMode.FAULT: RecoveryStep.RESTART_SAFETY,
+    SafetyMode.VALIDATE_JOINT_ID: (
+        'A joint has to be identified: follow the instructions on the pendant.'
+    ),
+    SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is unknown: check the pendant.',
+    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
+    SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
+    SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: (
+        'The safety system waits for the PROFIsafe controller: start it.'
+    ),
+    SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
+}
 
 #: The same for power and brakes.
-POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = MappingProxyType(
-    {
-        RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
-        RobotMode.DISCONNECTED: 'The arm is not connected to its controller: check the pendant.',
-        RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
-        RobotMode.BOOTING: RecoveryStep.WAIT,
-        RobotMode.POWER_OFF: RecoveryStep.POWER_ON,
-        RobotMode.POWER_ON: RecoveryStep.WAIT,
-        RobotMode.IDLE: RecoveryStep.RELEASE_BRAKES,
-        RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
-        RobotMode.RUNNING: None,
-        RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
-    }
-)
+POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = {
+    RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
+    RobotMode.DISCONNECTED: 'The arm is not connected to its controller: check the pendant.',
+    RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
+    RobotMode.BOOTING: RecoveryStep.WAIT,
+    RobotMode.POWER_OFF: RecoveryStep.POWER_ON,
+    RobotMode.POWER_ON: RecoveryStep.WAIT,
+    RobotMode.IDLE: RecoveryStep.RELEASE_BRAKES,
+    RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
+    RobotMode.RUNNING: None,
+    RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
