@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 import logging
+from typing import Any
 
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, timestamped
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
@@ -43,14 +44,13 @@ class LinkStatus:
         """The state of the connection."""
         return self.current.state
 
-    def apply(self, event: ConnectionEvent, **changes: object) -> None:
+    def apply(self, event: ConnectionEvent, **changes: Any) -> None:
         """Go to the state that the table of the life cycle names, with other changes."""
         self.update(state=next_state(self.state, event), **changes)
 
-    def update(self, **changes: object) -> None:
+    def update(self, **changes: Any) -> None:
         """Change fields of the status, and work out what is needed now."""
-        # Callers name fields; mypy cannot follow names.
-        status = replace(self.current, **changes)  # type: ignore[arg-type]
+        status = replace(self.current, **changes)
         if status.state not in OUT_OF_REACH:
             status = replace(status, message=self._required_action(status.state))
         if status != self.current:

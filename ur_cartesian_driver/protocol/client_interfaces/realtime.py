@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from itertools import accumulate
 import struct
-from typing import cast, Final
+from typing import Any, cast, Final
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
@@ -145,12 +145,11 @@ def decode_packet(data: bytes) -> RealtimeData:
         )
     count = min(_count(stated), _ENDS[-1])
     numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
-    values: dict[str, float | tuple[float, ...]] = {}
+    values: dict[str, Any] = {}
     for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
         if end <= count:
             values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length : end]
-    # `_LENGTHS` knows which fields are tuples; mypy cannot check names that come from `fields`.
-    return RealtimeData(**values)  # type: ignore[arg-type]
+    return RealtimeData(**values)
 
 
 class RealtimeDecoder:

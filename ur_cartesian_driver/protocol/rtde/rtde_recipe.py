@@ -102,13 +102,13 @@ class Recipe:
         :raises LocalProtocolError: number, length or range of the values is wrong.
         """
         flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
+        value: Any  # a number has no length: caught below
         try:
             for value, length in zip(values, self._lengths, strict=True):
                 if length == 1:
                     flat.append(value)
-                # A number has no length: caught below.
-                elif len(value) == length:  # type: ignore[arg-type]
-                    flat.extend(value)  # type: ignore[arg-type]
+                elif len(value) == length:
+                    flat.extend(value)
                 else:
                     raise self._packing_error(values)
             return self._frame.pack(self._frame.size, PackageType.DATA_PACKAGE, *flat)

@@ -9,6 +9,7 @@ does not read is dropped, so that it can stall neither the cycle nor the other c
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 import asyncio
 from collections.abc import Callable, Iterator
 import logging
@@ -34,13 +35,14 @@ class HangUp(Exception):
         self.farewell = farewell
 
 
-class ClientSession:
+class ClientSession(ABC):
     """One client's conversation."""
 
     def open(self) -> bytes:
         """Return what is sent unasked at the start: by default nothing, the client begins."""
         return b''
 
+    @abstractmethod
     def feed(self, data: bytes) -> bytes:
         """
         Take bytes from the client, return the answer.
@@ -48,9 +50,8 @@ class ClientSession:
         :raises ProtocolError: the client violates the protocol; it is disconnected.
         :raises HangUp: the conversation is over.
         """
-        raise NotImplementedError
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027  # most sessions hold nothing
         """Give back what the client held: by default nothing."""
 
 

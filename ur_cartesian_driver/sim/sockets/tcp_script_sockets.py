@@ -9,7 +9,7 @@ stay in the kernel, and a paused program stops its peer by TCP's flow control, a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 import contextlib
 import errno
@@ -22,8 +22,9 @@ _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
 
-_Address = tuple[str, int] | tuple[str, int, int, int]
-_Resolved = list[tuple[int, int, int, str, _Address]]
+#: Of IPv4, of IPv6, and what a Python without IPv6 gives, which connecting refuses.
+_Address = tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]
+_Resolved = Sequence[tuple[int, int, int, str, _Address]]
 
 
 class _ScriptConnection:
@@ -46,7 +47,7 @@ class _ScriptConnection:
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if _is_loopback(self._host) and _is_loopback(self._target[0]):
+        if _is_loopback(self._host) and _is_loopback(str(self._target[0])):
             self._socket.bind((self._host, 0))
         self._continue_connecting()
 
@@ -155,16 +156,14 @@ class TcpScriptSockets:
             connection.resolving = self._lookup(address, port)
             return
         try:
-            # A Python without IPv6 gives other addresses, which connecting refuses.
-            connection.connect(resolved)  # type: ignore[arg-type]
+            connection.connect(resolved)
         except (OSError, OverflowError):
             connection.close()
 
     def _lookup(self, address: str, port: int) -> Future[_Resolved]:
         if self._resolver is None:
             self._resolver = ThreadPoolExecutor(1, thread_name_prefix='ur-sim-resolver')
-        # The same as above.
-        return self._resolver.submit(socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)  # type: ignore[arg-type]
+        return self._resolver.submit(socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)
 
     def state(self, name: str) -> SocketState:
         """Return the state of a name."""
