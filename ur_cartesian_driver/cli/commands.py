@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+from contextlib import nullcontext
 import json
 from math import hypot
 from pathlib import Path
 import sys
 from time import monotonic
-from typing import Any
+from typing import Any, TextIO
 
 from ur_cartesian_driver.kinematics.robot_models import (
     DhTable,
@@ -136,12 +137,14 @@ def send(arguments: argparse.Namespace) -> int:
     goal = read_goal(arguments)
     goal.validate_only = goal.validate_only or arguments.validate_only
     with (
-        FeedbackLog(arguments.record) as feedback_log,
+        open(arguments.record, 'w', encoding='utf-8')
+        if arguments.record
+        else nullcontext() as file,
         client.GoalClient(arguments.driver) as sender,
     ):
         if arguments.wait > 0.0:
             sender.wait_ready(arguments.wait)
-        code, result = sender.send(goal, feedback_log.take)
+        code, result = sender.send(goal, FeedbackLog(file).take)
     status = client.STATUS_NAMES[code]
     clear_line()
     if (goal.validate_only or arguments.report) and result.report:
@@ -177,22 +180,10 @@ def clear_line() -> None:
 class FeedbackLog:
     """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
 
-    def __init__(self, path: str | None) -> None:
-        """Store the name of the file; None = no file."""
-        self._path = path
-        self._file: Any = None
+    def __init__(self, file: TextIO | None) -> None:
+        """Take the file that is written; None = no file."""
+        self._file = file
         self._next_line = 0.0
-
-    def __enter__(self) -> FeedbackLog:
-        """Open the file."""
-        if self._path:
-            self._file = open(self._path, 'w', encoding='utf-8')
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the file."""
-        if self._file is not None:
-            self._file.close()
 
     def take(self, feedback: Any) -> None:
         """Show and write one feedback message."""

@@ -207,17 +207,9 @@ def _draw_time(figure: Any, recording: Recording) -> None:
     deviation, speed, scaling, line = figure.subplots(
         4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows))
     )
-    time = recording.time
     _draw_deviation(deviation, recording)
-    speed.plot(
-        time,
-        np.linalg.norm(recording.target_twist[:, :3], axis=1),
-        color=_TARGET,
-        linewidth=2.4,
-        alpha=0.5,
-        label="controller's target",
-    )
-    speed.plot(time, recording.tool_speed, color=_ACTUAL, linewidth=0.9, label='tool')
+    target_speed = np.linalg.norm(recording.target_twist[:, :3], axis=1)
+    _plot_target_and_tool(speed, recording.time, target_speed, recording.tool_speed)
     speed.set_ylabel('tool speed\n[m/s]')
     speed.set_ylim(bottom=0.0)
     _draw_scaling(scaling, recording)
@@ -229,17 +221,16 @@ def _draw_time(figure: Any, recording: Recording) -> None:
                 axes.axvline(at, color=_MARKED_EVENTS[kind], linewidth=0.8, linestyle=':')
 
 
+def _plot_target_and_tool(axes: Any, time: Any, target: Any, tool: Any) -> None:
+    axes.plot(time, target, color=_TARGET, linewidth=2.4, alpha=0.5, label="controller's target")
+    axes.plot(time, tool, color=_ACTUAL, linewidth=0.9, label='tool')
+
+
 def _draw_deviation(axes: Any, recording: Recording) -> None:
     deviation = recording.deviation()
-    axes.plot(
-        recording.time,
-        1e3 * deviation.target_position,
-        color=_TARGET,
-        linewidth=2.4,
-        alpha=0.5,
-        label="controller's target",
+    _plot_target_and_tool(
+        axes, recording.time, 1e3 * deviation.target_position, 1e3 * deviation.position
     )
-    axes.plot(recording.time, 1e3 * deviation.position, color=_ACTUAL, linewidth=0.9, label='tool')
     axes.set_ylabel('distance from\nthe plan [mm]')
     axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(deviation.position).max()))
     axes.legend(loc='upper right', ncols=2)
@@ -291,10 +282,9 @@ def _draw_timeline(
     axes: Any, recording: Recording, rows: list[tuple[str, NDArray[np.float64]]]
 ) -> None:
     """Draw points, outputs and pauses as rows of one chart."""
-    time, points = (
-        recording.time,
-        [(at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'],
-    )
+    points = [
+        (at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'
+    ]
     axes.plot([at for at, _ in points], [0.0] * len(points), '|', color='#333333', markersize=9.0)
     if len(points) <= MAX_NUMBERED_POINTS:
         for at, number in points:
@@ -303,7 +293,7 @@ def _draw_timeline(
             )
     for height, (name, share) in enumerate(rows, start=1):
         axes.fill_between(
-            time,
+            recording.time,
             height - 0.3,
             height - 0.3 + 0.6 * share,
             step='post',

@@ -42,7 +42,7 @@ class LiveSession:
     """A live session that runs."""
 
     def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
-        """Be made by :meth:`~.api.Driver.start_live_session`."""
+        """Wrap a motion; :meth:`~.api.Driver.start_live_session` returns sessions."""
         #: To wait for its end, or to cancel it.
         self.motion = motion
         self._send = send
@@ -191,10 +191,8 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
     :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
     """
     check_pose(T_base_tcp)
-    distance, max_distance = (
-        T_base_tcp.distance_to(state.actual_tcp_pose),
-        options.max_approach_distance,
-    )
+    distance = T_base_tcp.distance_to(state.actual_tcp_pose)
+    max_distance = options.max_approach_distance
     if 0.0 < max_distance < distance:
         raise InvalidGoal(
             'The target',

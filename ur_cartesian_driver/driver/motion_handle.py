@@ -26,7 +26,7 @@ class MotionHandle:
     def __init__(
         self, number: int, outcome: Future[Outcome], send: Callable[[Request], None]
     ) -> None:
-        """Be made by :meth:`~.api.Driver.start`."""
+        """Wrap a motion; :meth:`~.api.Driver.start` returns handles."""
         self.number = number
         self._outcome, self._send = outcome, send
         #: Appends points; None = the goal was sent without keep_open. Set by the driver.

@@ -78,10 +78,8 @@ class EventLog:
 
     def keepalive_gap(self) -> float:
         """Return the longest pause between two keepalives since the last call [s]."""
-        self._last_gap, self._keepalives.max_keepalive_gap = (
-            self._keepalives.max_keepalive_gap,
-            0.0,
-        )
+        self._last_gap = self._keepalives.max_keepalive_gap
+        self._keepalives.max_keepalive_gap = 0.0
         return self._last_gap
 
     def keepalive_age(self) -> float:

@@ -97,8 +97,7 @@ class CartesianDriverNode(Node):
         self._components.append(self._publisher)
         self.action_server = CartesianActionServer(self, self.driver, settings)
         self._components.append(self.action_server)
-        self._append_service = AppendService(self, self.action_server)
-        self._components.append(self._append_service)
+        self._components.append(AppendService(self, self.action_server))
         arbiter = self.action_server.arbiter
         if settings.node.servo_state_rate > 0.0:
             self._servo_state_publisher = ServoStatePublisher(
@@ -109,8 +108,7 @@ class CartesianDriverNode(Node):
                 self, self.driver, arbiter, self.action_server.frames
             )
             self._components.append(self.live_targets)
-        self._freedrive_service = FreedriveService(self, self.driver, arbiter)
-        self._components.append(self._freedrive_service)
+        self._components.append(FreedriveService(self, self.driver, arbiter))
         self._publisher.start()
         self._call_services = CommandServices(self, self.driver, self._is_idle)
         self.create_timer(

@@ -154,20 +154,15 @@ class Recorder:
         self._folder = folder = RecordingFolder(
             Path(self._directory).expanduser(), metadata, self._max_size, self._warn_once
         )
-        self._start_time, self._time, self._flush_due, self._used = (
-            state.timestamp,
-            0.0,
-            FLUSH_PERIOD,
-            0,
-        )
+        self._start_time, self._time = state.timestamp, 0.0
+        self._flush_due, self._used = FLUSH_PERIOD, 0
         self._stale_points_begun = state.points_begun
         self._submit(folder, folder.open)
         if metadata['points']:
             self.add_plan(job.reference, -inf)
         count = metadata['points']
-        self.add_event(
-            'start', f'{metadata["execution"]}, {count} point{"" if count == 1 else "s"}'
-        )
+        points = f'{count} point{"" if count == 1 else "s"}'
+        self.add_event('start', f'{metadata["execution"]}, {points}')
         self.add_state(state)
 
     def add_plan(self, reference: ReferencePath, since: float) -> None:

@@ -54,12 +54,8 @@ class RecordingFolder:
         :param max_size: of all recordings together [bytes]; a motion may take half of it.
         :param warn: takes a sentence when something is wrong.
         """
-        self._directory, self._metadata, self._max_size, self._warn = (
-            directory,
-            metadata,
-            max_size,
-            warn,
-        )
+        self._directory, self._metadata = directory, metadata
+        self._max_size, self._warn = max_size, warn
         self._is_broken = False
         #: When the samples of the plan that came last are due.
         self._last_times: NDArray[np.float64] = np.empty(0)

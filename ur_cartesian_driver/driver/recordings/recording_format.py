@@ -67,12 +67,8 @@ PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')]
 
 #: Files of a folder, and the end of its name.
 PART_SUFFIX = '.part'
-METADATA_FILE, EXECUTED_FILE, PLANNED_FILE, EVENTS_FILE = (
-    'metadata.json',
-    'executed.npy',
-    'planned.npy',
-    'events.jsonl',
-)
+METADATA_FILE, EVENTS_FILE = 'metadata.json', 'events.jsonl'
+EXECUTED_FILE, PLANNED_FILE = 'executed.npy', 'planned.npy'
 #: Rows that are processed together, which holds the interpreter for 0.1 ms.
 CHUNK = 512
 #: Events that are kept; a path of a million points has a million. The column ``waypoint`` has

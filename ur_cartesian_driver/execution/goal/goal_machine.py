@@ -16,6 +16,7 @@ the robot and what its answers mean.
 from __future__ import annotations
 
 from math import inf
+from typing import NamedTuple
 
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
@@ -65,6 +66,17 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryResult,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
+
+
+class MotionStatus(NamedTuple):
+    """How far a motion is; NaN = unknown."""
+
+    #: The number of the point to which the arm moves.
+    waypoint: int
+    #: The motion time that the robot has received and not yet run [s].
+    buffered: float
+    #: How far the arm is behind the newest set-point [s].
+    lag: float
 
 
 class GoalMachine:
@@ -145,15 +157,9 @@ class GoalMachine:
             commands += self._after_packet(now)
         return commands
 
-    def motion_status(self) -> tuple[int, float, float]:
-        """
-        Return waypoint, buffered time and lag, for the recording.
-
-        :returns: the number of the point to which the arm moves; the motion time that the robot
-            has received and not yet run [s]; how far the arm is behind the newest set-point [s].
-            NaN = unknown.
-        """
-        return self._monitor.waypoint(), self.feeder.buffered, self.feeder.lag
+    def motion_status(self) -> MotionStatus:
+        """Return how far the motion is, for the recording."""
+        return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.feeder.lag)
 
     def end_time_of(self, records: int) -> float:
         """Return when the first ``records`` records are planned to end [s]."""
