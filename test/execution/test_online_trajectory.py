@@ -16,13 +16,14 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     LiveLimits,
     OnlineTrajectoryGenerator,
 )
-from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace
+from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.workspace import Plane
 
 UR5E = robot_model('ur5e')
 NOMINAL = Arm(UR5E)
@@ -198,7 +199,7 @@ def rooms(q):
     yield 'itself', bodies.distances(np.array([q])).min() - 0.02
 
 
-TABLE = KeepOutPlane(name='table', point=(0.0, 0.0, 0.03), normal=(0.0, 0.0, 1.0), margin=0.01)
+TABLE = Plane(name='table', point=(0.0, 0.0, 0.03), normal=(0.0, 0.0, 1.0), margin=0.01)
 ANYWHERE = replace(LIMITS, singularity_margins=(0.0, 0.0, 0.0))
 
 

@@ -105,14 +105,16 @@ def test_the_arm_is_seized_only_when_it_is_free(arbiter):
 def test_what_has_the_arm_for_now_makes_way_for_every_goal(arbiter):
     (early,) = enqueued(arbiter, 'goal 1')
     session = RunningGoal(arbiter, 'a session')
-    assert arbiter.acquire_preemptible(session.arm_request)
-    assert not arbiter.acquire_preemptible(ArmRequest('another session', lambda: None))
+    assert arbiter.acquire(session.arm_request, preemptible=True)
+    assert not arbiter.acquire(ArmRequest('another session', lambda: None), preemptible=True)
     arbiter.preempt(early.arm_request)
     assert (session.arm_request.preempted_by, session.calls) == ('goal 1', 1)
     assert early.arm_request.preempted == 'a session'
-    assert not arbiter.acquire_preemptible(session.arm_request), 'as long as the goal has the arm'
+    assert not arbiter.acquire(session.arm_request, preemptible=True), (
+        'as long as the goal has the arm'
+    )
     arbiter.release(early.arm_request)
-    assert arbiter.acquire_preemptible(session.arm_request)
+    assert arbiter.acquire(session.arm_request, preemptible=True)
 
 
 @pytest.mark.parametrize('seed', range(5))

@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver.motion_handle import MotionHandle, OnProgress
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
-from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace
+from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
@@ -31,8 +31,8 @@ from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.workspace import parse_planes
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3
@@ -224,12 +224,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
             options.singularity_margin_shoulder,
         ),
         workspace=LiveWorkspace(
-            planes=tuple(
-                KeepOutPlane(
-                    name=plane.name, point=plane.point, normal=plane.normal, margin=plane.margin
-                )
-                for plane in parse_planes(options.workspace_planes)
-            ),
+            planes=parse_planes(options.workspace_planes),
             # Capsules are thicker than the arm: they stop it only if they also refuse goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import get_args, Literal, TypeAlias
 
-from ur_cartesian_driver.planning.workspace import parse_planes
+from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 #: The wire carries joint positions no finer than this [m].

@@ -20,7 +20,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.workspace import Plane
 
 #: No link is thicker [m].
 _THICKNESS = 0.3
@@ -29,20 +29,10 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeepOutPlane:
-    """A workspace plane: the arm stays on the side to which its normal points."""
-
-    name: str
-    point: Vector3
-    normal: Vector3
-    margin: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWorkspace:
     """The bounds to keep away from."""
 
-    planes: tuple[KeepOutPlane, ...] = ()
+    planes: tuple[Plane, ...] = ()
     #: Smallest distance of the capsules around the links [m]; None = not checked.
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.

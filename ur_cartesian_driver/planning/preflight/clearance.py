@@ -25,10 +25,10 @@ from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
-from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
 Flags: TypeAlias = NDArray[np.bool_]
 

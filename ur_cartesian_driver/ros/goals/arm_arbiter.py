@@ -65,25 +65,18 @@ class ArmArbiter:
             arm_request._number = next(self._numbers)
             self._queue.append(arm_request)
 
-    def acquire(self, arm_request: ArmRequest) -> bool:
-        """Acquire the arm if it is free; tell whether it was."""
-        with self._condition:
-            if self._holder is not None:
-                return False
-            self._holder = arm_request
-            return True
-
-    def acquire_preemptible(self, arm_request: ArmRequest) -> bool:
+    def acquire(self, arm_request: ArmRequest, *, preemptible: bool = False) -> bool:
         """
-        Acquire the arm if it is free, as the oldest request; tell whether it was.
+        Acquire the arm if it is free; tell whether it was.
 
-        Any other request can preempt it.
+        :param preemptible: as the oldest request, which any other one can preempt.
         """
         with self._condition:
             if self._holder is not None:
                 return False
             self._holder = arm_request
-            self._queue.insert(0, arm_request)
+            if preemptible:
+                self._queue.insert(0, arm_request)
             return True
 
     def preempt(self, arm_request: ArmRequest) -> None:

@@ -229,7 +229,7 @@ class LiveTargetSubscriber:
         arm_request = ArmRequest(
             SESSION_NAME, lambda: self._preempt_session(arm_request.preempted_by)
         )
-        if not self._arbiter.acquire_preemptible(arm_request):
+        if not self._arbiter.acquire(arm_request, preemptible=True):
             self._logger.info(
                 f'Live targets are ignored as long as {self._arbiter.holder} has the arm.',
                 throttle_duration_sec=WARNING_PERIOD,

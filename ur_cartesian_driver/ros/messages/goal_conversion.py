@@ -66,19 +66,14 @@ def goal_from_message(
     return resolve_frames(
         Goal(
             waypoints=tuple(map(_waypoint, trajectory.points)),
-            segments=tuple(
-                _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
-            ),
+            segments=_segments(message),
             frame_id=trajectory.header.frame_id,
             age=_age(trajectory.header.stamp, now),
             path_tolerance=_tolerance(message.path_tolerance),
             goal_tolerance=_tolerance(message.goal_tolerance),
             goal_time_tolerance=seconds(message.goal_time_tolerance) or time_tolerance,
             execution=_member(ExecutionMode, message.execution, 'execution'),
-            io_commands=tuple(
-                _io_command(command, f'io_commands[{i}]')
-                for i, command in enumerate(message.io_commands)
-            ),
+            io_commands=_io_commands(message),
             keep_open=message.keep_open,
         ),
         trajectory,
@@ -96,13 +91,8 @@ def appended_points_from_message(message: Message) -> AppendedPoints:
     """
     return AppendedPoints(
         waypoints=tuple(map(_waypoint, message.points)),
-        segments=tuple(
-            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
-        ),
-        io_commands=tuple(
-            _io_command(command, f'io_commands[{i}]')
-            for i, command in enumerate(message.io_commands)
-        ),
+        segments=_segments(message),
+        io_commands=_io_commands(message),
         last=message.last,
     )
 
@@ -169,6 +159,10 @@ def _posture(posture: Message) -> Posture:
     return Posture(names=tuple(names), values=tuple(values))
 
 
+def _segments(message: Message) -> tuple[Segment, ...]:
+    return tuple(_segment(each, f'segments[{i}]') for i, each in enumerate(message.segments))
+
+
 def _segment(segment: Message, field: str) -> Segment:
     type_ = _member(SegmentType, segment.type, f'{field}.type')
     via: Pose | None = pose_from_message(segment.via)
@@ -183,6 +177,11 @@ def _segment(segment: Message, field: str) -> Segment:
         via_posture=_posture(segment.via_posture),
         arc_mode=_member(ArcMode, segment.arc_mode, f'{field}.arc_mode'),
     )
+
+
+def _io_commands(message: Message) -> tuple[IOCommand, ...]:
+    commands = message.io_commands
+    return tuple(_io_command(each, f'io_commands[{i}]') for i, each in enumerate(commands))
 
 
 def _io_command(command: Message, field: str) -> IOCommand:

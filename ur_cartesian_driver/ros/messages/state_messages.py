@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from enum import IntEnum
 from math import nan
 from typing import Any
@@ -158,22 +159,14 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
 
 
 def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
-    """Return the state of the set-point stream."""
+    """Return the state of the set-point stream; its other fields have the same names."""
+    values = asdict(report)
+    del values['timestamp']
     return ServoState(
         header=Header(stamp=stamp),
-        state=int(report.activity),
-        setpoints_sent=report.setpoints_sent,
-        setpoints_done=report.setpoints_done,
-        buffer_size=report.buffer_size,
-        buffer_capacity=report.buffer_capacity,
-        buffered=duration_message(report.buffered),
-        lag=report.lag,
-        speed_scaling=report.speed_scaling,
-        joint_error=report.joint_error,
-        underruns=report.underruns,
-        overruns=report.overruns,
-        repeats=report.repeats,
-        skipped=report.skipped,
+        state=int(values.pop('activity')),
+        buffered=duration_message(values.pop('buffered')),
+        **values,
     )
 
 

@@ -4,8 +4,8 @@
 
 import pytest
 
+from ur_cartesian_driver.motion.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
 
 def test_a_plane_is_a_name_a_point_a_normal_and_a_margin():
