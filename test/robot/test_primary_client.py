@@ -64,3 +64,113 @@ def test_kinematics_that_cannot_be_are_refused_with_the_numbers():
 def test_a_text_of_the_robot_is_one_line():
     news = told_by(primary.encode_message(primary.TextMessage(text='first\n\x1b[31msecond')))
     assert news[0] == ('text', 'first  [31msecond')
+
+
+# ---- requests on a connection that is read-only -------------------------------------------------
+
+READ_ONLY = primary.encode_message(primary.ErrorCodeMessage(code=210, level=3))
+REQUEST = b'stop program\n'
+
+
+class Robot:
+    """A port that refuses what comes on its first connections."""
+
+    def __init__(self, refusing=1):
+        self.refusing = refusing
+        #: What came on each connection.
+        self.received = []
+
+    async def serve(self, reader, writer):
+        number = len(self.received)
+        self.received.append(b'')
+        with contextlib.suppress(ConnectionError):
+            while data := await reader.read(1000):
+                self.received[number] += data
+                if number < self.refusing:
+                    writer.write(READ_ONLY)
+        writer.close()
+
+
+def sent_to(robot, scene):
+    """Run ``scene(client)`` with a client that is connected; return the errors that it reports."""
+    errors = []
+
+    async def scenario():
+        client = PrimaryClient(
+            PrimaryCallbacks(
+                configuration=lambda _: None,
+                geometry=lambda _: None,
+                error=errors.append,
+                connection_error=errors.append,
+                text=lambda _: None,
+            )
+        )
+        await asyncio.start_server(robot.serve, HOST, PORT)
+        holding = asyncio.create_task(client.stay_connected(HOST, PORT))
+        await asyncio.sleep(0.1)
+        await scene(client)
+        await asyncio.sleep(0.1)
+        holding.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await holding
+
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        runner.run(scenario())
+    return errors
+
+
+def request(*, is_wanted=lambda: True):
+    async def scene(client):
+        assert client.send(REQUEST, is_wanted)
+
+    return scene
+
+
+def test_a_request_that_was_refused_is_sent_on_a_new_connection():
+    robot = Robot()
+    assert sent_to(robot, request()) == []
+    assert robot.received == [REQUEST, REQUEST]
+
+
+def test_a_request_is_sent_again_only_once_and_then_the_refusal_is_reported():
+    robot = Robot(refusing=9)
+    (error,) = sent_to(robot, request())
+    assert 'C210' in error
+    assert robot.received == [REQUEST, REQUEST]
+
+
+def test_a_request_that_is_no_longer_wanted_is_not_sent_again():
+    robot = Robot()
+    assert sent_to(robot, request(is_wanted=lambda: False)) == []
+    assert robot.received == [REQUEST, b'']
+
+
+def test_a_refusal_of_what_another_client_sent_is_reported():
+    class RobotOfOthers(Robot):
+        async def serve(self, reader, writer):
+            self.received.append(b'')
+            await asyncio.sleep(1.5)
+            writer.write(READ_ONLY)
+            await reader.read()
+            writer.close()
+
+    robot = RobotOfOthers()
+
+    async def scene(client):
+        assert client.send(REQUEST, lambda: True)
+        await asyncio.sleep(2.0)
+
+    (error,) = sent_to(robot, scene)
+    assert 'C210' in error
+    assert len(robot.received) == 1
+
+
+def test_what_comes_while_it_connects_again_is_sent_then():
+    robot = Robot(refusing=0)
+
+    async def scene(client):
+        client.reconnect()
+        assert client.send(REQUEST, lambda: True)
+
+    assert sent_to(robot, scene) == []
+    assert robot.received == [b'', REQUEST]

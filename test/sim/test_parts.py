@@ -164,7 +164,7 @@ def test_the_generation_decides_the_cycle_and_the_software(model, cycle, version
     ],
 )
 def test_the_script_port_takes_commands(bench, line, mode):
-    execute_command(bench.controller, UploadedLine(line))
+    execute_command(bench.controller, UploadedLine(line), may_send=True)
     bench.wait(2.0)
     assert bench.controller.power.mode is mode
 
@@ -173,14 +173,14 @@ def test_the_script_port_can_stop_pause_and_resume(bench):
     bench.start('while True:\n  sync()\nend')
     states = []
     for line in ('pause program', 'resume program', 'stop program', 'halt'):
-        execute_command(bench.controller, UploadedLine(line))
+        execute_command(bench.controller, UploadedLine(line), may_send=True)
         bench.wait(0.1)
         states.append(bench.programs.state.name)
     assert states == ['PAUSED', 'PLAYING', 'STOPPED', 'STOPPED']
 
 
 def test_an_error_in_a_bare_line_is_in_its_first_line(bench):
-    execute_command(bench.controller, UploadedLine('nonsense(1)'))
+    execute_command(bench.controller, UploadedLine('nonsense(1)'), may_send=True)
     assert bench.log == ['1:1: compile_error_name_not_found:nonsense:']
 
 

@@ -133,6 +133,26 @@ def test_in_local_control_the_script_port_is_read_only():
         assert robot.state().runtime_state is RuntimeState.STOPPED
 
 
+def test_the_right_to_send_is_that_of_the_time_of_the_connection():
+    with SimulatedRobot(SimulatorConfig(**FREE, remote_control=False)) as robot:
+
+        def turn_key(*, remote):
+            robot.call(lambda controller: setattr(controller, 'remote_control', remote))
+
+        with Primary(robot.ports.primary) as old:
+            old.await_(VersionMessage)
+            turn_key(remote=True)
+            old.send(b'set speed 0.5\n')
+            assert old.await_(ErrorCodeMessage).label == 'C210A0'
+            with Primary(robot.ports.primary) as new:
+                new.send(b'set speed 0.4\n')
+                wait_for(lambda: robot.state().speed_slider == 0.4)
+                turn_key(remote=False)
+                for wire in (old, new):  # the robot hangs up
+                    with pytest.raises((ConnectionError, AssertionError), match=r'clos|reset'):
+                        wire.await_(KeyMessage)
+
+
 def test_a_protective_stop_is_announced_once_and_unlocked_by_a_line(robot):
     with Primary(robot.ports.primary) as wire:
         wire.send(b'def a():\n  while True:\n    sync()\n  end\nend\n')

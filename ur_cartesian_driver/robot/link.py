@@ -35,6 +35,7 @@ from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
+    has_ended,
     is_paused,
     is_stopped,
     required_action,
@@ -101,6 +102,8 @@ class RobotLink:
         self.signals: Signals | None = None
         #: Whether the TCP from before the last goal is still to be restored.
         self.tcp_restore_pending = False
+        #: Whether it was in remote control when it was asked last; None = never asked.
+        self._remote_control: bool | None = None
         self._explain_timer: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(
             PrimaryCallbacks(
@@ -132,7 +135,10 @@ class RobotLink:
             pending=may_upload,
             upload=self.upload_program,
             warn=self._warn,
-            power_up=lambda: self.send_primary(primary.PrimaryCommand.RUN),
+            power_up=lambda: self.send_primary(
+                primary.PrimaryCommand.RUN,
+                lambda: self.robot is not None and not is_stopped(self.robot),
+            ),
         )
 
     @property
@@ -178,9 +184,19 @@ class RobotLink:
         self.program.send_servo(on)
         self.event_log.note('the driver entered the servo' if on else 'the driver left the servo')
 
-    def send_primary(self, command: primary.PrimaryCommand) -> bool:
-        """Send a command to the primary interface; False = there is no connection."""
-        return self._primary.send(primary.encode_command(command))
+    def send_primary(self, command: primary.PrimaryCommand, is_wanted: Callable[[], bool]) -> bool:
+        """
+        Send a command to the primary interface; False = there is no connection.
+
+        :param is_wanted: whether it is to be sent again, if the connection was read-only.
+        """
+        return self._primary.send(primary.encode_command(command), is_wanted)
+
+    def note_remote_control(self, remote: bool) -> None:
+        """Take note of whether clients may control the robot: a change needs new connections."""
+        if self._remote_control not in (None, remote):
+            self._primary.reconnect()
+        self._remote_control = remote
 
     def set_executing(self, busy: bool) -> None:
         """Set whether a goal runs: that changes the status and the kind of keepalive."""
@@ -201,7 +217,13 @@ class RobotLink:
     def restore_tcp(self, T_flange_tcp: Pose) -> None:
         """Restore the TCP from before a goal, if the robot is connected."""
         if self.robot is not None:
-            self._tcp_setter.restore(T_flange_tcp, self.robot)
+            self._tcp_setter.restore(
+                T_flange_tcp,
+                self.robot,
+                lambda: (
+                    self.tcp_restore_pending and not self._tracker.foreign_program_runs(self.robot)
+                ),
+            )
 
     def set_tcp_restore_pending(self, pending: bool) -> None:
         """Set whether the TCP has to be restored: until it is, no goal starts."""
@@ -218,14 +240,25 @@ class RobotLink:
         self._warn(f'the robot program is stopped: {reason}')
         self.event_log.note('the driver ended the robot program')
         self._tracker.is_ending = self.program.connected
-        self._primary.send(primary.encode_command(primary.PrimaryCommand.STOP_PROGRAM))
+        self.send_primary(primary.PrimaryCommand.STOP_PROGRAM, self._has_program_of_ours)
         self.program.send_stop()
+
+    def _has_program_of_ours(self) -> bool:
+        robot = self.robot
+        return (
+            robot is not None
+            and not has_ended(robot)
+            and not self._tracker.foreign_program_runs(robot)
+        )
 
     def upload_program(self) -> None:
         """Upload the robot program; it replaces ours, never a foreign one."""
         if refusal := self._upload_refusal():
             self._warn(f'the robot program is not sent: {refusal}')
-        elif not self._primary.send(primary.encode_program(wrap_in_program(self.program.text))):
+        elif not self._primary.send(
+            primary.encode_program(wrap_in_program(self.program.text)),
+            lambda: not self._upload_refusal(),
+        ):
             self._warn(
                 'the robot program is not sent: there is no connection to the primary '
                 'interface of the robot'

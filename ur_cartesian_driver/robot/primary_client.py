@@ -4,6 +4,11 @@
 The primary interface: the robot reports its model and errors, and takes programs.
 
 A goal goes on while this connection is lost and made again.
+
+The robot decides when a client connects whether it may send: a connection that was made in local
+control stays read-only after the switch to remote control, and every request on it is refused with
+C210. Nothing else shows that, so a refusal makes a new connection, on which the refused request is
+sent once more, if it is still wanted. The robot drops connections when it is switched back.
 """
 
 from __future__ import annotations
@@ -29,6 +34,10 @@ REPORT_TIMEOUT = 5.0
 #: The robot reports its state ten times a second. A connection that is silent for so long [s] is
 #: dead, and a command to stop the program would be lost on it.
 SILENCE_TIMEOUT = 1.5
+#: Error code of a request on a connection that is read-only.
+READ_ONLY_CODE = 210
+#: A request that is older is not repeated [s]: whoever turns the key meanwhile starts nothing.
+REPEAT_TIMEOUT = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +56,13 @@ class PrimaryCallbacks:
     text: Callable[[str], None]
 
 
+@dataclass(frozen=True, slots=True)
+class _Request:
+    data: bytes
+    is_wanted: Callable[[], bool]
+    time: float
+
+
 class PrimaryClient:
     """One connection at a time, made again when it breaks."""
 
@@ -56,10 +72,54 @@ class PrimaryClient:
         self._decoder = primary.PrimaryDecoder()
         self._connection: TcpConnection | None = None
         self._has_configuration = self._has_received = False
+        #: Requests that a refusal may be about, and those to send on the next connection.
+        self._sent: list[_Request] = []
+        self._to_send: list[_Request] = []
+        #: The connection is closed to make another one.
+        self._is_reconnecting = False
 
-    def send(self, data: bytes) -> bool:
-        """Send a program or command; False while there is no connection."""
-        return self._connection is not None and self._connection.send(data)
+    def send(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
+        """
+        Send a program or command; False while there is no connection.
+
+        :param is_wanted: asked before it is sent again, because the connection was read-only:
+            whether it is still to be carried out, and no other program would suffer.
+        """
+        request = _Request(data, is_wanted, asyncio.get_running_loop().time())
+        if self._is_reconnecting:
+            self._to_send.append(request)
+            return True
+        if self._connection is None or not self._connection.send(data):
+            return False
+        self._sent = [*self._recent(self._sent), request]
+        return True
+
+    def reconnect(self) -> None:
+        """Connect again: the right to send may have changed."""
+        if self._connection is not None and not self._is_reconnecting:
+            self._is_reconnecting = True
+            self._connection.close('to connect again')
+
+    def _recent(self, requests: list[_Request]) -> list[_Request]:
+        now = asyncio.get_running_loop().time()
+        return [request for request in requests if now - request.time < REPEAT_TIMEOUT]
+
+    def _send_again(self) -> None:
+        """Send on a new connection what was refused on the one before, or came since."""
+        self._is_reconnecting = False
+        requests, self._sent, self._to_send = self._recent(self._to_send), [], []
+        for request in requests:
+            if request.is_wanted() and self._connection is not None:
+                self._connection.send(request.data)
+
+    def _repeats_refused(self) -> bool:
+        """Handle a refusal by a read-only connection; False = it is final."""
+        if not (refused := self._recent(self._sent)):
+            return False
+        self._to_send += refused
+        self._sent = []
+        self.reconnect()
+        return True
 
     async def stay_connected(self, host: str, port: int) -> NoReturn:
         """Keep connected until cancelled."""
@@ -70,8 +130,11 @@ class PrimaryClient:
                 reason = await self._serve_connection(host, port)
                 retry.reset()
                 last_warning = ''
+                if self._is_reconnecting:
+                    continue
             except OSError as error:
                 reason = str(error)
+                self._is_reconnecting = False
             if reason != last_warning:  # once, not with each attempt
                 last_warning = reason
                 self._listener.connection_error(f'primary interface: {reason}')
@@ -93,6 +156,7 @@ class PrimaryClient:
         )
         try:
             await dial(self._connection, host, port)
+            self._send_again()
             begin = asyncio.get_running_loop().time()
             while True:
                 self._has_received = False
@@ -139,6 +203,10 @@ class PrimaryClient:
 
     def _on_message(self, message: primary.PrimaryFrame) -> None:
         match message:
+            case primary.ErrorCodeMessage(code=code) if (
+                code == READ_ONLY_CODE and self._repeats_refused()
+            ):
+                pass
             case primary.ErrorCodeMessage(level=level) if (
                 primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT
             ):

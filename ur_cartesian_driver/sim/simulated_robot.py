@@ -244,9 +244,14 @@ class SimulatedRobot:
 
     async def _cycles(self) -> None:
         stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
+        took_scripts = self.controller.takes_scripts
         while True:
             await self._clock.next_cycle()
             self.controller.step()
+            if took_scripts and not self.controller.takes_scripts:
+                for server in (self._primary, self._secondary, self._realtime):
+                    server.drop()
+            took_scripts = self.controller.takes_scripts
             for session, connection in self._rtde.session_connections:
                 for package in session.packages():
                     connection.write(package)

@@ -8,6 +8,8 @@ When that is due is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.program.secondary_program import tcp_program
@@ -43,19 +45,24 @@ class TemporaryTcpSetter:
         self._program_remembers = True
         self._send(T_flange_tcp, TcpPersistence.TEMPORARY)
 
-    def restore(self, T_flange_tcp: Pose, robot: RobotState) -> None:
+    def restore(
+        self, T_flange_tcp: Pose, robot: RobotState, is_wanted: Callable[[], bool]
+    ) -> None:
         """
         Restore the TCP from before a goal.
 
         The robot program does it if it is connected, not paused, and remembers that TCP exactly.
         Else a program of its own does, if we may send one and no foreign program runs. If we may
         not, the robot program does, with the digits of the wire.
+
+        :param is_wanted: whether that program may be sent again, if the connection was read-only.
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):
             self._send(T_flange_tcp, TcpPersistence.RESTORE)
         elif self._headless_mode and (listens or robot.runtime_state not in _RUNNING_STATES):
-            self._primary.send(primary.encode_program(tcp_program(T_flange_tcp.rotation_vector())))
+            program = tcp_program(T_flange_tcp.rotation_vector())
+            self._primary.send(primary.encode_program(program), is_wanted)
 
     def program_lost(self) -> None:
         """Forget what the robot program remembered: it is gone."""

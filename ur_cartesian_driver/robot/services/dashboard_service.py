@@ -142,4 +142,7 @@ class DashboardService:
             reply = await self._client.request('is in remote control')
         except (OSError, DriverError):
             return None
-        return {'true': True, 'false': False}.get(reply.value or '')
+        remote = {'true': True, 'false': False}.get(reply.value or '')
+        if remote is not None:
+            self._link.note_remote_control(remote)
+        return remote

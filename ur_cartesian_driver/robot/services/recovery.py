@@ -196,7 +196,10 @@ class RecoveryRunner:
         self, step: RecoveryStep, effect: ExpectedEffect
     ) -> ServiceAnswer:
         for _ in range(2):  # an unlock is refused for 5 s after the stop
-            if not self._link.send_primary(PRIMARY_COMMANDS[step]):
+            if not self._link.send_primary(
+                PRIMARY_COMMANDS[step],
+                lambda: self._link.robot is not None and not effect.is_reached(self._link.robot),
+            ):
                 return failed('there is no connection to the primary interface of the robot.')
             if await wait_for_state(self._link, effect.is_reached, effect.timeout):
                 return succeeded('')

@@ -4,7 +4,7 @@
 The commands that clients may send to a script port besides programs, one line each.
 
 Any other line is a statement: it is compiled as a program of its own, which replaces the running
-one, as on the robot. In local control everything is refused.
+one, as on the robot. A client that connected in local control is refused everything.
 """
 
 from __future__ import annotations
@@ -31,9 +31,15 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 )
 
 
-def execute_command(controller: Controller, item: UploadedProgram | UploadedLine) -> None:
-    """Execute what a client has sent; answers go to all clients."""
-    if not controller.takes_scripts:
+def execute_command(
+    controller: Controller, item: UploadedProgram | UploadedLine, *, may_send: bool
+) -> None:
+    """
+    Execute what a client has sent; answers go to all clients.
+
+    :param may_send: whether its connection may; else it is read-only.
+    """
+    if not may_send:
         controller.messages.error(
             READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
         )

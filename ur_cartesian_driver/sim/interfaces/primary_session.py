@@ -4,7 +4,7 @@
 One client of an interface that takes scripts: primary, secondary, real-time.
 
 All three take programs and commands. What they send differs; apart from the greeting, it goes to
-all clients.
+all clients. Whether a client may send is decided when it connects, and not again.
 """
 
 from __future__ import annotations
@@ -22,13 +22,15 @@ class ScriptSession(ClientSession):
     def __init__(self, controller: Controller) -> None:
         """Wait for programs."""
         self._controller = controller
+        self._may_send = controller.takes_scripts
         self._uploads = UploadDecoder()
 
     def feed(self, data: bytes) -> bytes:
         """Execute what is complete; answers go to all clients."""
         try:
             for item in self._uploads.feed(data):
-                execute_command(self._controller, item)
+                may_send = self._may_send and self._controller.takes_scripts
+                execute_command(self._controller, item, may_send=may_send)
         except UploadTooLong:
             raise HangUp from None
         return b''
