@@ -17,7 +17,7 @@ import re
 import signal
 import sys
 
-from ur_cartesian_driver.cli import commands, recording_plot, validate_command
+from ur_cartesian_driver.cli import check_robot, commands, recording_plot, validate_command
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
@@ -52,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     _add_send(sub)
     _add_validate(sub)
     _add_where(sub)
+    _add_check_robot(sub)
     _add_plot(sub)
     return top
 
@@ -287,6 +288,35 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
     where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
+
+
+def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
+    check = _add(
+        sub,
+        'check-robot',
+        check_robot.check_robot,
+        'tell what works with a robot and how it differs from what is assumed; moves nothing '
+        'without being asked',
+    )
+    check.add_argument('--robot-ip', required=True, metavar='ADDRESS', help='address of the robot')
+    for name, port in (
+        ('rtde', 30004),
+        ('primary', 30001),
+        ('dashboard', 29999),
+        ('robot-api', 80),
+    ):
+        check.add_argument(f'--{name}-port', type=int, default=port, help='its port')
+    check.add_argument(
+        '--seconds', type=float, default=5.0, help='how long the RTDE stream is recorded [s]'
+    )
+    check.add_argument(
+        '--with-motion',
+        action='store_true',
+        help='also move the arm a little, after asking on the terminal before each motion',
+    )
+    check.add_argument(
+        '--report', default='robot_report.json', metavar='FILE', help='report to send in'
+    )
 
 
 def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:

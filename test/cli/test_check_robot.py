@@ -1,0 +1,281 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""check-robot with robots of each generation, and with some that are closed or busy."""
+
+from io import StringIO
+import json
+import socket
+import sys
+
+import pytest
+
+from ur_cartesian_driver.cli import check_robot, main
+from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
+from ur_cartesian_driver.robot.check.experiments import EXPERIMENTS
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.rtde_observations import INPUT_GROUPS
+
+pytestmark = pytest.mark.slow
+
+FOREIGN = 'def foreign():\n  while True:\n    sync()\n  end\nend\n'
+
+
+def closed_port():
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        return server.getsockname()[1]
+
+
+@pytest.fixture
+def check(ur_sim, tmp_path, capsys):
+    """Run the command; returns its status, what it printed, and the report's findings by name."""
+
+    def run(**ports):
+        path = tmp_path / 'report.json'
+        numbers = {
+            'rtde': ur_sim.ports.rtde,
+            'primary': ur_sim.ports.primary,
+            'dashboard': ur_sim.ports.dashboard,
+            'robot-api': ur_sim.ports.robot_api,
+        }
+        words = [
+            word
+            for name, port in (numbers | ports).items()
+            for word in (f'--{name}-port', str(port))
+        ]
+        options = ['--robot-ip', '127.0.0.1', '--seconds', '0.3', '--report', str(path)]
+        status = main(['check-robot', *options, *words])
+        found = json.loads(path.read_text())
+        return status, capsys.readouterr().out, {f['check']: f for f in found['findings']}
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ('software', 'models', 'remote'),
+    [
+        pytest.param(
+            '5.21.0.0', ['ur10e', 'ur12e'], 'true', marks=pytest.mark.ur_sim(model='ur10e')
+        ),
+        pytest.param('3.15.8.0', ['ur3'], None, marks=pytest.mark.ur_sim(model='ur3')),
+        pytest.param(
+            '10.14.0.0',
+            ['ur20'],
+            'true',
+            marks=pytest.mark.ur_sim(model='ur20', polyscope='10.14'),
+        ),
+    ],
+)
+def test_a_robot_of_each_generation_is_described(check, ur_sim, software, models, remote):
+    status, printed, findings = check()
+    assert status == 0
+    assert findings['software']['data']['version'] == software
+    assert findings['model']['data']['models'] == models
+    assert findings['remote_control']['data'].get('remote_control') == remote
+    assert findings['scripts']['data']['accepted'] is True
+    assert findings['rtde_outputs']['verdict'] == 'ok'
+    assert findings['rtde_inputs']['verdict'] == 'ok'
+    assert findings['calibration']['data']['pose_error_mm'] < 0.01
+    assert findings['rtde_stream']['data']['packets'] > 10
+    assert findings['rest']['data']['noise_mrad'] >= 0.0
+    for check_name in findings:
+        assert check_name in printed
+    assert not ur_sim.state().program  # the line in the log came from beside any program
+
+
+def test_the_report_does_not_say_who_or_where_the_robot_is(check, tmp_path):
+    check()
+    text = (tmp_path / 'report.json').read_text()
+    for secret in '127.0.0.1', '20000000000', str(tmp_path):
+        assert secret not in text
+    assert json.loads(text)['driver']
+
+
+@pytest.mark.ur_sim(remote_control=False)
+def test_local_control_is_noted(check):
+    status, _, findings = check()
+    assert status == 0
+    assert findings['scripts']['verdict'] == 'note'
+    assert 'local control (C210)' in findings['scripts']['text']
+    assert findings['remote_control']['data']['remote_control'] == 'false'
+
+
+@pytest.mark.ur_sim(polyscope='5.9.1')
+def test_software_that_is_too_old_is_a_problem(check):
+    status, _, findings = check()
+    assert status == 1
+    assert findings['software']['verdict'] == 'problem'
+    assert 'needs 5.9.4' in findings['software']['text']
+
+
+@pytest.mark.parametrize(
+    ('interface', 'finding', 'status', 'words'),
+    [
+        ('rtde', 'rtde', 1, 'connection refused; switch RTDE on'),
+        ('primary', 'primary', 1, 'connection refused; switch the primary client interface on'),
+        ('dashboard', 'remote_control', 0, 'services below ~/dashboard/ will not work'),
+    ],
+)
+def test_a_closed_port_is_one_sentence(check, interface, finding, status, words):
+    code, printed, findings = check(**{interface: closed_port()})
+    assert code == status
+    assert words in findings[finding]['text']
+    assert findings[finding]['text'].count('.') <= 5  # those of the address
+    assert 'Traceback' not in printed
+
+
+@pytest.mark.ur_sim(polyscope='10.14')
+def test_a_closed_robot_api_is_one_sentence(check):
+    code, _, findings = check(**{'robot-api': closed_port()})
+    assert code == 0
+    assert '(Robot API): connection refused' in findings['remote_control']['text']
+
+
+def test_nobody_at_the_address_has_a_status_of_its_own(check):
+    code, _, findings = check(rtde=closed_port(), primary=closed_port())
+    assert code == 3
+    assert set(findings) == {'rtde', 'primary', 'other_ports'}
+
+
+def test_something_else_at_the_ports_is_said(check):
+    with socket.create_server(('127.0.0.1', 0)) as silent:
+        port = silent.getsockname()[1]
+        code, _, findings = check(rtde=port)
+    assert code == 1
+    assert 'does not answer as an RTDE server' in findings['rtde']['text']
+
+
+def test_inputs_of_another_client_are_named(check, ur_sim):
+    codec = RtdeClientCodec(['timestamp'], inputs=INPUT_GROUPS['speed slider'])
+    with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
+        other.sendall(codec.start())
+        while codec.state is not RtdeState.READY:
+            codec.feed(other.recv(65536))
+            other.sendall(codec.data_to_send())
+        code, _, findings = check()
+    assert code == 0
+    assert findings['rtde_inputs']['data']['refused'] == ['speed slider']
+    assert 'in use by another client' in findings['rtde_inputs']['text']
+
+
+# ---- with motion ------------------------------------------------------------------------------
+
+
+def address(ur_sim):
+    return RobotAddress(
+        host='127.0.0.1',
+        rtde_port=ur_sim.ports.rtde,
+        primary_port=ur_sim.ports.primary,
+        dashboard_port=ur_sim.ports.dashboard,
+        robot_api_port=ur_sim.ports.robot_api,
+    )
+
+
+def run_experiments(ur_sim, agrees):
+    recordings = {}
+    findings = check_robot.experiment_findings(address(ur_sim), [], agrees, recordings)
+    return {finding.check: finding for finding in findings}, recordings
+
+
+@pytest.mark.ur_sim(rate=4.0, frequency=125.0)
+def test_each_experiment_is_asked_for_moves_and_returns(ur_sim):
+    begin, asked = ur_sim.state(), []
+
+    def agree(motion):
+        asked.append(motion)
+        return True
+
+    findings, recordings = run_experiments(ur_sim, agree)
+    assert asked == [experiment.motion for experiment in EXPERIMENTS]
+    for name, finding in findings.items():
+        assert finding.verdict is Verdict.OK, finding.text
+        assert recordings[name].duration > 0.1
+    for name in 'turn', 'timed_line', 'slider':
+        assert findings[name].data['law']
+    end = ur_sim.state()
+    assert end.q == pytest.approx(begin.q, abs=1e-4)
+    assert end.speed_slider == begin.speed_slider
+    assert end.runtime_state is RuntimeState.STOPPED
+
+
+@pytest.mark.parametrize(
+    'generation',
+    [
+        pytest.param('3', marks=pytest.mark.ur_sim(rate=4.0, model='ur5')),
+        pytest.param('10', marks=pytest.mark.ur_sim(rate=4.0, frequency=125.0, polyscope='10.12')),
+    ],
+)
+def test_the_other_generations_move_too(ur_sim, generation):
+    findings, _ = run_experiments(ur_sim, lambda motion: motion == EXPERIMENTS[0].motion)
+    assert findings['joint_move'].verdict is Verdict.OK
+
+
+def test_nothing_moves_without_a_yes(ur_sim):
+    begin = ur_sim.state()
+    findings, recordings = run_experiments(ur_sim, lambda _: False)
+    assert {finding.verdict for finding in findings.values()} == {Verdict.SKIPPED}
+    assert not recordings
+    assert ur_sim.state().q == begin.q
+    assert not ur_sim.state().program
+
+
+@pytest.mark.parametrize(
+    ('answer', 'agrees'),
+    [('y', True), (' Yes ', True), ('', False), ('n', False), ('yellow', False)],
+)
+def test_only_yes_is_yes(monkeypatch, answer, agrees):
+    monkeypatch.setattr(sys, 'stdin', StringIO(answer + '\n'))
+    assert check_robot.ask('The arm moves.') is agrees
+
+
+def test_without_a_terminal_no_motion_is_asked_for(capsys):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, 'stdin', StringIO('y\n' * 9))
+        assert main(['check-robot', '--robot-ip', '127.0.0.1', '--with-motion']) == 1
+    assert 'needs a terminal' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('prepare', 'words'),
+    [
+        (lambda sim: sim.protective_stop(), 'the safety mode is PROTECTIVE_STOP'),
+        (lambda sim: sim.call(lambda c: c.power_off()), 'switch it on'),
+        (lambda sim: sim.run_script(FOREIGN), 'a program is PLAYING; stop it'),
+    ],
+)
+def test_a_robot_that_is_not_ready_is_not_moved(ur_sim, prepare, words):
+    prepare(ur_sim)
+    ur_sim.call(lambda controller: [controller.step() for _ in range(5)])
+    findings, _ = run_experiments(ur_sim, lambda _: pytest.fail('nothing may be asked for'))
+    assert all(words in finding.text for finding in findings.values())
+
+
+def test_no_motion_where_something_is_wrong(ur_sim):
+    problem = Finding(check='software', verdict=Verdict.PROBLEM, text='Too old.')
+    findings = check_robot.experiment_findings(
+        address(ur_sim), [problem], lambda _: pytest.fail('nothing may be asked for'), {}
+    )
+    assert all('because of software' in finding.text for finding in findings)
+
+
+@pytest.mark.ur_sim(rate=4.0, frequency=125.0)
+def test_a_stop_of_the_robot_ends_an_experiment_and_the_slider_is_restored(ur_sim):
+    def agree(motion):
+        if 'slider' not in motion:
+            return False
+        ur_sim.inject('protective_stop at 2 s')
+        return True
+
+    findings, recordings = run_experiments(ur_sim, agree)
+    assert findings['slider'].verdict is Verdict.PROBLEM
+    assert 'PROTECTIVE_STOP' in findings['slider'].text
+    assert not recordings
+    assert ur_sim.state().speed_slider == 1.0
+
+
+@pytest.mark.ur_sim(remote_control=False)
+def test_a_robot_in_local_control_is_said_not_to_move(ur_sim):
+    findings, _ = run_experiments(ur_sim, lambda motion: motion == EXPERIMENTS[0].motion)
+    text = findings['joint_move'].text
+    assert text.startswith('Not finished: the arm does not move: ')
+    assert 'C210' in text

@@ -1,0 +1,149 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``check-robot``: what a robot tells, and experiments if a person agrees to each."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+from collections.abc import Callable
+from datetime import date
+import json
+from pathlib import Path
+import sys
+from typing import Any
+from xml.etree import ElementTree
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
+from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS, MotionSamples
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
+from ur_cartesian_driver.robot.check.observations import observe
+
+#: Exit status: nothing answers at the address; something keeps the driver from working.
+UNREACHABLE, HAS_PROBLEMS = 3, 1
+WARNING = (
+    'The arm will move. A hand on the emergency stop, nobody in reach, 10 cm of free space around '
+    'the tool.'
+)
+
+
+def check_robot(arguments: argparse.Namespace) -> int:
+    """Check a robot, write the report, and return the exit status."""
+    if arguments.with_motion and not sys.stdin.isatty():
+        raise ValueError('--with-motion asks before each motion, so it needs a terminal.')
+    address = RobotAddress(
+        host=arguments.robot_ip,
+        rtde_port=arguments.rtde_port,
+        primary_port=arguments.primary_port,
+        dashboard_port=arguments.dashboard_port,
+        robot_api_port=arguments.robot_api_port,
+    )
+    findings = asyncio.run(_observe(address, arguments.seconds))
+    recordings: dict[str, MotionSamples] = {}
+    if arguments.with_motion:
+        findings += experiment_findings(address, findings, ask, recordings)
+    path = Path(arguments.report)
+    path.write_text(json.dumps(_without_nan(report(findings, recordings))), encoding='utf-8')
+    print(f'\nreport: {path}')
+    return exit_status(findings)
+
+
+async def _observe(address: RobotAddress, seconds: float) -> list[Finding]:
+    findings = []
+    async for finding in observe(address, seconds):
+        show(finding)
+        findings.append(finding)
+    return findings
+
+
+def experiment_findings(
+    address: RobotAddress,
+    observed: list[Finding],
+    agrees: Callable[[str], bool],
+    recordings: dict[str, MotionSamples],
+) -> list[Finding]:
+    """
+    Carry out the experiments to which a person agrees.
+
+    :param agrees: asks about a motion.
+    :param recordings: gets the samples of each.
+    """
+    if problems := [f.check for f in observed if f.verdict is Verdict.PROBLEM]:
+        reason = f'No motion, because of {", ".join(problems)}'
+        findings = [skipped(experiment.check, reason) for experiment in EXPERIMENTS]
+    else:
+        print(f'\n{WARNING}')
+        findings = []
+        for experiment in EXPERIMENTS:
+            findings.append(_experiment(address, experiment, agrees, recordings))
+            show(findings[-1])
+    return findings
+
+
+def _experiment(
+    address: RobotAddress,
+    experiment: Experiment,
+    agrees: Callable[[str], bool],
+    recordings: dict[str, MotionSamples],
+) -> Finding:
+    try:
+        if refusal := asyncio.run(motion_refusal(address)):
+            return skipped(experiment.check, f'No motion: {refusal}')
+        if not agrees(experiment.motion):
+            return skipped(experiment.check, 'Not wanted')
+        if refusal := asyncio.run(motion_refusal(address)):  # things change while a person thinks
+            return skipped(experiment.check, f'No motion: {refusal}')
+        samples = asyncio.run(run_experiment(address, experiment))
+    except (OSError, DriverError) as error:
+        text = f'Not finished: {str(error).rstrip(".")}.'
+        return Finding(check=experiment.check, verdict=Verdict.PROBLEM, text=text)
+    recordings[experiment.check] = samples
+    return experiment.analyse(samples)
+
+
+def ask(motion: str) -> bool:
+    """Ask on the terminal; everything but yes is no."""
+    return input(f'\n{motion} Move? [y/N] ').strip().lower() in ('y', 'yes')
+
+
+def show(finding: Finding) -> None:
+    """Print a finding as one line."""
+    print(f'{finding.verdict.value:<8} {finding.check:<15} {finding.text}', flush=True)
+
+
+def exit_status(findings: list[Finding]) -> int:
+    """Return 0 if the driver can work, 1 if something keeps it from that, 3 if nobody answers."""
+    problems = {finding.check for finding in findings if finding.verdict is Verdict.PROBLEM}
+    if {'rtde', 'primary'} <= problems:
+        return UNREACHABLE
+    return HAS_PROBLEMS if problems else 0
+
+
+def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dict[str, Any]:
+    """Return what is sent in: no address, no serial number, no names of programs."""
+    return {
+        'format': 1,
+        'driver': ElementTree.parse(share_path() / 'package.xml').findtext('version'),
+        'date': date.today().isoformat(),
+        'findings': [
+            {
+                'check': finding.check,
+                'verdict': finding.verdict.value,
+                'text': finding.text,
+                'data': dict(finding.data),
+            }
+            for finding in findings
+        ],
+        'recordings': {check: samples.as_lists() for check, samples in recordings.items()},
+    }
+
+
+def _without_nan(value: Any) -> Any:
+    """Return a value with null for what the robot does not have: JSON knows no NaN."""
+    if isinstance(value, dict):
+        return {name: _without_nan(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(part) for part in value]
+    return None if value != value else value

@@ -1,0 +1,165 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Carries out one experiment: records, sends the program, and brings the tool back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from math import dist
+from typing import Any
+
+import numpy as np
+
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    encode_command,
+    PrimaryCommand,
+)
+from ur_cartesian_driver.robot.check.experiments import (
+    Experiment,
+    MotionSamples,
+    program,
+    return_program,
+)
+from ur_cartesian_driver.robot.check.finding import RobotAddress
+from ur_cartesian_driver.robot.check.primary_observations import (
+    LOCAL_CONTROL,
+    PrimaryProbe,
+)
+from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
+from ur_cartesian_driver.robot.rtde.probe import read_state
+from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_write, write_inputs
+from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
+
+RECORDED = (
+    'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'target_TCP_speed',
+    'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
+)  # fmt: skip
+#: How long a program may take to move the arm, and to end [s].
+START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
+#: What is recorded before and after the motion [s].
+MARGIN = 0.3
+#: The tool is back where it was [m].
+NEAR = 1e-4
+_SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
+
+
+async def motion_refusal(address: RobotAddress) -> str:
+    """
+    Return why the arm must not be moved now, as a clause; empty if it may be.
+
+    :raises OSError: the robot does not answer.
+    """
+    state = await read_state(address.host, address.rtde_port)
+    if state.safety_mode not in _SAFE:
+        return f'the safety mode is {state.safety_mode.name}'
+    if state.robot_mode is not RobotMode.RUNNING:
+        return f'the arm is in mode {state.robot_mode.name}; switch it on and release the brakes'
+    if state.runtime_state is not RuntimeState.STOPPED:
+        return f'a program is {state.runtime_state.name}; stop it'
+    return ''
+
+
+async def run_experiment(address: RobotAddress, experiment: Experiment) -> MotionSamples:
+    """
+    Move the arm as the experiment says, and return what was recorded.
+
+    However it ends, the program is stopped and the slider restored.
+
+    :raises OSError: the robot is lost, stops, or does not do it.
+    """
+    recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
+    probe = PrimaryProbe()
+    try:
+        await recorder.open()
+        await probe.open(address)
+        if not await recorder.wait_for(lambda row: True, START_TIMEOUT):
+            raise OSError('the robot streams nothing')
+        return await _run(address, experiment, recorder, probe)
+    finally:
+        recorder.close()
+        await probe.close()
+
+
+async def _run(
+    address: RobotAddress, experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe
+) -> MotionSamples:
+    before = recorder.newest
+    if experiment.slider is not None:
+        await _set_slider(address, experiment.slider)
+    try:
+        stop_sent = await _move(experiment, recorder, probe)
+        samples = _samples(recorder, stop_sent)
+        if dist(recorder.newest['target_TCP_pose'][:3], before['target_TCP_pose'][:3]) > NEAR:
+            await _play(recorder, probe, return_program(before['target_TCP_pose']))
+        return samples
+    finally:
+        probe.send(encode_command(PrimaryCommand.STOP_PROGRAM))
+        if experiment.slider is not None:
+            await _set_slider(address, before['target_speed_fraction'])
+
+
+async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe) -> float:
+    """Run the program; return when it was told to stop [s, clock of the controller]."""
+    await asyncio.sleep(MARGIN)
+    stop_sent = float('nan')
+    await _start(recorder, probe, program(experiment.check, experiment.script))
+    if experiment.stop_after is not None:
+        due = recorder.newest['timestamp'] + experiment.stop_after
+        await recorder.wait_for(lambda row: row['timestamp'] >= due, END_TIMEOUT)
+        stop_sent = recorder.newest['timestamp']
+        probe.send(encode_command(PrimaryCommand.STOP_PROGRAM))
+    await _finish(recorder)
+    await asyncio.sleep(MARGIN)
+    return stop_sent
+
+
+async def _play(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
+    await _start(recorder, probe, script)
+    await _finish(recorder)
+
+
+async def _start(recorder: RtdeRecorder, probe: PrimaryProbe, script: bytes) -> None:
+    """Send a program and wait until the arm moves."""
+    begin = recorder.newest['target_q']
+
+    def refusal() -> str:
+        return next((line for line in probe.lines if LOCAL_CONTROL in line), '')
+
+    probe.send(script)
+    await recorder.wait_for(lambda row: row['target_q'] != begin or bool(refusal()), START_TIMEOUT)
+    if recorder.newest['target_q'] == begin:
+        said = refusal() or ''.join(probe.lines[-1:]) or f'nothing in {START_TIMEOUT:g} s'
+        raise OSError(f'the arm does not move: {said}')
+
+
+async def _finish(recorder: RtdeRecorder) -> None:
+    """Wait until the program has ended."""
+
+    def ended(row: Mapping[str, Any]) -> bool:
+        return row['runtime_state'] == RuntimeState.STOPPED or row['safety_mode'] not in _SAFE
+
+    if not await recorder.wait_for(ended, END_TIMEOUT):
+        raise OSError(f'the program does not end within {END_TIMEOUT:g} s')
+    if (mode := recorder.newest['safety_mode']) not in _SAFE:
+        raise OSError(f'the robot stopped, with safety mode {SafetyMode(mode).name}')
+
+
+async def _set_slider(address: RobotAddress, fraction: float) -> None:
+    write = speed_slider_write(SetSpeedSliderCall(fraction=fraction))
+    if not await write_inputs(address.host, address.rtde_port, write):
+        raise OSError(f'the speed slider does not go to {fraction:.0%}')
+
+
+def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
+    speed = recorder.column('target_TCP_speed')
+    return MotionSamples(
+        time=recorder.column('timestamp'),
+        target_q=recorder.column('target_q'),
+        actual_q=recorder.column('actual_q'),
+        tool_speed=np.linalg.norm(speed[:, :3], axis=1),
+        scaling=recorder.column('speed_scaling'),
+        fraction=recorder.column('target_speed_fraction'),
+        stop_sent=stop_sent,
+    )

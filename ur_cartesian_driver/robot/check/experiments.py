@@ -1,0 +1,274 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Small motions that settle which law a controller moves by, and what their recordings show.
+
+Each is slow and short and begins where the arm stands; afterwards the tool is brought back there.
+The analyses are pure: samples in, a sentence and numbers out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from math import degrees, radians
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.robot.check.finding import Finding, note, ok
+
+Array: TypeAlias = NDArray[np.float64]
+
+#: Speed and acceleration of the joint motion [rad/s, rad/s^2], of the tool [m/s, m/s^2].
+JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
+TOOL_SPEED, TOOL_ACCELERATION = 0.05, 0.5
+WRIST_TURN, TOOL_TURN = radians(5.0), radians(10.0)
+TIMED_DISTANCE, TIMED_TIME = 0.02, 2.0
+STOP_DISTANCE = 0.06
+#: How long a path that begins with a program may take longer: one start ramp [s].
+MAX_START_COST = 0.1
+#: The slider in its experiment.
+SLIDER = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionSamples:
+    """
+    What was recorded, a row each cycle.
+
+    :param time: clock of the controller (n,) [s].
+    :param target_q: (n, 6) [rad].
+    :param actual_q: (n, 6) [rad].
+    :param tool_speed: of the target TCP (n,) [m/s].
+    :param scaling: speed_scaling (n,).
+    :param fraction: target_speed_fraction (n,).
+    :param stop_sent: when the program was told to stop, on the same clock; NaN = it was not.
+    """
+
+    time: Array
+    target_q: Array
+    actual_q: Array
+    tool_speed: Array
+    scaling: Array
+    fraction: Array
+    stop_sent: float = float('nan')
+
+    def as_lists(self) -> dict[str, Any]:
+        """Return everything as JSON has it, to the microradian."""
+        columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != 'stop_sent'}
+        return {name: np.round(column, 6).tolist() for name, column in columns.items()}
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Tell for each row whether the target differs from that before, (n,)."""
+        steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
+        return np.concatenate([[False], steps])
+
+    @property
+    def duration(self) -> float:
+        """The time from the first to the last step of the target [s]; 0 = it did not move."""
+        rows = np.flatnonzero(self.moving)
+        return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """
+    A motion and what it settles.
+
+    :param check: its name in the report and in doc/robot_program.md.
+    :param motion: what moves, how far and how fast; a sentence for the person who is asked.
+    :param script: body of the program that moves.
+    :param analyse: what the samples show.
+    :param slider: the speed slider during the motion; None = as it is.
+    :param stop_after: the program is stopped so long after the arm begins to move [s], on the
+        clock of the controller.
+    """
+
+    check: str
+    motion: str
+    script: str
+    analyse: Callable[[MotionSamples], Finding]
+    slider: float | None = None
+    stop_after: float | None = None
+
+
+def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:
+    """Return the time of a motion that accelerates, cruises and brakes [s]."""
+    if distance * acceleration < speed**2:
+        return float(2.0 * np.sqrt(distance / acceleration))
+    return distance / speed + speed / acceleration
+
+
+def _joint_move(samples: MotionSamples) -> Finding:
+    ideal = 2.0 * trapezoid_time(WRIST_TURN, JOINT_SPEED, JOINT_ACCELERATION)
+    extra = samples.duration - ideal
+    text = (
+        f'Wrist 3 took {samples.duration:.3f} s there and back, two trapezoids {ideal:.3f} s; '
+        f'so the program start costs {1e3 * extra:+.0f} ms (recorded on other robots: 80).'
+    )
+    expected = -0.01 < extra < MAX_START_COST
+    return (ok if expected else note)(
+        'joint_move', text, duration=samples.duration, trapezoids=ideal
+    )
+
+
+def _turn(samples: MotionSamples) -> Finding:
+    laws = {
+        law: trapezoid_time(TOOL_TURN, n * TOOL_SPEED, n * TOOL_ACCELERATION)
+        for law, n in (('turning runs with 4 v and 4 a', 4), ('turning runs with v and a', 1))
+    }
+    one_turn = samples.duration / 2.0
+    law = _nearest(one_turn, laws)
+    text = (
+        f'A movel that turns by {degrees(TOOL_TURN):.0f} degrees on the spot, with v = '
+        f'{TOOL_SPEED:g} and a = {TOOL_ACCELERATION:g}, takes {one_turn:.2f} s: '
+        f'{law or "no known law"}.'
+    )
+    return (ok if law else note)('turn', text, duration=one_turn, law=law)
+
+
+def _timed_line(samples: MotionSamples) -> Finding:
+    """Tell a stretched trapezoid (peak 2 d/T where it never cruises) from thirds (1.5 d/T)."""
+    peak = float(samples.tool_speed.max()) * TIMED_TIME / TIMED_DISTANCE
+    law = _nearest(peak, {'t stretches the trapezoid': 2.0, 't makes thirds': 1.5})
+    text = (
+        f'A line of {1e3 * TIMED_DISTANCE:g} mm in t = {TIMED_TIME:g} s took '
+        f'{samples.duration:.3f} s with {peak:.2f} times its mean speed at most: '
+        f'{law or "no known law"}.'
+    )
+    return (ok if law else note)(
+        'timed_line', text, duration=samples.duration, peak_over_mean=peak, law=law
+    )
+
+
+def _slider(samples: MotionSamples) -> Finding:
+    moving = samples.moving
+    if not moving.any():
+        return note('slider', 'The arm did not move.')
+    scaling, fraction = (float(np.median(x[moving])) for x in (samples.scaling, samples.fraction))
+    law = _nearest(
+        scaling, {'it does not contain the slider': 1.0, 'it contains the slider': SLIDER}
+    )
+    text = (
+        f'With the slider at {SLIDER:.0%} speed_scaling is {scaling:.2f} and '
+        f'target_speed_fraction {fraction:.2f} while the arm moves: {law or "no known law"}.'
+    )
+    return (ok if law else note)(
+        'slider', text, speed_scaling=scaling, target_speed_fraction=fraction, law=law
+    )
+
+
+def _program_stop(samples: MotionSamples) -> Finding:
+    """Measure the ramp of a program that is stopped in motion."""
+    moving = np.flatnonzero(samples.moving & (samples.time >= samples.stop_sent))
+    if not len(moving):
+        return note('program_stop', 'The program was stopped too late: the arm stood already.')
+    before = np.median(samples.tool_speed[max(0, moving[0] - 20) : moving[0] + 1])
+    slow = moving[samples.tool_speed[moving] < 0.97 * before]
+    end = samples.time[moving[-1]]
+    ramp = float(end - samples.time[slow[0]]) if len(slow) else 0.0
+    reaction = float(end - ramp - samples.stop_sent)
+    distance = float(np.sum(samples.tool_speed[slow]) * np.median(np.diff(samples.time)))
+    return ok(
+        'program_stop',
+        f'A stopped program brakes from {before:.3f} m/s within {1e3 * ramp:.0f} ms and '
+        f'{1e3 * distance:.1f} mm, {1e3 * reaction:.0f} ms after the command (recorded once: '
+        '160 ms).',
+        speed=float(before),
+        ramp=ramp,
+        reaction=reaction,
+        distance=distance,
+    )
+
+
+def _nearest(value: float, laws: dict[str, float]) -> str:
+    """Return the law that predicts a value within 15 %; empty = none does."""
+    name = min(laws, key=lambda law: abs(value / laws[law] - 1.0))
+    return name if abs(value / laws[name] - 1.0) < 0.15 else ''
+
+
+def _tool_line(x: float, options: str) -> str:
+    return (
+        'start = get_target_tcp_pose()\n'
+        f'movel(pose_trans(start, p[0, 0, {x:g}, 0, 0, 0]), {options})'
+    )
+
+
+_THERE_AND_BACK = f"""start = get_target_joint_positions()
+goal = [start[0], start[1], start[2], start[3], start[4], start[5] + {WRIST_TURN:.6f}]
+movej(goal, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})
+movej(start, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})"""
+_SLOW = f'a={TOOL_ACCELERATION:g}, v={TOOL_SPEED:g}'
+_WRIST = f'Wrist 3 turns by {degrees(WRIST_TURN):.0f} degrees and back, at up to'
+_RETRACT = 'mm against its z axis, away from the work'
+
+EXPERIMENTS = (
+    Experiment(
+        check='joint_move',
+        motion=f'{_WRIST} {degrees(JOINT_SPEED):.0f} degrees/s.',
+        script=_THERE_AND_BACK,
+        analyse=_joint_move,
+    ),
+    Experiment(
+        check='turn',
+        motion=(
+            f'The tool turns by {degrees(TOOL_TURN):.0f} degrees about its z axis and back, at up '
+            f'to {degrees(4.0 * TOOL_SPEED):.0f} degrees/s; the TCP stays where it is.'
+        ),
+        script=(
+            'start = get_target_tcp_pose()\n'
+            f'movel(pose_trans(start, p[0, 0, 0, 0, 0, {TOOL_TURN:.6f}]), {_SLOW})\n'
+            f'movel(start, {_SLOW})'
+        ),
+        analyse=_turn,
+    ),
+    Experiment(
+        check='timed_line',
+        motion=(
+            f'The tool moves {1e3 * TIMED_DISTANCE:g} {_RETRACT}, in {TIMED_TIME:g} s, and back '
+            f'at {1e3 * TOOL_SPEED:g} mm/s.'
+        ),
+        script=_tool_line(-TIMED_DISTANCE, f't={TIMED_TIME:g}'),
+        analyse=_timed_line,
+    ),
+    Experiment(
+        check='slider',
+        motion=(
+            f'The speed slider goes to {SLIDER:.0%} and back to where it is. {_WRIST} '
+            f'{degrees(JOINT_SPEED * SLIDER):.0f} degrees/s.'
+        ),
+        script=_THERE_AND_BACK,
+        analyse=_slider,
+        slider=SLIDER,
+    ),
+    Experiment(
+        check='program_stop',
+        motion=(
+            f'The tool moves less than {1e3 * STOP_DISTANCE:g} {_RETRACT}, at '
+            f'{1e3 * TOOL_SPEED:g} mm/s; the program is stopped on the way, and the tool moves '
+            'back at the same speed.'
+        ),
+        script=_tool_line(-STOP_DISTANCE, _SLOW),
+        analyse=_program_stop,
+        stop_after=0.6,
+    ),
+)
+
+
+def program(name: str, body: str) -> bytes:
+    """Return a program for the primary interface."""
+    lines = '\n'.join(f'  {line}' for line in body.splitlines())
+    return f'def ur_check_{name}():\n{lines}\nend\n'.encode()
+
+
+def return_program(pose: Sequence[float]) -> bytes:
+    """
+    Return a program that moves straight to a pose.
+
+    :param pose: ``x y z rx ry rz`` of the TCP in the base [m, rad].
+    """
+    numbers = ', '.join(f'{value:.6f}' for value in pose)
+    return program('return', f'movel(p[{numbers}], {_SLOW})')

@@ -1,0 +1,68 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a check of a robot has found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+
+class Verdict(Enum):
+    """What a finding means for this driver."""
+
+    OK = 'ok'
+    #: Worth knowing: less works, or the robot differs from what was expected.
+    NOTE = 'note'
+    #: The driver does not work like this.
+    PROBLEM = 'problem'
+    SKIPPED = 'skipped'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """
+    The outcome of one check.
+
+    :param check: its name, as in the table of doc/robot_program.md.
+    :param text: one sentence.
+    :param data: numbers behind it, for the report; never who or where the robot is.
+    """
+
+    check: str
+    verdict: Verdict
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotAddress:
+    """Where a robot listens."""
+
+    host: str
+    rtde_port: int = 30004
+    primary_port: int = 30001
+    dashboard_port: int = 29999
+    robot_api_port: int = 80
+
+
+def ok(check: str, text: str, **data: Any) -> Finding:
+    """Return a finding that is as it should be."""
+    return Finding(check=check, verdict=Verdict.OK, text=text, data=data)
+
+
+def note(check: str, text: str, **data: Any) -> Finding:
+    """Return a finding worth knowing."""
+    return Finding(check=check, verdict=Verdict.NOTE, text=text, data=data)
+
+
+def problem(check: str, clause: str) -> Finding:
+    """Return a finding that keeps the driver from working; the clause gets its full stop."""
+    return Finding(check=check, verdict=Verdict.PROBLEM, text=f'{clause.rstrip(".")}.')
+
+
+def skipped(check: str, reason: str) -> Finding:
+    """Return a check that could not be made, and why, as a clause."""
+    return Finding(check=check, verdict=Verdict.SKIPPED, text=f'{reason}.')

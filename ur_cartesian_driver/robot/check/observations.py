@@ -1,0 +1,110 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What can be observed of a robot without moving it or changing anything.
+
+Two things leave a trace for a moment: RTDE inputs are requested and released without a write, and
+a secondary program writes one line to the robot's log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.protocol.robot_api import FIRST_VERSION
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.check.finding import (
+    Finding,
+    note,
+    ok,
+    problem,
+    RobotAddress,
+)
+from ur_cartesian_driver.robot.check.primary_observations import observe_primary
+from ur_cartesian_driver.robot.check.rtde_observations import (
+    EXTRA_OUTPUTS,
+    observe_inputs,
+    observe_rtde,
+)
+from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
+from ur_cartesian_driver.robot.rtde.state_recipe import STATE_FIELDS
+from ur_cartesian_driver.robot.services.dashboard_connection import (
+    DashboardConnection,
+    POLYSCOPE_X,
+    unavailable_reason,
+)
+from ur_cartesian_driver.robot.services.robot_api_connection import RobotApiConnection
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
+
+#: The interfaces that only other clients need.
+OTHER_PORTS = {'secondary': 30002, 'real-time': 30003, 'interpreter': 30020}
+
+
+async def observe(address: RobotAddress, seconds: float) -> AsyncIterator[Finding]:
+    """
+    Yield what the robot tells.
+
+    :param seconds: how long the stream of RTDE is recorded [s].
+    """
+    recorder = RtdeRecorder(
+        [*STATE_FIELDS, *(n for n in EXTRA_OUTPUTS if n not in STATE_FIELDS)],
+        address.host,
+        address.rtde_port,
+    )
+    version: ControllerVersion | None = None
+    try:
+        version = await recorder.open()
+    except OSError as error:
+        yield problem(
+            'rtde', f'{error}; switch RTDE on (Settings, Security, Services), check the address'
+        )
+    else:
+        for finding in await observe_rtde(recorder, version, seconds):
+            yield finding
+        async for finding in observe_inputs(address):
+            yield finding
+    recorder.close()
+    async for finding in observe_primary(address, version, recorder.newest):
+        yield finding
+    if version is not None:
+        yield await _observe_remote_control(address, version)
+    yield await _observe_other_ports(address)
+
+
+async def _observe_remote_control(address: RobotAddress, version: ControllerVersion) -> Finding:
+    """Ask dashboard or Robot API; CB3 has no such mode."""
+    check = 'remote_control'
+    number = (version.major, version.minor)
+    if version.major >= POLYSCOPE_X and number < FIRST_VERSION:
+        return note(check, f'PolyScope X {version} has neither dashboard nor Robot API.')
+    client = (
+        RobotApiConnection(address.host, address.robot_api_port, version)
+        if version.major >= POLYSCOPE_X
+        else DashboardConnection(address.host, address.dashboard_port)
+    )
+    name = 'Robot API' if version.major >= POLYSCOPE_X else 'dashboard'
+    missing = unavailable_reason('is in remote control', version)
+    try:
+        reply = await client.request('programState' if missing else 'is in remote control')
+    except (OSError, DriverError) as error:
+        return note(check, f'{str(error).rstrip(".")}: services below ~/dashboard/ will not work.')
+    if missing:
+        return ok(check, f'The {name} answers; it does not tell about remote control.')
+    answer = reply.value if reply.ok else reply.text
+    return ok(check, f'The {name} answers; remote control: {answer}.', remote_control=answer)
+
+
+async def _observe_other_ports(address: RobotAddress) -> Finding:
+    is_open = {}
+    for name, port in OTHER_PORTS.items():
+        connection = TcpConnection(lambda _: None, lambda _: None)
+        try:
+            await dial(connection, address.host, port)
+            is_open[name] = True
+        except OSError:
+            is_open[name] = False
+        finally:
+            connection.close()
+    found = ', '.join(name for name, there in is_open.items() if there) or 'none'
+    return ok('other_ports', f'Open interfaces that this driver does not use: {found}.', **is_open)

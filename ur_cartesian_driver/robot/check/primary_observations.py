@@ -1,0 +1,210 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the primary interface tells: model, limits, calibration, and whether it takes scripts."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping
+import contextlib
+from math import degrees
+from typing import Any
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.robot.check.finding import (
+    Finding,
+    note,
+    ok,
+    problem,
+    RobotAddress,
+    skipped,
+)
+from ur_cartesian_driver.robot.link import model_names
+from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
+
+#: A program that runs beside any other and writes one line to the log.
+RIGHTS_MARK = 'ur-cartesian check-robot'
+RIGHTS_PROGRAM = f'sec ur_check_rights():\n  textmsg("{RIGHTS_MARK}")\nend\n'.encode()
+#: The code of a refusal because the robot is in local control.
+LOCAL_CONTROL = 'C210'
+#: How long the robot may take to report its configuration, and to run that program [s].
+CONFIGURATION_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 3.0
+
+
+class PrimaryProbe:
+    """A connection to the primary interface, with what the robot has said on it."""
+
+    def __init__(self) -> None:
+        """Prepare; :meth:`open` connects."""
+        self.configuration: ConfigurationData | None = None
+        self.geometry: DhTable | None = None
+        #: Texts and errors of the robot, in their order.
+        self.lines: list[str] = []
+        self._failure = ''
+        self._news = asyncio.Event()
+        self._client = PrimaryClient(
+            PrimaryCallbacks(
+                configuration=lambda found: self._learn(configuration=found),
+                geometry=lambda found: self._learn(geometry=found),
+                error=lambda text: self._learn(lines=[*self.lines, text]),
+                text=lambda text: self._learn(lines=[*self.lines, text]),
+                connection_error=lambda text: self._learn(_failure=text),
+            )
+        )
+        self._task: asyncio.Task[Any] | None = None
+
+    async def open(self, address: RobotAddress) -> None:
+        """
+        Connect and wait for the configuration.
+
+        :raises OSError: the robot does not answer, or does not report it.
+        """
+        self._task = asyncio.create_task(
+            self._client.stay_connected(address.host, address.primary_port)
+        )
+        await self._wait(lambda: bool(self.configuration or self._failure), CONFIGURATION_TIMEOUT)
+        if self.configuration is None:
+            raise OSError(self._failure or 'primary interface: no configuration is reported')
+
+    async def close(self) -> None:
+        """Disconnect."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    def send(self, program: bytes) -> bool:
+        """
+        Send a program or a command; False if the connection is gone.
+
+        A read-only connection is made anew and gets it once more, before the refusal counts.
+        """
+        return self._client.send(program, lambda: True)
+
+    async def find_line(self, *parts: str, time: float = RIGHTS_TIMEOUT) -> str:
+        """Wait for a line with one of the parts; empty if none comes in time [s]."""
+
+        def found() -> str:
+            return next((line for line in self.lines if any(p in line for p in parts)), '')
+
+        await self._wait(lambda: bool(found()), time)
+        return found()
+
+    def _learn(self, **found: Any) -> None:
+        for name, value in found.items():
+            setattr(self, name, value)
+        self._news.set()
+
+    async def _wait(self, is_there: Callable[[], bool], time: float) -> None:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(time):
+                while not is_there():
+                    self._news.clear()
+                    await self._news.wait()
+
+
+async def observe_primary(
+    address: RobotAddress, version: ControllerVersion | None, state: Mapping[str, Any]
+) -> AsyncIterator[Finding]:
+    """
+    Yield what the primary interface shows.
+
+    :param version: software of the robot; None = unknown.
+    :param state: newest RTDE outputs by name; empty = none.
+    """
+    probe = PrimaryProbe()
+    try:
+        await probe.open(address)
+    except OSError as error:
+        yield problem(
+            'primary', f'{error}; switch the primary client interface on, in the same place'
+        )
+    else:
+        configuration = probe.configuration
+        assert configuration is not None
+        if version is not None:
+            models = model_names(configuration.robot_type, version.major)
+            yield _model(models)
+            yield _limits(configuration)
+            await asyncio.sleep(0.2)  # the kinematics come in a later state
+            yield _calibration(models[0], probe.geometry, state)
+        yield await _rights(probe)
+    finally:
+        await probe.close()
+
+
+def _model(models: list[str]) -> Finding:
+    if models[0].startswith('robot'):
+        return problem('model', f'It is a {models[0]}')
+    return ok('model', f'It is a {" or ".join(models)}: set ur_type to that.', models=list(models))
+
+
+def _limits(configuration: ConfigurationData) -> Finding:
+    speeds = [round(degrees(speed)) for speed, _ in configuration.motion_limits]
+    return ok(
+        'joint_limits',
+        f'Largest joint speeds {speeds} degrees/s; moves without v and a use '
+        f'{configuration.v_tool_default:g} m/s and {configuration.a_tool_default:g} m/s^2, '
+        f'{configuration.v_joint_default:.3f} rad/s and {configuration.a_joint_default:.3f} '
+        'rad/s^2.',
+        position=[list(pair) for pair in configuration.position_limits],
+        speed_and_acceleration=[list(pair) for pair in configuration.motion_limits],
+        defaults={
+            'v_joint': configuration.v_joint_default,
+            'a_joint': configuration.a_joint_default,
+            'v_tool': configuration.v_tool_default,
+            'a_tool': configuration.a_tool_default,
+            'eq_radius': configuration.eq_radius,
+        },
+    )
+
+
+def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any]) -> Finding:
+    """Compare the reported pose with the kinematics, as the driver does before it moves."""
+    if geometry is None or 'actual_q' not in state:
+        return skipped('calibration', 'The robot did not report its calibration')
+    try:
+        nominal = Arm(robot_model(model))
+    except ValueError as error:
+        return skipped('calibration', str(error).rstrip('.'))
+    arm = Arm(robot_model(model), geometry)
+    T_flange_tcp = Pose.from_rotation_vector(state['tcp_offset'])
+    reported = Pose.from_rotation_vector(state['actual_TCP_pose'])
+    pose_error = 1e3 * (arm.forward(state['actual_q']) @ T_flange_tcp).distance_to(reported)
+    difference = 1e3 * arm.max_flange_distance(nominal)
+    text = (
+        f'The calibration moves the flange by up to {difference:.2f} mm, and the reported pose is '
+        f'{pose_error:.3f} mm from that of the calibrated kinematics.'
+    )
+    data = {'difference_mm': round(difference, 3), 'pose_error_mm': round(pose_error, 4)}
+    return (ok if pose_error < 0.5 else note)('calibration', text, **data)
+
+
+async def _rights(probe: PrimaryProbe) -> Finding:
+    """Send a program that only writes a line, and see whether the robot takes it."""
+    loop = asyncio.get_running_loop()
+    begin = loop.time()
+    probe.send(RIGHTS_PROGRAM)
+    line = await probe.find_line(RIGHTS_MARK, LOCAL_CONTROL)
+    passed = loop.time() - begin
+    if RIGHTS_MARK in line:
+        return ok(
+            'scripts',
+            f'The robot takes scripts from the network, and answers after {1e3 * passed:.0f} ms.',
+            accepted=True,
+            seconds=round(passed, 4),
+        )
+    why = (
+        f'it is in local control ({LOCAL_CONTROL})'
+        if line
+        else f'nothing came back in {RIGHTS_TIMEOUT:g} s'
+    )
+    return note(
+        'scripts',
+        f'The robot takes no scripts from the network: {why}. headless_mode and recover need '
+        'remote control.',
+        accepted=False,
+    )

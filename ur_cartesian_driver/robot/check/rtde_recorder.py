@@ -1,0 +1,95 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Records RTDE packets with the times of their arrival."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+
+
+class RtdeRecorder:
+    """Records from its opening to its end; used once, from one event loop."""
+
+    def __init__(self, names: Sequence[str], host: str, port: int) -> None:
+        """
+        Prepare.
+
+        :param names: RTDE outputs, of which the robot may lack all but ``timestamp``.
+        """
+        self.names: tuple[str, ...] = ()
+        self.rows: list[RtdeValues] = []
+        #: When each row came in, on the clock of the event loop [s].
+        self.arrivals: list[float] = []
+        self._requested = tuple(names)
+        self._address = host, port
+        self._connection = RtdeConnection(
+            RtdeClientCodec(
+                outputs=self._requested,
+                optional_outputs=[name for name in names if name != 'timestamp'],
+            ),
+            self._take,
+        )
+
+    async def open(self) -> ControllerVersion:
+        """
+        Begin, and return the software of the controller.
+
+        :raises OSError: nobody answers, or not as a robot.
+        """
+        return await self._connection.open(*self._address)
+
+    def close(self) -> None:
+        """End."""
+        self._connection.close()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The outputs that the robot lacks."""
+        return tuple(name for name in self._requested if name not in self.names)
+
+    @property
+    def newest(self) -> Mapping[str, Any]:
+        """The values of the newest row by their names; empty before the first."""
+        return dict(zip(self.names, self.rows[-1], strict=True)) if self.rows else {}
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return the values of an output, (n,) or (n, 6); NaN if the robot lacks it."""
+        if name not in self.names:
+            return np.full(len(self.rows), np.nan)
+        i = self.names.index(name)
+        return np.array([row[i] for row in self.rows], dtype=float)
+
+    async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
+        """
+        Wait until the newest row shows something; return whether it did in time [s].
+
+        :raises OSError: the connection ended.
+        """
+        ended = asyncio.create_task(self._connection.ended())
+        end = asyncio.get_running_loop().time() + time
+        try:
+            while not (self.rows and is_reached(self.newest)):
+                if ended.done():
+                    host, port = self._address
+                    raise OSError(f'{host} port {port} (RTDE): {ended.result()}')
+                if asyncio.get_running_loop().time() >= end:
+                    return False
+                await asyncio.sleep(0.002)
+            return True
+        finally:
+            ended.cancel()
+
+    def _take(self, names: Sequence[str], values: RtdeValues) -> None:
+        self.names = tuple(names)
+        self.rows.append(values)
+        self.arrivals.append(asyncio.get_running_loop().time())
