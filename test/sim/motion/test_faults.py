@@ -107,7 +107,7 @@ def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, beg
     [
         lambda g: g.speedj((0.0, 0.0, 0.0, 0.0, 0.0, 3.0), 10.0, 100.0),
         lambda g: g.speedl((0.0, 0.0, 0.0, 0.0, 0.0, -1.0), 10.0, 100.0),
-        lambda g: g.servoj((*HOME[:5], 7.0), 100.0),
+        lambda g: g.servoj((*HOME[:5], 7.0), 3.0),
     ],
 )
 def test_joint_limit_is_approached_slowly_and_never_crossed(recorder, call):

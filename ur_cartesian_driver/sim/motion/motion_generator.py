@@ -242,10 +242,11 @@ class MotionGenerator:
     def servoj(
         self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
     ) -> Move:
-        """Follow ``q`` for ``t`` scaled seconds."""
-        qd = self._active.nominal_joint_speed()
+        """Lead the set-point to ``q`` within ``t`` scaled seconds, and follow it."""
+        qd, before = self._active.nominal_joint_speed(), self._active.motion
+        begin = before.setpoint(before.elapsed) if isinstance(before, ServoMotion) else self.q
         return self._replace(
-            ServoMotion(self.q, qd, q, t, lookahead_time, gain, MAX_JOINT_ACCELERATION)
+            ServoMotion(self.q, qd, begin, q, t, lookahead_time, gain, MAX_JOINT_ACCELERATION)
         )
 
     def speedj(self, qd: Vector6, a: float, t: float | None = None) -> Move:

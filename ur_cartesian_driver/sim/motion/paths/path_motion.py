@@ -22,6 +22,7 @@ from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     s_curve,
     timed,
     timed_cruise,
+    timed_ramp,
     trapezoid,
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import (
@@ -46,7 +47,7 @@ class ProfileParameters:
     """
     Speed and acceleration along a path, in its unit (rad or m) per second.
 
-    :param time: [s], replaces speed and acceleration unless 0.
+    :param time: [s]; unless 0, speed and acceleration only say how it is divided.
     :param jerk: bound, for an S-curve; None = trapezoid.
     :param braking: at the end, where it differs from the acceleration.
     """
@@ -60,10 +61,14 @@ class ProfileParameters:
     def profile(self, length: float, start_speed: float = 0.0) -> MotionProfile:
         """Return the profile over a length, to rest."""
         if self.time > 0.0:
-            return timed(length, self.time, start_speed)
+            return timed(length, self.time, start_speed, self.ramp_part(length))
         if self.jerk is not None:
             return s_curve(length, self.acceleration, self.speed, self.jerk, start_speed)
         return trapezoid(length, self.acceleration, self.speed, start_speed, self.braking)
+
+    def ramp_part(self, length: float) -> float:
+        """Return the part of its time in which a timed move of a length speeds up, and brakes."""
+        return timed_ramp(length, self.acceleration, self.speed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +78,12 @@ class PathSection:
 
     :param offset: path parameter at which the profile begins.
     :param stop: time of the profile at which the next section takes over.
-    :param halt: whether a cycle has to end exactly there.
     """
 
     path: MotionPath
     profile: MotionProfile
     offset: float
     stop: float
-    halt: bool = False
 
     def at(self, time: float) -> Setpoint:
         """Return the set-point; the exact end of the path at the end of the profile."""
@@ -109,16 +112,18 @@ class PathMotion:
     """
     Sections to follow and the progress of the arm: time [s] in the profile of section ``index``.
 
-    The last section always belongs to ``last_move``.
+    The last section always belongs to ``last_move``. ``spare`` is what its end has left of the
+    last cycle [s].
     """
 
     sections: tuple[PathSection, ...]
     last_move: LastMove
     index: int = 0
     time: float = 0.0
+    spare: float = 0.0
     real_time = False
 
-    def preview(self, h: float) -> tuple[Setpoint, tuple[int, float]]:
+    def preview(self, h: float) -> tuple[Setpoint, tuple[int, float, float]]:
         """Return the set-point after ``h`` more seconds of the profile."""
         i, t = self.index, self.time
         while True:
@@ -128,15 +133,15 @@ class PathMotion:
                 t += h
                 break
             last = i + 1 == len(self.sections)
-            if last or (section.halt and left > _ROUNDING):
-                t = section.stop
-                break
-            h, i, t = max(h - left, 0.0), i + 1, 0.0
-        return self.sections[i].at(t), (i, t)
+            h = max(h - left, 0.0)
+            if last:
+                return self.sections[i].at(section.stop), (i, section.stop, h)
+            i, t = i + 1, 0.0
+        return self.sections[i].at(t), (i, t, 0.0)
 
     def accept(self, state: Any) -> None:
         """Go to a state that ``preview`` returned."""
-        self.index, self.time = state
+        self.index, self.time, self.spare = state
 
     @property
     def finished(self) -> bool:
@@ -153,13 +158,21 @@ class PathMotion:
 
 
 def start_from_rest(
-    move_path: MovePath, parameters: ProfileParameters, radius: float, call: Move
+    move_path: MovePath,
+    parameters: ProfileParameters,
+    radius: float,
+    call: Move,
+    spare: float = 0.0,
 ) -> PathMotion:
-    """Return the motion along one path, from rest to rest."""
+    """
+    Return the motion along one path, from rest to rest.
+
+    :param spare: what the move before has left of the last cycle [s].
+    """
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
     entry = _blend_entry_time(section, move_path, radius)
-    return PathMotion((section,), LastMove(move_path, parameters, radius, entry, call))
+    return PathMotion((section,), LastMove(move_path, parameters, radius, entry, call), 0, spare)
 
 
 def append_move_path(
@@ -186,7 +199,7 @@ def append_move_path(
     head = _blend_head(last_move, tail, last.profile.speed(leave), move_path)
     if head is None:
         rest = start_from_rest(move_path, parameters, radius, call)
-        sections = (*ahead, replace(last, halt=True), *rest.sections)
+        sections = (*ahead, last, *rest.sections)
         return PathMotion(sections, rest.last_move, 0, path_motion.time), False
     blend = make_blend(last_move.move_path, tail, move_path, head, circular)
     through, after = _blend_profiles(
@@ -258,9 +271,10 @@ def _blend_profiles(
     u0 = speed / entry_rate
     time = after.time + remaining
     whole = head + rest
+    part = after.ramp_part(whole)
     if after.time > 0.0:
-        cruise = timed_cruise(whole + head, time, u0 * exit_rate)
-        acceleration, stoppable = 4.5 * whole / after.time**2, inf
+        cruise = timed_cruise(whole + head, time, u0 * exit_rate, part)
+        acceleration, stoppable = whole / (part * (1.0 - part) * after.time**2), inf
     else:
         cruise, acceleration = after.speed, after.acceleration
         stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)
@@ -269,7 +283,8 @@ def _blend_profiles(
     through = ramp(1.0, u0, u1)
     if after.time > 0.0:
         min_time = time * rest / (whole + head) / _MAX_CATCH_UP
-        after = replace(after, time=max(time - through.duration, min_time))
+        left = max(time - through.duration, min_time)
+        return through, timed(rest, left, u1 * exit_rate, part)
     return through, after.profile(rest, u1 * exit_rate)
 
 

@@ -53,14 +53,17 @@ class PathQueue:
         #: Whether the last path move is a movep.
         self._after_movep = False
         self._overlap: _Overlap | None = None
+        #: What the move that has just ended has left of its cycle [s]: a move that follows at once
+        #: begins that much earlier, so that moves are not rounded to cycles.
+        self._spare = 0.0
 
     def clear(self) -> None:
         """Forget the move that waits."""
         self._waiting = self._overlap = None
 
     def end_of_frame(self) -> None:
-        """Keep an overlapping waypoint, because no other move has followed at once."""
-        self._overlap = None
+        """Keep an overlapping waypoint, and no spare time: no other move has followed at once."""
+        self._overlap, self._spare = None, 0.0
 
     def begin(self, call: MotionCall) -> None:
         """
@@ -107,6 +110,7 @@ class PathQueue:
         if motion.may_return(self._target.cycle):
             motion.last_move.call.returned = True
         if motion.finished:
+            self._spare = motion.spare
             self.finish_at_rest()
 
     def _wait(self, call: MotionCall) -> None:
@@ -117,9 +121,8 @@ class PathQueue:
         target.activate_tcp()
         start = PathStart(target.q, target.T_base_tcp)
         move_path = call.move_path(start)
-        path_motion = start_from_rest(
-            move_path, call.parameters_of(move_path, start), call.radius, call.move
-        )
+        parameters = call.parameters_of(move_path, start)
+        path_motion = start_from_rest(move_path, parameters, call.radius, call.move, self._spare)
         margin = _distance_to_waypoint(start.pose, move_path) - call.radius
         self._follow(None, path_motion, call, margin)
 
