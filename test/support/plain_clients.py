@@ -8,6 +8,7 @@ What they see is what any other client of a robot sees.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import socket
 import struct
 import time
@@ -109,3 +110,48 @@ class PlainDashboard:
     def ask(self, line: str) -> str:
         self.socket.sendall(line.encode() + b'\n')
         return self._lines.readline().removesuffix('\n')
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A packet of the real-time interface: targets [s, rad, rad/s, m]."""
+
+    time: float
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    #: x, y, z and rotation vector of the tool in the base.
+    pose: tuple[float, ...]
+
+
+class PlainRealtime:
+    """The real-time interface (30003): a packet of doubles in each cycle."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.socket = socket.create_connection((host, port), timeout=TIMEOUT)
+        self._stream = self.socket.makefile('rb')
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stream.close()
+        self.socket.close()
+
+    def next(self) -> Sample:
+        (size,) = struct.unpack('>i', self._stream.read(4))
+        values = struct.unpack(f'>{(size - 4) // 8}d', self._stream.read(size - 4))
+        return Sample(values[0], values[1:7], values[7:13], values[73:79])
+
+    def motion(self, script: str) -> list[Sample]:
+        """Send a program; return its motion from the last sample at rest to the first again."""
+        self.socket.sendall(script.encode())
+        before = sample = self.next()
+        start = sample.time
+        while not any(sample.qd):
+            assert sample.time < start + TIMEOUT, 'nothing moves'
+            before, sample = sample, self.next()
+        samples = [before, sample]
+        # An arm that stands for 50 ms has arrived.
+        while any(any(sample.qd) for sample in samples[-25:]):
+            samples.append(self.next())
+        return samples[:-24]

@@ -55,6 +55,8 @@ START_TIME = 60.0
 #: real robot are not published.
 SLIDER_TIME = 0.25
 PROTECTIVE_STOP_TIME = 0.1
+#: The same for a program that ends on its path: a recorded UR5e of URSim loses 6.25 per second.
+PROGRAM_STOP_TIME = 0.16
 #: How many cycles back programs can ask for joint positions.
 _MAX_HISTORY = 100
 _MAX_POPUPS = 100
@@ -127,6 +129,8 @@ class Controller:
         self.speed_slider = 1.0
         #: The rate at which motion runs now, 0..1; it follows slider, pauses and stops.
         self.scale = 1.0
+        #: Whether a program has ended in motion, and the arm slows down on its path.
+        self._stopping_on_path = False
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
             make_builtins(self),
@@ -202,6 +206,9 @@ class Controller:
             self.safety_event(SafetyEvent.UNLOCK_BY_LINE)
         self.sockets.poll()
         self._watch_inputs()
+        if self._stopping_on_path and self.at_rest:
+            self._stopping_on_path = False
+            self.motion.stop_at_once()
         was_at_rest = not self.motion.moving
         self.programs.step()
         self._change_scale(was_at_rest)
@@ -218,12 +225,13 @@ class Controller:
         :param was_at_rest: the arm stood before this cycle, so it needs no ramp.
         """
         paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
-        target = 0.0 if paused else self.speed_slider
+        target = 0.0 if paused or self._stopping_on_path else self.speed_slider
         if was_at_rest:
             self.scale = target
             return
+        time = PROGRAM_STOP_TIME if self._stopping_on_path else SLIDER_TIME
         stopped = self.safety.mode not in OPERATIONAL
-        step = self.cycle / (PROTECTIVE_STOP_TIME if stopped else SLIDER_TIME)
+        step = self.cycle / (PROTECTIVE_STOP_TIME if stopped else time)
         self.scale = min(max(target, self.scale - step), self.scale + step)
 
     def _report_motion_events(self) -> None:
@@ -253,10 +261,22 @@ class Controller:
     # ---- called by the program runner ---------------------------------------------------------
 
     def brake(self) -> None:
-        """Stop hard; an arm that stands on its path, paused or at a fault, drops the path."""
+        """
+        Stop for a program that has ended: on its path, or hard where there is none.
+
+        An arm that stands on its path, paused or at a fault, drops the path.
+        """
         if self.scale == 0.0 or self.motion.fault is not None:
             self.motion.stop_at_once()
-        self.ownership.brake()
+        self._stopping_on_path = self.motion.on_path
+        if self._stopping_on_path:
+            self.ownership.let_go()
+        else:
+            self.ownership.brake()
+
+    def begin_program(self) -> None:
+        """Let the first motion of a program set out slowly."""
+        self.motion.begin_program()
 
     def end_modes(self) -> None:
         """End the modes and settings that end with a program."""

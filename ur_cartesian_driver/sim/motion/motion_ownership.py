@@ -100,8 +100,12 @@ class MotionOwnership:
         if self._calls == 0 and self._abandoned:
             self.brake()
 
+    def let_go(self) -> None:
+        """Take the motion from every thread, and let it be."""
+        self._owner, self._abandoned = None, False
+
     def brake(self) -> None:
         """Stop as hard as the controller does on its own."""
-        self._owner, self._abandoned = None, False
+        self.let_go()
         if self._motion.moving:
             self._motion.stopj(HARD_STOP)

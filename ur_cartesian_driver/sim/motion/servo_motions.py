@@ -129,8 +129,8 @@ class ServoMotion(_JointMotion):
         """Return u a time after the call."""
         if elapsed >= self.duration - _ROUNDING:
             return self.target
-        way = subtract6(self.target, self.begin)
-        return add_scaled6(self.begin, way, elapsed / self.duration)
+        change = subtract6(self.target, self.begin)
+        return add_scaled6(self.begin, change, elapsed / self.duration)
 
     @property
     def is_over(self) -> bool:

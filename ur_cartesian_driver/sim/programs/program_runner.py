@@ -10,9 +10,9 @@ Programs from start to end: one primary program, and secondary ones beside it.
                        +------------- RESUMING <-------play---------+
     any of these --end, halt, exception, stop, new program--> STOPPING --arm stands--> STOPPED
 
-When a program is stopped while the arm moves, the controller brakes hard; the next program starts
-when the arm stands. A program that does not compile is refused with line and column; the running
-one goes on.
+When a program is stopped while the arm moves, the controller stops it on its path; the next
+program starts when the arm stands. A program that does not compile is refused with line and
+column; the running one goes on.
 """
 
 from __future__ import annotations
@@ -54,6 +54,9 @@ class ProgramArm(Protocol):
 
     def brake(self) -> None:
         """Stop as hard as the controller does on its own."""
+
+    def begin_program(self) -> None:
+        """Get ready for the first motion of a program."""
 
     def end_modes(self) -> None:
         """End what a program has switched on: force mode, freedrive, watchdogs."""
@@ -187,6 +190,7 @@ class ProgramRunner:
         interpreter = self._interpreter
         interpreter.on_thread_end = lambda number: self._arm.release((id(interpreter), number))
         self.state = RuntimeState.PLAYING
+        self._arm.begin_program()
         # XXX is what a controller writes; the name of the program follows as the text.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
