@@ -213,15 +213,18 @@ class RobotCell:
             replace(self.robot.config, q=self.robot.controller.motion.q, power='off')
         )
 
-    async def load_pendant_program(self):
-        """Let the External Control node fetch the program of the driver."""
+    async def fetch_program(self):
+        """Be the External Control node: return the program of the driver, as it is played."""
         reader, writer = await asyncio.open_connection(HOST, SENDER)
         writer.write(REQUEST)
         text = await reader.readuntil(b'# NODE_CONTROL_LOOP_ENDS\n')
         writer.close()
-        assert not self.robot.controller.programs.load(
-            PENDANT_PROGRAM, f'def external_control():\n{text.decode()}\nend\n'
-        )
+        return f'def external_control():\n{text.decode()}\nend\n'
+
+    async def load_pendant_program(self):
+        """Load the program that the External Control node fetches."""
+        text = await self.fetch_program()
+        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, text)
 
     async def close(self):
         self.owner.hang_up()

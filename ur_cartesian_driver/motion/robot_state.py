@@ -153,6 +153,10 @@ class RobotState:
     ] = None
     #: How many points of the running trajectory the robot program has begun; 0 = none, or unknown.
     points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
+    #: What our robot program shows of itself: version, number, and a count of its connections.
+    program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
+    program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
+    program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and those before.
     effective_speed: Annotated[float, None] = 1.0

@@ -109,6 +109,8 @@ class ProgramSettings:
     reverse_port: int
     trajectory_port: int
     script_command_port: int
+    #: By which the driver recognises this program; drawn by lot, not 0.
+    number: int = 1
     #: Software version of the controller: major, minor, bugfix.
     version: tuple[int, int, int] = (5, 21, 0)
     #: Deceleration of the leading axis for every stop [rad/s^2].
@@ -205,6 +207,11 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'STREAM_LENGTH = {2**31 - 1}'
     yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
     yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
+    yield f'REGISTER_PROGRAM_VERSION = {int(registers.OutputInteger.PROGRAM_VERSION)}'
+    yield f'REGISTER_PROGRAM_NUMBER = {int(registers.OutputInteger.PROGRAM_NUMBER)}'
+    yield f'REGISTER_PROGRAM_RUN = {int(registers.OutputInteger.PROGRAM_RUN)}'
+    yield f'PROGRAM_VERSION = {registers.PROGRAM_VERSION}'
+    yield f'PROGRAM_NUMBER = {settings.number}'
     yield from _servo_constants(settings)
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)

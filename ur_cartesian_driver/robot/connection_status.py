@@ -26,8 +26,10 @@ class ConnectionStatus:
     robot_model: str = ''
     polyscope_version: str = ''
     serial_number: str = ''
-    #: Our program runs on the robot and is connected to us.
+    #: A robot program is connected to us.
     program_running: bool = False
+    #: It has shown that we rendered it.
+    program_is_own: bool = False
     calibration_known: bool = False
     #: The ports that are open, by the name of the parameter.
     ports: Mapping[str, int] = field(default_factory=dict)

@@ -280,6 +280,10 @@ class RobotLink:
             return 'wire_dialect says that the robot has an older one; play that on the pendant'
         return ''
 
+    async def has_own_program(self) -> bool:
+        """Return whether the connected program is ours; a new one takes a moment to show it."""
+        return await self._tracker.wait_for_identity()
+
     # ---- connection ---------------------------------------------------------------------------
 
     async def _stay_connected(self) -> NoReturn:
@@ -351,6 +355,8 @@ class RobotLink:
         for change in changes:
             self.event_log.note(change)
         self._tracker.observe(robot)
+        if self._tracker.is_own and not self.status.program_is_own:
+            self._status.update(program_is_own=True)
         if status_may_change:
             self._review_state()
             self._on_event(StateReceived(state=robot))
@@ -401,7 +407,7 @@ class RobotLink:
 
     def _on_program_connected(self) -> None:
         self.event_log.note('the robot program has connected')
-        self._tracker.is_ending = False
+        self._tracker.program_connected()
         self._status.update(program_running=True)
         self._review_state()
 
@@ -414,7 +420,9 @@ class RobotLink:
                 CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
             )
         self._tcp_setter.program_lost()
-        self._status.apply(ConnectionEvent.PROGRAM_LOST, program_running=False)
+        self._status.apply(
+            ConnectionEvent.PROGRAM_LOST, program_running=False, program_is_own=False
+        )
         self._on_event(LinkLost(link='program', reason=reason))
 
     def _on_robot_lost(self, reason: str, status_text: str) -> None:

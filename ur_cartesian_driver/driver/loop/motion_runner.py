@@ -128,7 +128,10 @@ class MotionRunner:
             request,
             self._config,
         )
-        if reason := self._refusal(request.job):
+        job = request.job
+        if reason := (
+            self._refusal(job) or await self._foreign_program(job) or self._refusal(job)
+        ):
             refusal = Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason)
             self._pipe.send(MotionEnded(motion=request.motion, outcome=refusal))
             return
@@ -153,14 +156,31 @@ class MotionRunner:
             return ''
         return 'The TCP of the robot changed after the goal was planned; send the goal again.'
 
-    def append(self, request: AppendToMotion) -> None:
+    async def _foreign_program(self, job: MotionJob | None) -> str:
+        """Return what of a motion the program on the robot cannot do; empty if nothing."""
+        needs = '' if job is None else job.own_program_needs
+        if not needs or await self._link.has_own_program():
+            return ''
+        return (
+            f'The goal has {needs}, for which the robot has to run the program of this driver, '
+            'and the program that runs has not shown to be that; call resend_robot_program '
+            '(headless_mode), or play a program whose External Control node fetches it from here.'
+        )
+
+    async def append(self, request: AppendToMotion) -> None:
         """Offer points to the motion that runs, if they are for it."""
-        if request.motion == self._number and self._machine is not None:
+        foreign = await self._foreign_program(request.append_job.job)
+        if request.motion != self._number or self._machine is None:
+            self._refuse_append(request, 'The goal has ended.')
+        elif foreign:
+            self._refuse_append(request, foreign)
+        else:
             self._pending_append = request
             self._execute(self._machine.step(request.append_job, _now()))
-        else:
-            answer = AnswerAppend(number=request.append_job.number, refusal='The goal has ended.')
-            self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
+
+    def _refuse_append(self, request: AppendToMotion, refusal: str) -> None:
+        answer = AnswerAppend(number=request.append_job.number, refusal=refusal)
+        self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
 
     def set_live_target(self, request: SetLiveTarget) -> None:
         """Give the session that runs another target, if it is for it."""

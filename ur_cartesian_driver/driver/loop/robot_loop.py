@@ -143,7 +143,7 @@ class RobotLoop:
             case StartMotion():
                 await self._motion.start(request)
             case AppendToMotion():
-                self._motion.append(request)
+                await self._motion.append(request)
             case SetLiveTarget():
                 self._motion.set_live_target(request)
             case CancelMotion():

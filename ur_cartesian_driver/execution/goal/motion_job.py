@@ -79,6 +79,13 @@ class MotionJob:
         fill('end_times', self.reference.time[np.maximum(rows, 0)])
         fill('request_times', self.end_times)
 
+    @property
+    def own_program_needs(self) -> str:
+        """What only our robot program can do of this, as part of a sentence; empty = nothing."""
+        if not self.is_motion.all():
+            return 'outputs (io_commands)'
+        return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendJob:

@@ -26,10 +26,17 @@ from the program   int         28         repetitions of set-points that the arm
 from the program   int         29         sequence numbers skipped
 from the program   int         30         set-points in the buffer
 from the program   int         31         set-points lost to a full buffer
+from the program   int         32         version of the program (:data:`PROGRAM_VERSION`)
+from the program   int         33         number that was drawn when it was rendered
+from the program   int         34         count of connections, changes with each of them
 =================  ==========  =========  ====================================================
 
-The ints from 27 are ours; a program after the guide does not write them. All counts start at 0
-when the program enters the control mode ``BUFFERED_SERVO``.
+The ints from 26 are ours; a program after the guide does not write them. The counts 27 to 31 start
+at 0 when the program enters the control mode ``BUFFERED_SERVO``.
+
+The ints 32 to 34 show the driver that the program is its own: it writes them when it has read the
+first message on the reverse socket, the count last. Registers survive programs. So version and
+number count only after the count has changed on this connection.
 """
 
 from __future__ import annotations
@@ -66,6 +73,9 @@ class OutputInteger(IntEnum):
     SKIPPED = 29
     BUFFER_SIZE = 30
     OVERFLOWS = 31
+    PROGRAM_VERSION = 32
+    PROGRAM_NUMBER = 33
+    PROGRAM_RUN = 34
 
 
 class OutputDouble(IntEnum):
@@ -97,6 +107,9 @@ class ExternalError(IntEnum):
     NONE = 0
     HALT = 1
 
+
+#: Grows when the robot program learns what the driver relies on.
+PROGRAM_VERSION = 1
 
 #: See :class:`OutputInteger`.
 POINTS_BEGUN = OutputInteger.POINTS_BEGUN

@@ -17,11 +17,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import inf
+import secrets
 from typing import NoReturn
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import ProgramSettings, render
+from ur_cartesian_driver.protocol.framing import INT32_MAX
 from ur_cartesian_driver.protocol.program import reverse, script_sender
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
@@ -53,6 +55,8 @@ class ProgramSockets:
         self._listener = listener
         #: The robot program, for the script sender; empty = the robot has one of its own.
         self.text = ''
+        #: By which we recognise that program, not 0.
+        self.program_number = 1 + secrets.randbelow(INT32_MAX)
         #: A goal runs: its keepalives are another message.
         self.is_executing = False
         #: It uses the buffered servo, whose keepalives are a third message.
@@ -131,6 +135,7 @@ class ProgramSockets:
                 reverse_port=ports['reverse_port'],
                 trajectory_port=ports['trajectory_port'],
                 script_command_port=ports['script_command_port'],
+                number=self.program_number,
                 version=(version.major, version.minor, version.bugfix),
                 stop_deceleration=s.stop_deceleration,
                 servoj_gain=s.servoj_gain,

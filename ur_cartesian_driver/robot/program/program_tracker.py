@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+import asyncio
 from math import inf
 
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
 #: How long a program may hold its sockets after the robot has reported its end [s].
 DEAD_PROGRAM_TIMEOUT = 0.5
+#: How long our own program may take, from its connection on, to show that it is ours [s].
+IDENTITY_TIMEOUT = 0.5
 
 
 class ProgramTracker:
@@ -23,9 +27,35 @@ class ProgramTracker:
         #: The program that is connected was told to end.
         self.is_ending = False
         #: The program that runs has called us, even if it has hung up since.
-        self._is_ours = False
+        self._has_called = False
         #: Since when the robot reports that no program runs while one is connected [s].
         self._dead_since = inf
+        self._has_shown_itself = False
+        #: Its count of connections as the robot reported it last, and when this one was made.
+        self._run = self._run_at_connection = 0
+        self._identity = asyncio.Event()
+        self._connected_at = -inf
+
+    @property
+    def is_own(self) -> bool:
+        """Tell whether the program that is connected was rendered by us, and has shown it."""
+        return self._sockets.connected and self._has_shown_itself
+
+    def program_connected(self) -> None:
+        """Begin to doubt a program: it has to show itself on each connection."""
+        self.is_ending = self._has_shown_itself = False
+        self._run_at_connection = self._run
+        self._connected_at = asyncio.get_running_loop().time()
+        self._identity.clear()
+
+    async def wait_for_identity(self) -> bool:
+        """Return whether the connected program is ours, when that can be known."""
+        try:
+            async with asyncio.timeout_at(self._connected_at + IDENTITY_TIMEOUT):
+                await self._identity.wait()
+        except TimeoutError:
+            pass
+        return self.is_own
 
     def observe(self, robot: RobotState) -> None:
         """Take what the robot reports; hang up on a program that has ended without a word."""
@@ -38,9 +68,19 @@ class ProgramTracker:
             if robot.timestamp - self._dead_since > DEAD_PROGRAM_TIMEOUT:
                 sockets.drop('the robot reports that no program runs')
         if ended:
-            self._is_ours = False
+            self._has_called = False
         elif sockets.connected:
-            self._is_ours = True
+            self._has_called = True
+        self._run = robot.program_run
+        if (
+            sockets.connected
+            and not self._has_shown_itself
+            and robot.program_run != self._run_at_connection
+            and robot.program_version == PROGRAM_VERSION
+            and robot.program_number == sockets.program_number
+        ):
+            self._has_shown_itself = True
+            self._identity.set()
 
     def foreign_program_runs(self, robot: RobotState | None) -> bool:
         """Tell whether a program runs that has not called us."""
@@ -48,7 +88,7 @@ class ProgramTracker:
             robot is not None
             and not has_ended(robot)
             and not self._sockets.connected
-            and not self._is_ours
+            and not self._has_called
         )
 
     def reads(self, robot: RobotState | None) -> bool:
