@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """check-robot with robots of each generation, and with some that are closed or busy."""
 
+import asyncio
 from io import StringIO
 import json
 import socket
 import sys
 
 import pytest
+from waiting import wait_for
 
 from ur_cartesian_driver.cli import check_robot, main
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
+from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import EXPERIMENTS
 from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
 from ur_cartesian_driver.robot.check.rtde_observations import INPUT_GROUPS
@@ -279,3 +282,21 @@ def test_a_robot_in_local_control_is_said_not_to_move(ur_sim):
     text = findings['joint_move'].text
     assert text.startswith('Not finished: the arm does not move: ')
     assert 'C210' in text
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+def test_who_interrupts_an_experiment_stops_the_arm_and_gets_the_slider_back(ur_sim):
+    slider = next(experiment for experiment in EXPERIMENTS if experiment.check == 'slider')
+
+    async def interrupted():
+        running = asyncio.create_task(run_experiment(address(ur_sim), slider))
+        await asyncio.to_thread(wait_for, lambda: max(map(abs, ur_sim.state().qd)) > 0.01)
+        assert ur_sim.state().speed_slider == 0.5
+        running.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+
+    asyncio.run(asyncio.wait_for(interrupted(), 10.0))
+    wait_for(lambda: ur_sim.state().runtime_state is RuntimeState.STOPPED)
+    wait_for(lambda: max(map(abs, ur_sim.state().qd)) == 0.0)
+    assert ur_sim.state().speed_slider == 1.0

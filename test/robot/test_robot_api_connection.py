@@ -261,6 +261,16 @@ def test_redirects_end():
         ask(server, 'power on')
 
 
+@pytest.mark.parametrize('target', ['http://127.0.0.2/', 'https://127.0.0.1/'])
+def test_no_redirect_leads_away_from_the_robot(target):
+    path = '/robotstate/v1/state'
+    with (
+        robot({('PUT', path): (307, {}, ('Location', target))}) as server,
+        pytest.raises(OSError, match='redirects to another host, or to HTTPS'),
+    ):
+        ask(server, 'power on')
+
+
 def test_a_robot_that_hangs_up_is_named():
     with robot({('GET', '/robotstate/v1/robotmode'): lambda _: None}) as server:
         port = server.server_address[1]

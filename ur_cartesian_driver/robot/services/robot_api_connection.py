@@ -51,8 +51,7 @@ class RobotApiConnection:
 
         :param version: software of the robot, which decides on the requests.
         """
-        self._where = f'{host} port {port} (Robot API)'
-        self._url = f'http://{f"[{host}]" if ":" in host else host}:{port}{BASE_PATH}'
+        self._host, self._port = host, port
         self._version = (version.major, version.minor)
 
     async def request(self, command: str, argument: str = '') -> DashboardReply:
@@ -99,14 +98,16 @@ class RobotApiConnection:
     def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; called in a thread."""
         try:
-            # Unlike other clients, it takes no proxy from the environment: the robot is near.
-            with urllib3.PoolManager(
+            # To the robot only: through no proxy of the environment, and after no redirect.
+            with urllib3.HTTPConnectionPool(
+                self._host,
+                self._port,
                 timeout=urllib3.Timeout(connect=CONNECT_TIMEOUT, read=timeout),
                 retries=urllib3.Retry(total=MAX_REDIRECTS, connect=0, read=0, status=0, other=0),
-            ) as client:
-                response = client.request(
+            ) as robot:
+                response = robot.request(
                     command.method,
-                    self._url + command.path,
+                    BASE_PATH + command.path,
                     body=body or None,
                     headers={'Accept': 'application/json'}
                     | ({'Content-Type': 'application/json'} if body else {}),
@@ -117,7 +118,8 @@ class RobotApiConnection:
                 finally:
                     response.close()
         except urllib3.exceptions.HTTPError as error:
-            raise OSError(f'{self._where}: {_reason(error, timeout)}') from error
+            where = f'{self._host} port {self._port} (Robot API)'
+            raise OSError(f'{where}: {_reason(error, timeout)}') from error
 
 
 def _reason(error: urllib3.exceptions.HTTPError, timeout: float) -> str:
@@ -134,7 +136,7 @@ def _reason(error: urllib3.exceptions.HTTPError, timeout: float) -> str:
             return f'no answer within {timeout:g} s'
         case urllib3.exceptions.ResponseError():
             return f'it redirects more than {MAX_REDIRECTS} times'
-        case urllib3.exceptions.SSLError():
-            return 'it redirects to HTTPS, with a certificate that cannot be checked'
+        case urllib3.exceptions.HostChangedError():
+            return 'it redirects to another host, or to HTTPS'
         case _:
             return 'it hangs up, or does not speak HTTP'
