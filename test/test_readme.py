@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 import importlib.util
 import os
 from pathlib import Path
@@ -388,6 +389,17 @@ def test_every_parameter_that_is_named_as_one_exists():
     ]
     assert {'robot_ip', 'ur_type', 'max_tool_speed'} <= set(named)
     assert set(named) <= set(defaults())
+
+
+def test_every_imperfection_is_described():
+    from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+
+    text = (CHECKOUT / 'doc' / 'simulation.md').read_text(encoding='utf-8')
+    (table,) = re.findall(r'^\| imperfection \|.*?\n\n', text, re.DOTALL | re.MULTILINE)
+    named = re.findall(
+        r'`(\w+)`', ''.join(line.split('|')[1] for line in table.strip().splitlines())
+    )
+    assert sorted([*named, 'seed']) == sorted(field.name for field in fields(Imperfections))
 
 
 def test_every_example_is_listed():

@@ -8,7 +8,8 @@ The robot loop is the one of the driver with all its sockets, the controller the
 as those of a CB3 robot, because each costs computing time.
 
 With the environment variable ``THREADS='delay N'`` new threads of the robot program begin N cycles
-later, and with ``THREADS='seed N'`` its threads take turns at random.
+later, and with ``THREADS='seed N'`` its threads take turns at random. With ``IMPERFECT=N`` the arm
+is imperfect, with noise by the seed N.
 """
 
 from __future__ import annotations
@@ -42,16 +43,19 @@ from ur_cartesian_driver.driver.ipc.channel import (
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.robot_loop import RobotLoop
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, ReverseMessage
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+from ur_cartesian_driver.sim.motion.imperfect_arm import typical_imperfections
 
 T = TypeVar('T')
 
 CYCLE = 0.008
+UR5E = robot_model('ur5e')
 #: How long the owner may be silent [s]; the real one is 5 s.
 NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
@@ -142,9 +146,12 @@ class Owner:
 class RobotCell:
     """Simulated controller, robot loop and owner; used inside :func:`run_cell`."""
 
-    def __init__(self, loop, *, headless, settings, threads=''):
+    def __init__(self, loop, *, headless, settings, threads='', imperfect=''):
         self.loop, self.headless = loop, headless
-        self._threads, self._settings = threads, settings
+        self._settings = settings
+        self._simulator = thread_schedule(threads)
+        if imperfect:
+            self._simulator['imperfections'] = typical_imperfections(UR5E, int(imperfect))
         self.owner = Owner()
         self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None
@@ -165,7 +172,7 @@ class RobotCell:
                 secondary_port=30002,
                 realtime_port=30003,
                 interpreter_port=30020,
-                **thread_schedule(self._threads),
+                **self._simulator,
             )
         )
         self.config = DriverConfig(
@@ -314,20 +321,24 @@ def run_cell(
     *,
     headless: bool = True,
     threads: str = os.environ.get('THREADS', ''),
+    imperfect: str = os.environ.get('IMPERFECT', ''),
     **settings: Any,
 ) -> T:
     """
     Run ``scenario(cell)`` in a cell that is ready for goals; return its result.
 
     :param threads: how the controller schedules threads, see :func:`thread_schedule`.
+    :param imperfect: seed of the imperfections of the arm; empty = it has none.
     """
     loop = VirtualLoop()
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
-        return runner.run(_run(loop, scenario, headless, threads, settings))
+        return runner.run(
+            _run(loop, scenario, headless, settings, threads=threads, imperfect=imperfect)
+        )
 
 
-async def _run(loop, scenario, headless, threads, settings):
-    cell = RobotCell(loop, headless=headless, threads=threads, settings=settings)
+async def _run(loop, scenario, headless, settings, **simulator):
+    cell = RobotCell(loop, headless=headless, settings=settings, **simulator)
     try:
         await cell.start()
         return await scenario(cell)

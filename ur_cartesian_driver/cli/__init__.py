@@ -141,6 +141,15 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     _add_calibration(sim)
     sim.add_argument(
+        '--imperfect',
+        nargs='?',
+        type=int,
+        const=1,
+        metavar='SEED',
+        help='let the arm lag, ring and be measured with noise, and leave out RTDE packets, as '
+        'recorded on real robots',
+    )
+    sim.add_argument(
         '--rate',
         type=float,
         default=1.0,

@@ -27,6 +27,7 @@ from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
+from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
 
 
 def demo(arguments: argparse.Namespace) -> int:
@@ -82,6 +83,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         has_remote_control=not arguments.no_remote_control,
         rate=arguments.rate,
         faults=arguments.faults,
+        imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
         programs={_program_name(file): file.read_text() for file in files},
         program=_program_name(arguments.program) if arguments.program else '',
@@ -92,6 +94,13 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
 def _program_name(file: Path) -> str:
     """Return the name by which the dashboard loads a file of URScript."""
     return f'{file.stem}.urp'
+
+
+def imperfections(arguments: argparse.Namespace) -> Imperfections | None:
+    """Return the imperfections of the simulated robot from the arguments; None = none."""
+    if arguments.imperfect is None:
+        return None
+    return typical_imperfections(robot_model(arguments.model), arguments.imperfect)
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:

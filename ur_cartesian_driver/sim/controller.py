@@ -97,8 +97,8 @@ class Controller:
         self.cycles = 0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
-        #: The measured motion: equal to the targets, unless a fault interferes.
-        self.actual = ActualMotion(self.motion)
+        #: The measured motion: equal to the targets, unless imperfect or a fault interferes.
+        self.actual = ActualMotion(self.motion, config.imperfections)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
         self.safety = SafetySystem(config.unlock_delay)
@@ -213,6 +213,7 @@ class Controller:
         self.programs.step()
         self._change_scale(was_at_rest)
         self.motion.step(self.scale)
+        self.actual.step()
         self._joint_history.append(self.actual.q)
         self._report_motion_events()
         if self.safety.mode in POWERLESS and self.at_rest:

@@ -12,6 +12,7 @@ from typing import Literal
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
+from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -58,6 +59,9 @@ class SimulatorConfig:
     has_remote_control: bool = True
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
+    #: How far the arm fails to follow its targets, and the controller to keep up; None = not at
+    #: all. `sim.motion.imperfect_arm.typical_imperfections` has those of a model.
+    imperfections: Imperfections | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None
     #: Time after a protective stop during which pendant and dashboard refuse to unlock [s]; 5 s on

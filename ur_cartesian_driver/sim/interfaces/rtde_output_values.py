@@ -3,9 +3,9 @@
 """
 How each RTDE output is computed in the simulated controller.
 
-Actual values equal the targets, unless a fault makes them differ: the arm follows without error.
-Its links weigh nothing; only the payload does. Outputs that would need more (currents,
-temperatures, encoders) are zero or have the plausible values of :data:`FIXED`.
+Actual values equal the targets, unless the arm is imperfect or a fault makes them differ. Links
+weigh nothing; only the payload does. Outputs that would need more (temperatures, encoders) are
+zero or have the plausible values of :data:`FIXED`.
 """
 
 from __future__ import annotations
@@ -106,6 +106,18 @@ def _actual_acceleration(controller: Controller) -> Vector6:
     return add6(_tcp_acceleration(controller), controller.actual.acceleration_error)
 
 
+def _target_currents(controller: Controller) -> Vector6:
+    """Return the joint currents, which only an imperfect arm has [A]."""
+    imperfections = controller.config.imperfections
+    return imperfections.holding_current if imperfections and _powered(controller) else ZERO6
+
+
+def _joint_currents(controller: Controller) -> Vector6:
+    """Return the same as measured [A]."""
+    arm = controller.actual.imperfect_arm
+    return arm.currents() if arm is not None and _powered(controller) else ZERO6
+
+
 def _tcp(controller: Controller) -> Vector6:
     return controller.motion.T_base_tcp.rotation_vector()
 
@@ -144,6 +156,8 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
         'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
         'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
+        'target_current': _target_currents,
+        'actual_current': _joint_currents,
         'target_moment': _payload_moments,
         'actual_current_as_torque': _payload_moments,
         'target_TCP_acceleration': _tcp_acceleration,

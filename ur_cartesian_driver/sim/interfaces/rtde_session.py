@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import floor
+from random import Random
 
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
@@ -18,6 +19,7 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.rtde_input_effects import apply_inputs
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
+from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 
 
 class _OutputSchedule:
@@ -40,6 +42,26 @@ class _OutputSchedule:
         return self._recipe.pack([get(controller) for get in self._getters])
 
 
+class _PacketGaps:
+    """Leaves out packets, as a loaded controller does."""
+
+    def __init__(self, imperfections: Imperfections) -> None:
+        self._imperfections, self._random = imperfections, Random(imperfections.seed)
+        self._left_out = 0
+
+    def leaves_out(self) -> bool:
+        """Tell whether to leave out the packets of this cycle."""
+        if self._left_out > 0:
+            self._left_out -= 1
+            return True
+        imperfections, draw = self._imperfections, self._random.random()
+        if draw < imperfections.long_gaps:
+            self._left_out = self._random.randint(1, imperfections.max_skipped)
+        elif draw < imperfections.long_gaps + imperfections.single_gaps:
+            self._left_out = 1
+        return False
+
+
 class RtdeSession(ClientSession):
     """Answers requests, applies inputs, and packs the data packages that are due."""
 
@@ -57,6 +79,8 @@ class RtdeSession(ClientSession):
             taken_inputs,
             self._maximum,
         )
+        imperfections = controller.config.imperfections
+        self._gaps = None if imperfections is None else _PacketGaps(imperfections)
         self._outputs: list[OutputStream] = []
         self._streams: list[_OutputSchedule] = []
 
@@ -76,7 +100,7 @@ class RtdeSession(ClientSession):
 
     def packages(self) -> Iterator[bytes]:
         """Yield the data packages that are due in this cycle."""
-        if self._server.streaming:
+        if self._server.streaming and not (self._gaps and self._gaps.leaves_out()):
             for stream in self._streams:
                 if stream.is_due(self._controller.cycles):
                     yield stream.package(self._controller)

@@ -3,11 +3,11 @@
 """
 The motion that the robot measures.
 
-The simulated arm follows its targets exactly, so actual values equal the targets, unless a fault
-makes them deviate. A deviation of the pose shows in pose and joint positions, one of the twist in
-twist and joint speeds; like a faulty measurement, neither shows in the other. A deviation of the
-acceleration shows in acceleration and accelerometer and, integrated, in twist and joint speeds,
-because many clients check it there.
+The simulated arm follows its targets exactly, so actual values equal the targets, unless the arm
+is to be imperfect or a fault makes them deviate. A deviation of the pose shows in pose and joint
+positions, one of the twist in twist and joint speeds; like a faulty measurement, neither shows in
+the other. A deviation of the acceleration shows in acceleration and accelerometer and, integrated,
+in twist and joint speeds, because many clients check it there.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.pose import (
 )
 from ur_cartesian_driver.motion.vectors import add, add6, scale6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
+from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
 # A solution farther than this from the target is another branch [rad].
 _BRANCH_JUMP = 0.5
@@ -32,9 +33,16 @@ _BRANCH_JUMP = 0.5
 class ActualMotion:
     """The measured motion of one arm."""
 
-    def __init__(self, motion: MotionGenerator) -> None:
-        """Follow the targets of this motion exactly."""
+    def __init__(self, motion: MotionGenerator, imperfections: Imperfections | None) -> None:
+        """
+        Follow the targets of this motion.
+
+        :param imperfections: None = exactly.
+        """
         self._motion = motion
+        self.imperfect_arm = ImperfectArm(motion, imperfections) if imperfections else None
+        #: The motion without deviations.
+        self._undisturbed: Motion = self.imperfect_arm or motion
         self._pose: Vector6 | None = None
         self._twist: Vector6 | None = None
         #: Deviation of the measured acceleration of the TCP [m/s^2, rad/s^2].
@@ -42,6 +50,11 @@ class ActualMotion:
         #: The integral of the deviation of the acceleration.
         self._drift: Vector6 = ZERO6
         self._solved: tuple[object, object, Vector6] | None = None
+
+    def step(self) -> None:
+        """Follow the target for a cycle."""
+        if self.imperfect_arm is not None:
+            self.imperfect_arm.step()
 
     def deviate(
         self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
@@ -58,46 +71,47 @@ class ActualMotion:
     @property
     def T_base_tcp(self) -> Pose:
         """Pose of the TCP."""
-        target = self._motion.T_base_tcp
+        pose = self._undisturbed.T_base_tcp
         if self._pose is None:
-            return target
+            return pose
         x, y, z, rx, ry, rz = self._pose
         return Pose(
-            add(target.position, (x, y, z)),
-            multiply(quaternion_from_rotation_vector((rx, ry, rz)), target.quaternion),
+            add(pose.position, (x, y, z)),
+            multiply(quaternion_from_rotation_vector((rx, ry, rz)), pose.quaternion),
         )
 
     @property
     def q(self) -> Vector6:
         """Joint positions at the deviated pose [rad]."""
         if self._pose is None:
-            return self._motion.q
-        if self._solved is None or self._solved[:2] != (self._motion.q, self._pose):
-            self._solved = (self._motion.q, self._pose, self._solve(self._pose))
+            return self._undisturbed.q
+        if self._solved is None or self._solved[:2] != (self._undisturbed.q, self._pose):
+            self._solved = (self._undisturbed.q, self._pose, self._solve(self._pose))
         return self._solved[2]
 
     @property
     def tcp_twist(self) -> Vector6:
         """Twist of the tool centre point in base axes [m/s, rad/s]."""
-        twist = self._motion.tcp_twist
+        twist = self._undisturbed.tcp_twist
         return twist if self._twist is None else add6(twist, self._twist)
 
     @property
     def qd(self) -> Vector6:
         """Joint speeds for the deviated twist [rad/s]."""
         if self._twist is None:
-            return self._motion.qd
-        return add6(self._motion.qd, self._joint_change(self._twist))
+            return self._undisturbed.qd
+        return add6(self._undisturbed.qd, self._joint_change(self._twist))
 
     def _solve(self, deviation: Vector6) -> Vector6:
         motion = self._motion
         T_base_flange = self.T_base_tcp @ motion.T_flange_tcp.inverse()
-        q = nearest(motion.arm, T_base_flange, motion.q)
-        if q is None or dist(q, motion.q) > _BRANCH_JUMP:
-            return add6(motion.q, self._joint_change(deviation))
+        undisturbed = self._undisturbed.q
+        q = nearest(motion.arm, T_base_flange, undisturbed)
+        if q is None or dist(q, undisturbed) > _BRANCH_JUMP:
+            return add6(undisturbed, self._joint_change(deviation))
         return q
 
     def _joint_change(self, change: Vector6) -> Vector6:
         """Return the joint change for a small change of the TCP; the smallest one if singular."""
-        jacobian = self._motion.arm.jacobian(self._motion.q, self._motion.T_flange_tcp)
+        jacobian = self._motion.arm.jacobian(self._undisturbed.q, self._motion.T_flange_tcp)
         return vector6(float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
