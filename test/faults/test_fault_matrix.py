@@ -64,21 +64,23 @@ def test_a_goal_ends_as_the_table_says_and_the_next_one_works(kind, phases, row,
 
 THREAD_SEED = os.environ.get('THREAD_SEED') or str(Random().randrange(10**6))
 #: Cells in the sample.
-SAMPLES = 30
+SAMPLES = 40
 
 
 @pytest.mark.parametrize('sample', range(SAMPLES))
-def test_threads_may_be_scheduled_otherwise(sample):
+def test_threads_and_arm_may_be_otherwise(sample):
     draw = Random(f'{THREAD_SEED} {sample}')
     kind, phases, row, settings = cast(tuple[Any, ...], draw.choice(CASES).values)
     phase = draw.choice(list(row.phases or phases))
     threads = draw.choice(['delay 1', 'delay 3', f'seed {draw.randrange(10**6)}'])
-    print(f'THREAD_SEED={THREAD_SEED}: {threads}, {kind.__name__}, {row.fault}, {phase}')
+    imperfect = draw.choice(['', str(draw.randrange(10**6))])
+    arm = f'imperfect arm {imperfect}' if imperfect else 'exact arm'
+    print(f'THREAD_SEED={THREAD_SEED}: {threads}, {arm}, {kind.__name__}, {row.fault}, {phase}')
 
     async def one_phase(cell):
         await run_scenario(cell, row.at(phase), phase, kind)
 
-    run_cell(one_phase, threads=threads, **settings)
+    run_cell(one_phase, threads=threads, imperfect=imperfect, **settings)
 
 
 def test_every_fault_that_can_be_injected_is_in_the_table():

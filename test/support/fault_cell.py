@@ -20,6 +20,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 WATCH_TIME = 0.2
 #: Time for which an arm inside all tolerances may still creep [s].
 CREEP_TIME = 0.05
+#: Joint travel that is only the rounding of a motion's last cycles [rad].
+ROUNDING = 1e-12
 #: Time that the next goal may take [s].
 NEXT_GOAL_TIMEOUT = 2.0
 
@@ -158,7 +160,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         await inject_cause(cell, cause)
     begin = cell.loop.time()
     if phase in BEFORE:
-        await cell.sleep(0.1 if phase == 'idle' else CYCLE)
+        await cell.sleep(0.1 if phase == 'idle' else cell.max_packet_gap)
         goal.send()
     if not cell.owner.silent:
         goal.send_remaining_points(phase)
@@ -184,7 +186,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         if phase == 'settling':
             await end_faults(cell)
         travel = await recover(cell, row.steps)
-        assert travel <= row.travel, f'{context}: a joint has moved by {travel} rad'
+        assert travel <= row.travel + ROUNDING, f'{context}: a joint has moved by {travel} rad'
     await cell.until(cell.is_ready, row.ready_within, context)
     await return_home(cell, home, context)
     goal.check_result(row, phase)

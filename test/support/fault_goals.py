@@ -35,6 +35,7 @@ from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.protocol.program.registers import OutputInteger
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
@@ -136,7 +137,7 @@ class FaultGoal:
 
     def points_begun(self):
         """Return the number of points that the robot program has begun."""
-        return self.cell.memory.read().points_begun
+        return self.cell.robot.controller.io.outputs.integers[OutputInteger.POINTS_BEGUN]
 
     def tool_offset(self):
         """Return the displacement of the tool since the start, along x and y [m]."""

@@ -150,8 +150,12 @@ class RobotCell:
         self.loop, self.headless = loop, headless
         self._settings = settings
         self._simulator = thread_schedule(threads)
+        #: Longest time between two RTDE packets of a robot without faults [s].
+        self.max_packet_gap = CYCLE
         if imperfect:
-            self._simulator['imperfections'] = typical_imperfections(UR5E, int(imperfect))
+            imperfections = typical_imperfections(UR5E, int(imperfect))
+            self._simulator['imperfections'] = imperfections
+            self.max_packet_gap *= 1 + imperfections.max_skipped
         self.owner = Owner()
         self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None

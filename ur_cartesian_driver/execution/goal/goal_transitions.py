@@ -273,15 +273,21 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
     | SafetyStatus.FAULT
 )
 NO_STOP = SafetyStatus(0)
-#: Below this speed of each joint the arm is at rest [rad/s].
+#: Below this target speed of each joint the arm is at rest [rad/s].
 REST_SPEED = 1e-3
+#: Below this measured speed it may ring [rad/s]. Recorded arms ring above 0.001 rad/s for up to
+#: 0.6 s after their target has stopped, above 0.005 rad/s for up to 0.3 s.
+RINGING_SPEED = 0.05
 #: Stops after which the robot continues its program once somebody unlocks and plays it.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
 
 
 def is_at_rest(state: RobotState) -> bool:
-    """Tell whether the arm is at rest."""
-    return max(map(abs, state.actual_qd)) < REST_SPEED
+    """Tell whether the target of the arm stands; the arm itself may still ring a little."""
+    return (
+        max(map(abs, state.target_qd)) < REST_SPEED
+        and max(map(abs, state.actual_qd)) < RINGING_SPEED
+    )
 
 
 def detect_stop(
