@@ -7,11 +7,6 @@ from dataclasses import replace
 from goal_machines import append_machine
 import numpy as np
 
-from ur_cartesian_driver.execution.goal.append_feeder import (
-    AppendSettings,
-    CLOSED_BY_CLIENT,
-    FIRST_POINTS_TIMEOUT,
-)
 from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
     Finish,
@@ -22,6 +17,11 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
+from ur_cartesian_driver.execution.points.append_feeder import (
+    AppendSettings,
+    CLOSED_BY_CLIENT,
+    FIRST_POINTS_TIMEOUT,
+)
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose

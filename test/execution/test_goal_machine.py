@@ -9,7 +9,6 @@ from goal_machines import append_machine, point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution.goal.append_feeder import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.execution.goal.goal_commands import (
     Finish,
     ReportProgress,
@@ -29,6 +28,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import SET_TIMEOUT
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, CAUSE_TIMEOUT, STOP_TIMEOUT
+from ur_cartesian_driver.execution.points.append_feeder import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

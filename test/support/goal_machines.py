@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints

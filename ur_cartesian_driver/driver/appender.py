@@ -18,9 +18,9 @@ import threading
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import AppendToMotion
-from ur_cartesian_driver.execution.goal.append_feeder import CLOSED_BY_CLIENT
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
+from ur_cartesian_driver.execution.points.append_feeder import CLOSED_BY_CLIENT
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress

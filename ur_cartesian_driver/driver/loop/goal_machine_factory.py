@@ -11,16 +11,16 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import LiveSetup, StartMotion
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
-from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
 from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFeeder
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
+from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints

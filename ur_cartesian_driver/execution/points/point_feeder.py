@@ -8,7 +8,7 @@ from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendControl, SendPoints
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
-from ur_cartesian_driver.execution.goal.send_window import SendWindow
+from ur_cartesian_driver.execution.points.send_window import SendWindow
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 

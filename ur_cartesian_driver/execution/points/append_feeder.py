@@ -38,7 +38,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     NO_MEANING,
 )
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
-from ur_cartesian_driver.execution.goal.send_window import SendWindow
+from ur_cartesian_driver.execution.points.send_window import SendWindow
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
