@@ -176,7 +176,7 @@ def test_the_simulator_says_where_it_listens_and_ends_on_a_signal():
         assert line.startswith('simulated ur10e on 127.0.0.1: RTDE ')
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=10.0)
-        assert process.returncode == 130
+        assert process.returncode == 128 + signal.SIGTERM
         assert not errors
     finally:
         process.kill()

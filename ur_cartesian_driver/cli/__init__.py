@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+import contextlib
 import logging
+import os
 from pathlib import Path
 import re
 import signal
 import sys
+from types import FrameType
 
 from ur_cartesian_driver.cli import check_robot, commands, recording_plot, validate_command
 from ur_cartesian_driver.kinematics.robot_models import MODELS
@@ -28,17 +31,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; 0 means that the command succeeded."""
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # SIGTERM cleans up like Ctrl-C. SIGINT is ignored by default in a background process.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    # SIGINT is ignored by default in a background process, SIGHUP after nohup.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _end)
     run: Callable[[argparse.Namespace], int] = arguments.run
     try:
-        return run(arguments)
-    except KeyboardInterrupt:
-        return 130
+        status = run(arguments)
+        sys.stdout.flush()
+        return status
+    except KeyboardInterrupt as interrupt:
+        return commands.SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else signal.SIGINT)
     except (DriverError, OSError, ValueError) as error:
-        print(f'ur-cartesian {arguments.command}: {error}', file=sys.stderr)
-        return 1
+        _discard_unwritten_output()
+        with contextlib.suppress(OSError):
+            text = '; '.join([str(error), *getattr(error, '__notes__', ())])
+            print(f'ur-cartesian {arguments.command}: {text}', file=sys.stderr)
+        is_output_closed = isinstance(error, BrokenPipeError)
+        return commands.SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    """Clean up like after Ctrl-C, but end with the exit status of this signal."""
+    raise KeyboardInterrupt(number)
+
+
+def _discard_unwritten_output() -> None:
+    """Forget what cannot be written; Python would try again when it exits."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def parser() -> argparse.ArgumentParser:
@@ -236,6 +260,11 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
         '--report', action='store_true', help='print the report: what was done, and why'
     )
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
+    send.add_argument(
+        '--no-cancel',
+        action='store_true',
+        help='let the goal go on if a signal, a closed output or a full disk ends this command',
+    )
 
 
 def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:

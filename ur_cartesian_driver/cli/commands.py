@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-from contextlib import nullcontext
+import contextlib
 import json
 from math import hypot
 from pathlib import Path
 import sys
 from time import monotonic
-from typing import Any, TextIO
+from typing import Any, BinaryIO
 
 from ur_cartesian_driver.kinematics.robot_models import (
     DhTable,
@@ -28,6 +28,9 @@ from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
+
+#: The exit status of a command that a signal ended, less the signal's number, as in a shell.
+SIGNAL_STATUS = 128
 
 
 def demo(arguments: argparse.Namespace) -> int:
@@ -146,14 +149,15 @@ def send(arguments: argparse.Namespace) -> int:
     goal = read_goal(arguments)
     goal.validate_only = goal.validate_only or arguments.validate_only
     with (
-        open(arguments.record, 'w', encoding='utf-8')
+        # Without a buffer: a disk that is full is noticed while the arm moves.
+        open(arguments.record, 'wb', buffering=0)
         if arguments.record
-        else nullcontext() as file,
+        else contextlib.nullcontext() as file,
         client.GoalClient(arguments.driver) as sender,
     ):
         if arguments.wait > 0.0:
             sender.wait_ready(arguments.wait)
-        code, result = sender.send(goal, FeedbackLog(file).take)
+        code, result = sender.send(goal, FeedbackLog(file).take, cancel=not arguments.no_cancel)
     status = client.STATUS_NAMES[code]
     clear_line()
     if (goal.validate_only or arguments.report) and result.report:
@@ -161,7 +165,9 @@ def send(arguments: argparse.Namespace) -> int:
     if result.error_code:
         status += f', {code_text(result.error_code)}'
     print(f'{status}: {result.error_string}')
-    return 0 if status == 'SUCCEEDED' else 1
+    if status == 'SUCCEEDED':
+        return 0
+    return SIGNAL_STATUS + sender.signal_number if sender.signal_number else 1
 
 
 def read_goal(arguments: argparse.Namespace) -> Any:
@@ -189,34 +195,43 @@ def clear_line() -> None:
 class FeedbackLog:
     """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
 
-    def __init__(self, file: TextIO | None) -> None:
+    def __init__(self, file: BinaryIO | None) -> None:
         """Take the file that is written; None = no file."""
         self._file = file
         self._next_line = 0.0
 
     def take(self, feedback: Any) -> None:
-        """Show and write one feedback message."""
+        """
+        Show and write one feedback message.
+
+        :raises OSError: output or file cannot be written.
+        """
         position = feedback.actual.pose.position
-        line = (
+        self._show(
             f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
             f'x {position.x:7.3f}  y {position.y:7.3f}  z {position.z:7.3f} m  '
             f'speed {100.0 * feedback.speed_scaling:3.0f} %'
         )
-        self._show(line)
         if self._file is not None:
-            self._file.write(
-                json.dumps(
-                    {
-                        'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
-                        'point': feedback.point_index,
-                        'progress': feedback.progress,
-                        'desired': _position(feedback.desired),
-                        'actual': _position(feedback.actual),
-                        'speed': _speed(feedback.actual),
-                    }
-                )
-                + '\n'
+            self._write(
+                {
+                    'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
+                    'point': feedback.point_index,
+                    'progress': feedback.progress,
+                    'desired': _position(feedback.desired),
+                    'actual': _position(feedback.actual),
+                    'speed': _speed(feedback.actual),
+                }
             )
+
+    def _write(self, row: dict[str, Any]) -> None:
+        assert self._file is not None
+        try:
+            self._file.write(f'{json.dumps(row)}\n'.encode())
+        except OSError as error:
+            raise OSError(
+                f'the recording {self._file.name} cannot be written: {error.strerror}'
+            ) from None
 
     def _show(self, line: str) -> None:
         """Rewrite one line on a terminal; elsewhere print a line a second."""

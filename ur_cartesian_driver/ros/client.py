@@ -17,6 +17,7 @@ from pathlib import Path
 import signal
 import threading
 from time import monotonic
+from types import FrameType
 from typing import Any, TypeAlias
 
 from action_msgs.msg import GoalStatus
@@ -47,6 +48,7 @@ STATUS_NAMES = {
 }
 #: Time without a server after which the driver counts as gone [s].
 SERVER_TIMEOUT = 3.0
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _INTEGERS = {
     f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
     for sign in ('', 'u')
@@ -175,6 +177,8 @@ class GoalClient:
 
         :param driver: name of the driver's node, with its namespace if it has one.
         """
+        #: The signal that cancelled the goal sent last; 0 = none.
+        self.signal_number = 0
         self._driver = f'/{driver.strip("/")}'
         self.action = f'{self._driver}/follow_cartesian_trajectory'
         # A context of its own installs no signal handlers: a goal can be cancelled after Ctrl-C.
@@ -206,22 +210,36 @@ class GoalClient:
         goal: FollowCartesianTrajectory.Goal,
         on_feedback: Callable[[FollowCartesianTrajectory.Feedback], None] | None = None,
         timeout: float = 10.0,
+        *,
+        cancel: bool = True,
     ) -> tuple[int, FollowCartesianTrajectory.Result]:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
-        The first Ctrl-C cancels the goal and waits for its result; the second one gives up.
+        The first SIGINT, SIGTERM or SIGHUP cancels the goal and waits for its result, and
+        :attr:`signal_number` is set; the second one gives up.
 
+        :param on_feedback: called with each feedback; if it raises, the goal is cancelled, and its
+            exception is raised when the goal has ended, with a note that says how.
         :param timeout: how long to look for the driver [s].
+        :param cancel: whether what ends the client cancels the goal; False = the goal goes on.
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the driver is gone; how the goal ended is not known.
         """
         self._find_server(timeout)
-        with _interrupts() as interrupted:
-            request = self._client.send_goal_async(
-                goal, None if on_feedback is None else lambda m: on_feedback(m.feedback)
-            )
-            handle = self._spin_until(request, lambda: None)
+        self.signal_number = 0
+        failures: list[BaseException] = []
+
+        def take(message: Any) -> None:
+            if on_feedback is None or failures:
+                return
+            try:
+                on_feedback(message.feedback)
+            except BaseException as failure:  # raised again below
+                failures.append(failure)
+
+        with self._signals() if cancel else contextlib.nullcontext():
+            handle = self._spin_until(self._client.send_goal_async(goal, take), lambda: None)
             if not handle.accepted:
                 raise ConnectionError(
                     f'{self.action} did not accept the goal; this driver accepts all goals, so '
@@ -229,13 +247,20 @@ class GoalClient:
                 )
             cancelled = False
 
-            def cancel_once() -> None:
+            def check_end() -> None:
                 nonlocal cancelled
-                if interrupted.is_set() and not cancelled:
+                if failures and not cancel:
+                    raise failures[0]
+                if (self.signal_number or failures) and not cancelled:
                     cancelled = True
                     handle.cancel_goal_async()
 
-            response = self._spin_until(handle.get_result_async(), cancel_once)
+            response = self._spin_until(handle.get_result_async(), check_end)
+        if failures:
+            failures[0].add_note(
+                f'the goal ended {STATUS_NAMES[response.status]}: {response.result.error_string}'
+            )
+            raise failures[0]
         return response.status, response.result
 
     def wait_ready(self, timeout: float) -> None:
@@ -283,22 +308,26 @@ class GoalClient:
                 )
         return future.result()
 
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Store the first signal that ends a process; the second one raises KeyboardInterrupt."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
 
-@contextlib.contextmanager
-def _interrupts() -> Iterator[threading.Event]:
-    """Set an event at the first Ctrl-C; the second one raises KeyboardInterrupt."""
-    interrupted = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield interrupted
-        return
+        def received(number: int, _frame: FrameType | None) -> None:
+            if self.signal_number:
+                raise KeyboardInterrupt(number)
+            self.signal_number = number
 
-    def received(number: int, frame: object) -> None:
-        if interrupted.is_set():
-            raise KeyboardInterrupt
-        interrupted.set()
-
-    before = signal.signal(signal.SIGINT, received)
-    try:
-        yield interrupted
-    finally:
-        signal.signal(signal.SIGINT, before)
+        before = {
+            number: signal.signal(number, received)
+            for number in _SIGNALS
+            # nohup: SIGHUP is to be ignored.
+            if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN
+        }
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
