@@ -145,6 +145,65 @@ def test_in_scaled_time_path_and_time_are_the_same(robot, slider):
     robot.controller.set_slider(1.0)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize('slider', [1.0, 0.5, 0.25])
+def test_the_acceleration_is_that_of_the_polynomial_at_any_slider(robot, slider):
+    """No train of pulses: a step of the spline that lasts several cycles changes speed in all."""
+    robot.place(HOME, IDENTITY)
+    robot.controller.set_slider(slider)
+    splines = pieces([ODD] * 25)
+    fine = np.arange(0.0, sum(piece.duration for piece in splines), 1e-4)
+    greatest = np.abs(np.diff(polynomial(splines, fine), 2, axis=0)).max() / 1e-8
+    for _ in range(200):  # the slider takes its time
+        robot.controller.step()
+    run = robot.run(splines)
+    robot.controller.set_slider(1.0)
+    assert not run.failure
+    accelerations = np.abs(np.diff(run.joints, 2, axis=0)) / STEP**2
+    assert accelerations.max() < 1.2 * greatest * slider**2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('steps', 'bound'), [(1, 1.4e-4), (3, 3.5e-4)])
+def test_a_call_that_comes_late_keeps_the_arm_near_its_path(steps, bound):
+    """The bounds are those of a program that always allows 40 rad/s^2."""
+
+    def edit(text):
+        late = '  calls = calls + 1\n  if calls % 100 == 0:\n' + '    sync()\n' * steps + '  end\n'
+        return wrap_in_program(f'calls = 0\n{text}'.replace('  speedj(', f'{late}  speedj('))
+
+    robot = RobotInMemory('ur5e', edit=edit)
+    robot.place(HOME, IDENTITY)
+    splines = pieces([ODD] * 50)
+    run = robot.run(splines)
+    assert not run.failure
+    path = polynomial(splines, np.arange(0.0, sum(piece.duration for piece in splines), 1e-4))
+    assert max(np.abs(path - q).max(axis=1).min() for q in run.joints[::3]) < bound
+    assert (np.abs(np.diff(run.joints, 2, axis=0)) / STEP**2).max() < 40.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('moment', [0.8, 1.5, 1.7])
+def test_a_pause_keeps_the_arm_near_its_path(robot, moment):
+    """The bound is that of a program that always allows 40 rad/s^2."""
+    robot.place(HOME, IDENTITY)
+    splines = pieces([ODD] * 50)
+    cycles = []
+
+    def pause(controller):
+        cycles.append(controller.time)
+        if len(cycles) == round(moment / STEP):
+            assert controller.programs.pause() == ''
+        elif len(cycles) == round((moment + 0.8) / STEP):
+            assert controller.programs.play() == ''
+
+    run = robot.run(splines, on_cycle=pause)
+    assert not run.failure
+    path = polynomial(splines, np.arange(0.0, sum(piece.duration for piece in splines), 1e-4))
+    assert max(np.abs(path - q).max(axis=1).min() for q in run.joints[::3]) < 1.4e-3
+    assert (np.abs(np.diff(run.joints, 2, axis=0)) / STEP**2).max() < 40.5
+
+
 @pytest.mark.exhaustive
 def test_splines_do_not_drift_within_minutes(robot):
     """A place that is passed every second is passed at the second, to the end."""

@@ -69,8 +69,20 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 
 #: Constants of the spline interpolation.
 SPLINE_CONSTANTS: dict[str, float] = {
-    #: Acceleration of speedj [rad/s^2]; the client library's number.
-    'ACCELERATION': 40.0,
+    #: The least acceleration of speedj brakes the fastest joint in this time [s], between these
+    #: bounds [rad/s^2].
+    'BRAKING_TIME': 0.025,
+    'MIN_BRAKING': 1.0,
+    'MAX_ACCELERATION': 40.0,
+    #: A call that takes so many steps has ended late: the arm has coasted.
+    'COASTED': 2.0,
+    #: Fraction of its time for which a step that the slider shortens calls speedj.
+    'SHORT_CALL': 0.9,
+    #: From this fraction on the arm moves at full speed, and below this one it nearly stands.
+    'FULL_SPEED': 0.999,
+    'MIN_FRACTION': 0.01,
+    #: A call that moves the arm by this fraction more or less than expected took one step.
+    'SAME_STEP': 0.02,
     #: Fraction of the position error that is corrected in one step.
     'CORRECTION': 0.4,
     #: Deceleration at the end of the last piece [rad/s^2], and the highest mean joint speed of a
