@@ -28,7 +28,14 @@ def told_by(*frames):
             PrimaryCallbacks(
                 **{
                     kind: note(kind)
-                    for kind in ('configuration', 'geometry', 'error', 'connection_error', 'text')
+                    for kind in (
+                        'configuration',
+                        'geometry',
+                        'error',
+                        'connection_error',
+                        'failures',
+                        'text',
+                    )
                 }
             )
         )
@@ -102,6 +109,7 @@ def sent_to(robot, scene):
                 geometry=lambda _: None,
                 error=errors.append,
                 connection_error=errors.append,
+                failures=errors.append,
                 text=lambda _: None,
             )
         )
@@ -174,3 +182,15 @@ def test_what_comes_while_it_connects_again_is_sent_then():
 
     assert sent_to(robot, scene) == []
     assert robot.received == [b'', REQUEST]
+
+
+def test_a_robot_that_hangs_up_at_each_attempt_is_logged_once():
+    class BusyRobot(Robot):
+        async def serve(self, reader, writer):
+            self.received.append(b'')
+            writer.close()
+
+    robot = BusyRobot()
+    (error,) = sent_to(robot, lambda _: asyncio.sleep(30.0))
+    assert 'closed' in error
+    assert len(robot.received) > 10

@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
+from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.protocol.program.reverse import keepalive, trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
@@ -150,6 +151,10 @@ class RobotInMemory:
     def feed(self, primitives):
         """Let more points come."""
         self._socket(TRAJECTORY).feed(encode_points(primitives))
+
+    def send_command(self, command):
+        """Let a script command come."""
+        self._socket(COMMAND).feed(script_command.encode(command))
 
     # -- between trajectories --------------------------------------------------------------------
 

@@ -116,11 +116,18 @@ class LoopConnection:
         while (running := self.host) is not None:  # None: closed by a callback of ours
             notification = channel.receive(running.pipe)
             if notification is not None:
-                self._on_notification(notification)
+                self._handle(notification)
             elif self._closed.is_set():
                 return
             else:
                 self._restart()
+
+    def _handle(self, notification: Notification | Request) -> None:
+        """Pass a message on; a callback that fails must not make the driver deaf."""
+        try:
+            self._on_notification(notification)
+        except Exception:
+            LOG.exception('a %s of the robot loop was not handled', type(notification).__name__)
 
     def _restart(self) -> None:
         """

@@ -111,6 +111,7 @@ class RobotLink:
                 geometry=self._on_kinematics,
                 error=self._on_robot_error,
                 connection_error=self._status.error,
+                failures=self._warn,
                 text=self._on_robot_text,
             )
         )

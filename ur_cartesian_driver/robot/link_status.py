@@ -12,10 +12,13 @@ from typing import Any
 
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, timestamped
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
+from ur_cartesian_driver.robot.transport import AttemptLog
 
 #: In these states nothing is known of the robot, or it is the wrong one: the reason is the
 #: message.
 OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
+#: Through these each attempt to connect passes.
+ATTEMPTING = frozenset({*OUT_OF_REACH, ConnectionState.CONNECTING})
 #: How long a robot waits for its program before the log says so [s]: a program that is about to
 #: connect needs no help.
 LOG_DELAY = 1.0
@@ -37,6 +40,7 @@ class LinkStatus:
         :param required_action: what is needed in a state, as a sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
+        self._attempts = AttemptLog(self._log_info, self._log_info)
         self.current = ConnectionStatus(message=message)
 
     @property
@@ -65,15 +69,22 @@ class LinkStatus:
 
     def _log_change(self, before: ConnectionStatus, now: ConnectionStatus) -> None:
         """Log what is needed, for those who do not see the status."""
+        if now.state not in ATTEMPTING and before.state in ATTEMPTING:
+            self._attempts.succeeded()
         if now.message and now.message != before.message:
             if now.state is ConnectionState.CONNECTED:
                 asyncio.get_running_loop().call_later(LOG_DELAY, self._log_if_still, now.message)
+            elif now.state in ATTEMPTING:
+                self._attempts.failed(now.message)
             else:
-                self._on_log(logging.INFO, now.message)
+                self._log_info(now.message)
         idle = (ConnectionState.READY, ConnectionState.EXECUTING)
         if now.state is ConnectionState.READY and before.state not in idle:
-            self._on_log(logging.INFO, 'The robot program is connected: ready for goals.')
+            self._log_info('The robot program is connected: ready for goals.')
+
+    def _log_info(self, text: str) -> None:
+        self._on_log(logging.INFO, text)
 
     def _log_if_still(self, message: str) -> None:
         if self.current.message == message:
-            self._on_log(logging.INFO, message)
+            self._log_info(message)

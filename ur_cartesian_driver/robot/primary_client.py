@@ -27,7 +27,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     SubPackage,
 )
 from ur_cartesian_driver.protocol.framing import to_single_line
-from ur_cartesian_driver.robot.transport import Backoff, dial, TcpConnection
+from ur_cartesian_driver.robot.transport import AttemptLog, Backoff, dial, TcpConnection
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
@@ -54,6 +54,8 @@ class PrimaryCallbacks:
     connection_error: Callable[[str], None]
     #: A text that the robot program wrote.
     text: Callable[[str], None]
+    #: How often this connection failed for a reason.
+    failures: Callable[[str], None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +71,7 @@ class PrimaryClient:
     def __init__(self, listener: PrimaryCallbacks) -> None:
         """Prepare; :meth:`stay_connected` connects."""
         self._listener = listener
+        self._attempts = AttemptLog(listener.connection_error, listener.failures)
         self._decoder = primary.PrimaryDecoder()
         self._connection: TcpConnection | None = None
         self._has_configuration = self._has_received = False
@@ -124,20 +127,16 @@ class PrimaryClient:
     async def stay_connected(self, host: str, port: int) -> NoReturn:
         """Keep connected until cancelled."""
         retry = Backoff()
-        last_warning = ''
         while True:
             try:
                 reason = await self._serve_connection(host, port)
                 retry.reset()
-                last_warning = ''
                 if self._is_reconnecting:
                     continue
             except OSError as error:
                 reason = str(error)
                 self._is_reconnecting = False
-            if reason != last_warning:  # once, not with each attempt
-                last_warning = reason
-                self._listener.connection_error(f'primary interface: {reason}')
+            self._attempts.failed(f'primary interface: {reason}')
             await retry.wait()
 
     async def _serve_connection(self, host: str, port: int) -> str:
@@ -196,6 +195,8 @@ class PrimaryClient:
     def _on_package(self, package: SubPackage) -> None:
         match package:
             case ConfigurationData():
+                if not self._has_configuration:
+                    self._attempts.succeeded()
                 self._has_configuration = True
                 self._listener.configuration(package)
             case KinematicsInfo():

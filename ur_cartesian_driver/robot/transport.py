@@ -34,6 +34,8 @@ MAX_READ = 1 << 16
 LINGER_TIMEOUT = 1.0
 #: So many rejected clients are logged in each period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
+#: So many failures of attempts to connect are told apart.
+MAX_FAILURES = 20
 
 #: What to do when a port cannot be opened.
 REMEDIES = {
@@ -201,6 +203,47 @@ class Backoff:
         """Wait before the next attempt."""
         await asyncio.sleep(BACKOFF_PERIODS[min(self._attempt, len(BACKOFF_PERIODS) - 1)])
         self._attempt += 1
+
+
+class AttemptLog:
+    """
+    Logs the failures of repeated attempts once each.
+
+    How often each came is logged when a new one comes, and when an attempt succeeds.
+    """
+
+    def __init__(self, log: Callable[[str], None], log_count: Callable[[str], None]) -> None:
+        """
+        Begin with no failure.
+
+        :param log: a failure that is new.
+        :param log_count: how often one has come.
+        """
+        self._log, self._log_count = log, log_count
+        #: How often each came since its count was logged last.
+        self._counts: dict[str, int] = {}
+
+    def failed(self, text: str) -> None:
+        """Take a failure."""
+        if text in self._counts:
+            self._counts[text] += 1
+            return
+        self._log_counts()
+        if len(self._counts) >= MAX_FAILURES:  # they hardly repeat
+            self._counts.clear()
+        self._counts[text] = 1
+        self._log(text)
+
+    def succeeded(self) -> None:
+        """Take note of a success: failures after it are new."""
+        self._log_counts()
+        self._counts.clear()
+
+    def _log_counts(self) -> None:
+        for text, count in self._counts.items():
+            if count > 1:
+                self._log_count(f'{text.rstrip(".")} ({count} times)')
+                self._counts[text] = 1
 
 
 class WarningLimiter:

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.io_signals import (
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection, SILENCE_TIMEOUT
-from ur_cartesian_driver.robot.transport import Backoff
+from ur_cartesian_driver.robot.transport import AttemptLog, Backoff
 
 REQUIRED_FIELDS = ('actual_digital_input_bits', 'actual_digital_output_bits')
 #: Old software does not have all of these.
@@ -56,12 +56,13 @@ class SignalStream:
         :param on_signals: something changed.
         :param on_warning: the connection was lost, and why.
         """
-        self._on_signals, self._on_warning = on_signals, on_warning
+        self._on_signals = on_signals
+        self._attempts = AttemptLog(on_warning, on_warning)
         self._last: Signals | None = None
 
     async def stay_connected(self, host: str, port: int, frequency: float) -> NoReturn:
         """Keep connected until cancelled."""
-        retry, last_warning = Backoff(), ''
+        retry = Backoff()
         while True:
             connection = RtdeConnection(
                 RtdeClientCodec(
@@ -80,12 +81,11 @@ class SignalStream:
                 reason = str(error)
             finally:
                 connection.close()
-            if reason != last_warning:  # once, not with each attempt
-                last_warning = reason
-                self._on_warning(f'inputs and outputs are not reported: {reason}')
+            self._attempts.failed(f'inputs and outputs are not reported: {reason}')
             await retry.wait()
 
     def _on_values(self, names: Sequence[str], values: RtdeValues) -> None:
+        self._attempts.succeeded()
         now = signals_from_rtde(dict(zip(names, values, strict=True)))
         if now != self._last:
             self._last = now
