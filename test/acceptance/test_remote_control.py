@@ -93,7 +93,7 @@ def test_recovery_after_local_and_remote(driver, ur_sim, home, series):
     turn_key(ur_sim, remote=True)
     assert stays_without_program(ur_sim)
     assert ur_sim.state().safety_mode is SafetyMode.PROTECTIVE_STOP
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     moves(driver, home)
 
@@ -104,7 +104,7 @@ def test_the_key_is_turned_during_a_recovery(driver, ur_sim, home, series):
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
     turn_key(ur_sim, remote=False)
     turn_key(ur_sim, remote=True)
-    assert driver.recover().ok
+    assert driver.recover(unlock_protective_stop=True).ok
     moves(driver, home)
 
 

@@ -77,7 +77,7 @@ def test_each_generation_does_all_that_it_can(
 
     ur_sim.protective_stop()
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert driver.execute(there_and_back(driver, -0.02), timeout=READY).succeeded
 
@@ -98,7 +98,7 @@ def test_polyscope_x_works_from_power_off_to_recovery_without_a_person(
         wait_for(lambda: driver.status.serial_number == '20000000000')
         assert driver.dashboard('robotmode').text == 'POWER_OFF'
         assert driver.dashboard('is in remote control').text == 'true'
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     for step in 'switch the arm on', 'release the brakes', 'send the robot program':
         assert step in answer.text
@@ -106,14 +106,14 @@ def test_polyscope_x_works_from_power_off_to_recovery_without_a_person(
 
     ur_sim.protective_stop()
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert 'unlock the protective stop' in answer.text
     assert driver.execute(there_and_back(driver, 0.02), timeout=READY).succeeded
 
     ur_sim.call(lambda controller: controller.safety_event(SafetyEvent.VIOLATION))
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert 'restart the safety system' in answer.text
     assert driver.execute(there_and_back(driver, -0.02), timeout=READY).succeeded
@@ -123,7 +123,7 @@ def test_polyscope_x_works_from_power_off_to_recovery_without_a_person(
 def test_polyscope_x_in_local_control_leaves_it_to_a_person(make_driver, ur_sim):
     driver = make_driver()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    for answer in driver.dashboard('power on'), driver.recover():
+    for answer in driver.dashboard('power on'), driver.recover(unlock_protective_stop=True):
         assert not answer.ok
         assert 'in local control: switch it to remote control' in answer.text
     assert ur_sim.state().robot_mode is RobotMode.POWER_OFF

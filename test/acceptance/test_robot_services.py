@@ -14,7 +14,7 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotMode
+from ur_cartesian_driver.motion.robot_state import RobotMode, SafetyMode
 from ur_cartesian_driver.program.render import wrap_in_program
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.services import service_dispatcher
@@ -171,7 +171,7 @@ def test_recover_brings_the_robot_back(driver, ur_sim, stop):
         'fault': lambda: ur_sim.call(lambda c: c.safety_event(SafetyEvent.FAULT)),
     }[stop]()
     wait_for(lambda: driver.status.state is not ConnectionState.READY)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert 'Done: ' in answer.text
     assert driver.status.state is ConnectionState.READY
@@ -182,21 +182,39 @@ def test_recover_goes_no_further_than_it_may(driver, ur_sim):
     q = ur_sim.state().q
     ur_sim.emergency_stop()
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert not answer.ok
     assert 'release the button' in answer.text
     assert ur_sim.state().robot_mode is RobotMode.POWER_OFF
     ur_sim.call(lambda c: setattr(c, 'remote_control', False))
     ur_sim.release_emergency_stop()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert not answer.ok
     assert 'local control' in answer.text
     assert ur_sim.state().robot_mode is RobotMode.POWER_OFF
     ur_sim.call(lambda c: setattr(c, 'remote_control', True))
-    assert driver.recover().ok
+    assert driver.recover(unlock_protective_stop=True).ok
     assert ur_sim.state().q == q
-    assert 'ready for goals' in driver.recover().text
+    assert 'ready for goals' in driver.recover(unlock_protective_stop=True).text
+
+
+@QUICK
+@pytest.mark.parametrize('unlock', [False, True], ids=['asked each time', 'by parameter'])
+def test_a_protective_stop_is_unlocked_only_where_somebody_answers_for_it(
+    make_driver, ur_sim, unlock
+):
+    driver = make_driver(unlock_protective_stops=unlock)
+    driver.wait_ready(READY)
+    ur_sim.protective_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert answer.ok == unlock
+    if not unlock:
+        assert 'look for the cause' in answer.text
+        assert ur_sim.state().safety_mode is SafetyMode.PROTECTIVE_STOP
+        assert driver.recover(unlock_protective_stop=True).ok
+    assert ur_sim.state().safety_mode is SafetyMode.NORMAL
 
 
 @pytest.mark.ur_sim(frequency=125.0, remote_control=False)
@@ -224,7 +242,7 @@ def test_a_recovery_does_not_resume_the_goal(driver, ur_sim, home):
     assert motion.result(5.0).code.name == 'PROTECTIVE_STOP'
     wait_for(lambda: max(map(abs, ur_sim.state().qd)) < 1e-6)
     q = ur_sim.state().q
-    assert driver.recover().ok
+    assert driver.recover(unlock_protective_stop=True).ok
     assert ur_sim.state().q == q
 
 
@@ -232,16 +250,16 @@ def test_a_recovery_does_not_resume_the_goal(driver, ur_sim, home):
 def test_recover_plays_the_program_of_the_pendant_without_headless_mode(make_driver, ur_sim):
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert not answer.ok
     assert 'load_program' in answer.text
     program = wrap_in_program(fetch_program(driver))
     assert ur_sim.call(lambda c: c.programs.load('pendant.urp', program)) == ''
-    assert driver.recover().ok
+    assert driver.recover(unlock_protective_stop=True).ok
     assert driver.status.state is ConnectionState.READY
     ur_sim.protective_stop()
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert 'play the loaded program' in answer.text
 
@@ -250,7 +268,7 @@ def test_recover_plays_the_program_of_the_pendant_without_headless_mode(make_dri
 def test_recover_leaves_another_program_alone(driver, ur_sim):
     ur_sim.run_script('def foreign():\n  while True:\n    sync()\n  end\nend\n')
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert not answer.ok
     assert 'Another program' in answer.text
     assert ur_sim.state().program == 'foreign'
@@ -275,7 +293,7 @@ def test_the_robot_api_loads_plays_pauses_and_stops(make_driver, ur_sim):
     program = wrap_in_program(fetch_program(driver))
     assert ur_sim.call(lambda c: c.programs.load('pendant.urpx', program)) == ''
     assert driver.dashboard('get loaded program').text == 'pendant'
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
     assert 'play the loaded program' in answer.text
     for command, state in ('pause', 'PAUSED'), ('play', 'PLAYING'), ('stop', 'STOPPED'):
@@ -298,7 +316,7 @@ def test_polyscope_x_before_its_robot_api_refuses_and_the_rest_works(make_driver
     assert driver.set_tcp(NOZZLE).ok
     ur_sim.protective_stop()
     wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
-    answer = driver.recover()
+    answer = driver.recover(unlock_protective_stop=True)
     assert answer.ok, answer.text
 
 
@@ -325,7 +343,7 @@ def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver):
         driver.set_payload(1.0),
         driver.zero_ftsensor(),
         driver.set_speed_slider(0.5),
-        driver.recover(),
+        driver.recover(unlock_protective_stop=True),
         driver.set_digital_output(OutputKind.TOOL_DIGITAL, 0, True),
     ):
         assert not answer.ok
@@ -335,7 +353,11 @@ def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver):
 def test_a_wrong_robot_is_not_touched(make_driver, ur_sim):
     driver = make_driver(ur_type='ur10e')
     wait_for(lambda: driver.status.state is ConnectionState.REFUSED)
-    for answer in (driver.dashboard('power off'), driver.set_speed_slider(0.5), driver.recover()):
+    for answer in (
+        driver.dashboard('power off'),
+        driver.set_speed_slider(0.5),
+        driver.recover(unlock_protective_stop=True),
+    ):
         assert not answer.ok
         assert 'ur10e' in answer.text
     assert driver.dashboard('robotmode').text == 'RUNNING'

@@ -8,7 +8,7 @@ from example_goals import example_goal, stretch_times
 import numpy as np
 import pytest
 import robot_cell
-from robot_cell import run_cell
+from robot_cell import CYCLE, run_cell
 from virtual_network import HOST
 
 from ur_cartesian_driver.driver.ipc.channel import MotionProgress, ServoProgress
@@ -154,7 +154,8 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         outcome = await refused.end()
         assert outcome.code is ErrorCode.ROBOT_NOT_READY
         assert 'in use by another client' in outcome.text
-        assert cell.q == pytest.approx(q, abs=1e-7)  # what is left of the goal before dies out
+        # What is left of the goal before dies out, with the guide's gain in 33 ms to a third.
+        assert cell.q == pytest.approx(q, abs=1e-6)
         # But for a moment it waits for somebody who is about to hang up.
         await cell.until(cell.is_ready)
         again = Run(cell, straight(0.4, distance=-0.02))
@@ -196,7 +197,7 @@ def test_a_cancel_stops_the_arm_on_the_way():
         took = await cell.until(run.looked)
         assert run.motion.outcome.code is ErrorCode.CANCELLED
         assert took < 0.5
-        assert cell.at_rest()
+        await cell.until(cell.at_rest, 2.0 * CYCLE)  # the last step of the brakes
         await cell.until(cell.is_ready)
 
     run_cell(scenario)

@@ -150,3 +150,16 @@ def test_a_goal_without_times_is_never_late():
     machine, commands = arrived(1.5, due=None, goal_time_tolerance=0.1)
     assert outcome(commands) is None
     assert outcome(machine.step(StateReceived(state=AT_REST), DUE)).succeeded
+
+
+def test_the_noise_of_a_real_arm_at_rest_does_not_delay_the_end():
+    """Recorded: 1e-3 rad/s and more for 0.6 s after the target has stopped."""
+    machine, _ = arrived()
+    ringing = replace(AT_REST, actual_qd=(0.005, -0.004, 0.003, 0.0, 0.001, 0.0))
+    assert outcome(machine.step(StateReceived(state=ringing), DUE)).succeeded
+
+
+def test_a_target_that_moves_is_not_at_rest_however_slow_the_arm_is_measured():
+    machine, _ = arrived()
+    moves = replace(AT_REST, target_qd=(0.01,) + (0.0,) * 5)
+    assert outcome(machine.step(StateReceived(state=moves), DUE)) is None

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     InvalidGoal,
@@ -26,9 +27,18 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    Goal,
+    Posture,
+    Segment,
+    SegmentType,
+    Tolerance,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 TYPE = SegmentType
@@ -501,3 +511,21 @@ def test_timed_goals_keep_their_sum_or_are_too_fast(cell, spots, gap):
     assert made.duration == pytest.approx(gap * len(spots), rel=1e-6)
     slow = plan(goal, cell.state, cell.arm, PlanningOptions(on_too_fast='slow'))
     assert slow.duration == pytest.approx(made.duration)
+
+
+@pytest.mark.parametrize(
+    ('model', 'tolerance', 'warns'),
+    [('ur10', 1e-4, True), ('ur10', 1e-3, False), ('ur10', 0.0, False), ('ur10e', 1e-4, False)],
+)
+def test_a_goal_tolerance_that_a_cb3_arm_may_not_meet_is_in_the_report(model, tolerance, warns):
+    arm = Arm(robot_model(model))
+    q = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
+    home = arm.forward(q)
+    x, y, z = home.position
+    goal = Goal(
+        waypoints=(Waypoint(pose=Pose((x, y, z - 0.01), home.quaternion)),),
+        goal_tolerance=Tolerance(position=(tolerance,) * 3),
+    )
+    state = RobotState(timestamp=0.0, actual_q=q, actual_tcp_pose=home)
+    remarks = plan(goal, state, arm, PlanningOptions(max_tool_speed=1.0)).remarks
+    assert any('0.0003 m by which CB3' in line for line in remarks) == warns

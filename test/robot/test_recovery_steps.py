@@ -41,7 +41,7 @@ def situation(
             robot_mode=power,
             runtime_state=runtime,
         ),
-        **fields,
+        **{'may_unlock': True} | fields,
     )
 
 
@@ -60,9 +60,15 @@ def everything():
             program_connected=connected,
             headless=headless,
             remote_control=remote,
+            may_unlock=may_unlock,
         )
-        for connection, robot, connected, headless, remote in product(
-            ConnectionState, robots, (False, True), (False, True), (None, False, True)
+        for connection, robot, connected, headless, remote, may_unlock in product(
+            ConnectionState,
+            robots,
+            (False, True),
+            (False, True),
+            (None, False, True),
+            (False, True),
         )
     )
     return [(at, next_step(at)) for at in situations]
@@ -89,6 +95,14 @@ def test_in_local_control_everything_is_left_to_a_person(everything):
         for at, following in everything
         if at.remote_control is False and following.step in ACTIONS
     ]
+
+
+@pytest.mark.slow
+def test_nothing_is_unlocked_unless_somebody_answers_for_it(everything):
+    unlocked = {
+        at.may_unlock for at, following in everything if following.step is RecoveryStep.UNLOCK
+    }
+    assert unlocked == {True}
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from ur_cartesian_driver.srv import (
     Load,
     Popup,
     RawRequest,
+    Recover,
     SetIO,
     SetPayload,
     SetSpeedSliderFraction,
@@ -60,6 +61,7 @@ class ServiceClient:
                 Load,
                 Popup,
                 RawRequest,
+                Recover,
                 SetIO,
                 SetPayload,
                 SetSpeedSliderFraction,
@@ -106,7 +108,7 @@ def test_every_service_does_what_it_says(cell):
     cell.spin_until(lambda: not cell.node.driver.status.program_running)
     assert call('resend_robot_program').success
     assert cell.node.driver.status.state is ConnectionState.READY
-    assert call('recover').message == 'The robot is ready for goals.'
+    assert call('recover', Recover.Request()).message == 'The robot is ready for goals.'
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):
@@ -123,13 +125,16 @@ def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
     cell, call = single_cell, ServiceClient(single_cell)
     cell.sim.protective_stop()
     cell.spin_until(lambda: cell.node.driver.status.state is ConnectionState.STOPPED)
-    answer = call('recover')
+    answer = call('recover', Recover.Request())
+    assert not answer.success
+    assert 'look for the cause' in answer.message
+    answer = call('recover', Recover.Request(unlock_protective_stop=True))
     assert answer.success
     assert 'unlock the protective stop' in answer.message
     assert cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))[1].error_code == 0
     cell.sim.emergency_stop()
     cell.spin_until(lambda: cell.node.driver.status.state is ConnectionState.STOPPED)
-    answer = call('recover')
+    answer = call('recover', Recover.Request())
     assert not answer.success
     assert 'release the button' in answer.message
 
@@ -187,8 +192,13 @@ def test_a_goal_that_waits_for_its_time_keeps_its_tcp(single_cell):
 def test_services_of_a_driver_without_a_robot_answer(no_thread_left, sim, make_cell):
     cell = make_cell(sim, rtde_port=1, primary_port=1, dashboard_port=1)
     call = ServiceClient(cell)
-    for name in ('dashboard/power_on', 'zero_ftsensor', 'resend_robot_program', 'recover'):
-        answer = call(name)
+    for name, request in {
+        'dashboard/power_on': None,
+        'zero_ftsensor': None,
+        'resend_robot_program': None,
+        'recover': Recover.Request(),
+    }.items():
+        answer = call(name, request)
         assert not answer.success
         assert answer.message.endswith('.')
 

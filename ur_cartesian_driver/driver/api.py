@@ -125,6 +125,7 @@ class Driver(RobotServices, InteractiveMotions):
         """
         self.config = config
         self.options = options if options is not None else PlanningOptions()
+        self._has_warned_of_cell = False
         self._arm = Arm(robot_model(config.ur_type))
         self._loop = LoopConnection(
             config,
@@ -542,11 +543,32 @@ class Driver(RobotServices, InteractiveMotions):
         if status.state is ConnectionState.DISCONNECTED:
             self._signals, self._gaps = None, LinkGaps()
         if status.state is ConnectionState.READY:
+            self._warn_of_unchecked_cell()
             self._ready.set()
         else:
             self._ready.clear()
         for listener in list(self._status_listeners):
             run_callback(listener, status)
+
+    def _warn_of_unchecked_cell(self) -> None:
+        """Say once what of the cell the pre-flight cannot know."""
+        unknown = [
+            text
+            for text, is_unknown in (
+                (
+                    'workspace_planes is empty, so no table, wall or ceiling is checked',
+                    not self.options.workspace_planes,
+                ),
+                (
+                    'tool_radius is 0, so the tool is not checked',
+                    self.options.tool_radius == 0.0,
+                ),
+            )
+            if is_unknown
+        ]
+        if unknown and not self._has_warned_of_cell:
+            LOG.warning('%s; goals may lead the arm into what is there', ', and '.join(unknown))
+        self._has_warned_of_cell = True
 
     def _abort_all(self, text: str) -> None:
         """End all motions and calls of a robot loop that is gone."""

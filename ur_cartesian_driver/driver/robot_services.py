@@ -71,6 +71,11 @@ class RobotServices(ABC):
         """Move the speed slider, 0 (the arm stands) to 1."""
         return self.call(SetSpeedSliderCall(fraction=fraction)).result()
 
-    def recover(self) -> ServiceAnswer:
-        """Bring a stopped robot back to READY, as far as software may."""
-        return self.call(RecoverCall()).result()
+    def recover(self, *, unlock_protective_stop: bool = False) -> ServiceAnswer:
+        """
+        Bring a stopped robot back to READY, as far as software may.
+
+        :param unlock_protective_stop: a person has looked at the cause of a protective stop and
+            removed it; otherwise the stop is left to a person.
+        """
+        return self.call(RecoverCall(unlock_protective_stop=unlock_protective_stop)).result()

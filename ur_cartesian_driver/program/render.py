@@ -130,8 +130,8 @@ class ProgramSettings:
     #: Timeout of the next trajectory point [s].
     point_timeout: float = 0.5
     #: Stiffness of ``servoj`` (100 to 2000), and its lookahead time [s] (0.03 to 0.2).
-    servoj_gain: float = 2000.0
-    servoj_lookahead_time: float = 0.03
+    servoj_gain: float = 1000.0
+    servoj_lookahead_time: float = 0.06
     #: Capacity of the buffered servo [set-points].
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.

@@ -42,6 +42,8 @@ class LinkSettings:
     robot_receive_timeout: float = 0.2
     #: Switch the arm on and release its brakes on the first connection (headless mode only).
     auto_power: bool = False
+    #: A recovery unlocks protective stops without being asked to each time.
+    unlock_protective_stops: bool = False
     #: Time between two messages on the reverse socket [s].
     keepalive_period: float = 0.02
     #: Packets per second from the robot, at least :data:`MIN_RTDE_FREQUENCY`; 0 = as many as it
@@ -53,8 +55,8 @@ class LinkSettings:
     stop_deceleration: float = 4.0
     #: SERVO: how stiff ``servoj`` holds a set-point (100 to 2000), how far it looks ahead [s]
     #: (0.03 to 0.2), and how many set-points the buffer of the robot program holds.
-    servoj_gain: float = 2000.0
-    servoj_lookahead_time: float = 0.03
+    servoj_gain: float = 1000.0
+    servoj_lookahead_time: float = 0.06
     servo_buffer_depth: int = 250
     #: Whether a person may guide the arm by hand (freedrive).
     allow_freedrive: bool = False

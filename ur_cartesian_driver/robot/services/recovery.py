@@ -87,23 +87,31 @@ class RecoveryRunner:
         self._send_program, self._headless = send_program, headless
         self._is_running = False
 
-    async def run(self) -> ServiceAnswer:
-        """Recover until READY, or until a person has to act; the text says what was done."""
+    async def run(self, *, may_unlock: bool) -> ServiceAnswer:
+        """
+        Recover until READY, or until a person has to act; the text says what was done.
+
+        :param may_unlock: whether somebody answers for unlocking a protective stop.
+        """
         if self._is_running:
             return failed('A recovery is running already.')
         self._is_running = True
         try:
-            return await self._step_by_step()
+            return await self._step_by_step(may_unlock)
         finally:
             self._is_running = False
 
-    async def _step_by_step(self) -> ServiceAnswer:
+    async def _step_by_step(self, may_unlock: bool) -> ServiceAnswer:
         done: list[str] = []
         remote = await self._dashboard.remote_control()
+
+        def situation() -> RecoverySituation:
+            return self._situation(remote, may_unlock)
+
         loop = asyncio.get_running_loop()
         last_step_time = loop.time()
         while True:
-            upcoming = await self._settled_step(remote)
+            upcoming = await self._settled_step(situation)
             if upcoming.step is RecoveryStep.DONE:
                 return succeeded(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.OPERATOR:
@@ -130,7 +138,7 @@ class RecoveryRunner:
             done.append(STEP_NAMES[upcoming.step])
             last_step_time = loop.time()
 
-    async def _settled_step(self, remote: bool | None) -> NextStep:
+    async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
         Return the next step; one for a person only if it lasts.
 
@@ -138,14 +146,14 @@ class RecoveryRunner:
         started has not connected yet.
         """
         loop = asyncio.get_running_loop()
-        upcoming = next_step(self._situation(remote))
+        upcoming = next_step(situation())
         end = loop.time() + SETTLING_TIMEOUT
         while upcoming.step is RecoveryStep.OPERATOR and loop.time() < end:
             await asyncio.sleep(POLL_PERIOD)
-            upcoming = next_step(self._situation(remote))
+            upcoming = next_step(situation())
         return upcoming
 
-    def _situation(self, remote: bool | None) -> RecoverySituation:
+    def _situation(self, remote: bool | None, may_unlock: bool) -> RecoverySituation:
         link = self._link
         return RecoverySituation(
             connection=link.status.state,
@@ -154,6 +162,7 @@ class RecoveryRunner:
             program_connected=link.program.connected,
             headless=self._headless,
             remote_control=remote,
+            may_unlock=may_unlock,
         )
 
     async def _do(self, step: RecoveryStep) -> ServiceAnswer:

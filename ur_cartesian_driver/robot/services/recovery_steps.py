@@ -48,6 +48,11 @@ STEP_NAMES: Mapping[RecoveryStep, str] = {
     RecoveryStep.PLAY: 'play the loaded program',
 }
 
+#: The manufacturer's service note: a protective stop is never to be reset automatically.
+_LOCKED = (
+    'The robot is in a protective stop: look for the cause and remove it, then recover again with '
+    'unlock_protective_stop, or unlock it on the pendant.'
+)
 _GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
 _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
 _ENABLE = 'An enabling device is in use: release it, or choose automatic mode.'
@@ -106,6 +111,7 @@ class RecoverySituation:
     :param program_connected: our program holds its sockets.
     :param headless: we upload the program; else a program on the robot requests it.
     :param remote_control: whether clients may control the robot; None = it cannot be known.
+    :param may_unlock: somebody answers for unlocking a protective stop.
     """
 
     connection: ConnectionState
@@ -114,6 +120,7 @@ class RecoverySituation:
     program_connected: bool = False
     headless: bool = True
     remote_control: bool | None = None
+    may_unlock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +161,8 @@ def _of_robot(situation: RecoverySituation, robot: RobotState) -> NextStep:
     for needed in (SAFETY_STEPS[robot.safety_mode], POWER_STEPS[robot.robot_mode]):
         if isinstance(needed, str):
             return NextStep(RecoveryStep.OPERATOR, needed)
+        if needed is RecoveryStep.UNLOCK and not situation.may_unlock:
+            return NextStep(RecoveryStep.OPERATOR, _LOCKED)
         if needed is not None:
             return NextStep(needed)
     return _of_program(situation, robot.runtime_state)

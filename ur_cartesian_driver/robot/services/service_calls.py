@@ -178,6 +178,9 @@ class SendProgramCall:
 class RecoverCall:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
 
+    #: A person has looked at the cause of a protective stop, and it may be unlocked.
+    unlock_protective_stop: bool = False
+
 
 def succeeded(text: str) -> ServiceAnswer:
     """Return the answer of a call that succeeded."""

@@ -131,8 +131,10 @@ class ServiceDispatcher:
                 )
             case SendProgramCall():
                 return await self._send_program()
-            case RecoverCall():
-                return await self._recovery.run()
+            case RecoverCall(unlock_protective_stop=unlock):
+                return await self._recovery.run(
+                    may_unlock=unlock or self._settings.unlock_protective_stops
+                )
 
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Refuse a call that is not allowed now."""

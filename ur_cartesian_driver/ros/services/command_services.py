@@ -40,6 +40,7 @@ from ur_cartesian_driver.srv import (
     Load,
     Popup,
     RawRequest,
+    Recover,
     SetIO,
     SetSpeedSliderFraction,
     SetTCP,
@@ -50,7 +51,6 @@ from ur_cartesian_driver.srv import (
 
 #: Services without a request; the response is success and a sentence, or the value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
-    'recover': RecoverCall(),
     'resend_robot_program': SendProgramCall(),
     'zero_ftsensor': ZeroFtSensorCall(),
     **{
@@ -100,6 +100,10 @@ def _output(request: Any) -> ServiceCall:
 
 #: Services with a request of their own, and the call that it becomes.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
+    'recover': (
+        Recover,
+        lambda request: RecoverCall(unlock_protective_stop=request.unlock_protective_stop),
+    ),
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
     'set_io': (SetIO, _output),
