@@ -9,6 +9,7 @@ controller, which shares nothing with the planner.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 from hypothesis import given
@@ -83,8 +84,9 @@ def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):
         ].primitive.velocity
         == 0.15
     )
-    turn = one(cell, turn=(0.0, 0.0, 0.3), twist=twist)[0].primitive
-    assert (turn.velocity, turn.duration) == (pytest.approx(0.5), 0.0)
+    turn = one(cell, turn=(0.0, 0.0, 1.2), twist=twist)[0].primitive
+    # Sent with the time in which neither reading of a turn exceeds that speed.
+    assert turn.duration == pytest.approx(2.0 * 1.2 / 0.5)
     joint = one(cell, x=0.1, twist=twist, segment=Segment(type=TYPE.JOINT))
     assert joint[0].primitive.velocity <= OPTIONS.joint_velocity
     assert any('twist is ignored' in remark for remark in joint[1])
@@ -92,8 +94,38 @@ def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):
 
 def test_a_line_that_turns_more_than_it_moves_is_sent_with_a_time(cell):
     segment, _ = one(cell, x=0.1, turn=(0.0, 0.0, pi / 2))
-    assert segment.primitive.duration == pytest.approx(1.5 * (pi / 2) / 0.5)
+    # Whichever way the robot counts turns, it turns no faster than angular_velocity.
+    duration = segment.primitive.duration
+    assert duration == pytest.approx(2.0 * (pi / 2) / 0.5)
+    assert segment.primitive.velocity == pytest.approx(1.5 * (pi / 2) / duration)
+    assert segment.primitive.acceleration == pytest.approx(4.5 * (pi / 2) / duration**2)
     assert 'turn within angular_velocity' in segment.report_line
+
+
+@pytest.mark.parametrize('ratio', [1.0, 4.0])
+@pytest.mark.parametrize('time', [0.0, 4.0])
+@pytest.mark.parametrize('x', [0.0, 0.05, 0.3])
+def test_both_readings_of_a_turn_keep_its_time_and_limits(cell, ratio, time, x):
+    """The robot turns the tool at 1 or 4 rad/s for each m/s: the planner sends what suits both."""
+    options = replace(OPTIONS, turn_ratio=ratio)
+    point = cell.point(x, turn=(0.0, 0.0, 0.8), time=time)
+    made = plan(Goal(waypoints=(point,)), cell.state, cell.arm, options)
+    rows = drive(made, cell, turn_ratio=ratio)
+    T = made.segments[0].primitive.duration
+    assert T > 0.0
+    assert rows[-1, 0] == pytest.approx(T, abs=2 * CYCLE)
+    assert rows[:, 4].max() <= 0.25 + 1e-6
+    assert rows[:, 5].max() <= 2.0 * 0.8 / T * (1.0 + 1e-3)
+    if not time:
+        assert rows[:, 5].max() <= OPTIONS.angular_velocity * (1.0 + 1e-3)
+
+
+@pytest.mark.parametrize('kind', [TYPE.PROCESS, TYPE.CIRCULAR])
+def test_a_time_where_the_turn_leads_is_refused_until_it_has_been_measured(cell, kind):
+    segment = Segment(type=kind, via=cell.pose(0.05, 0.05) if kind == TYPE.CIRCULAR else None)
+    with pytest.raises(InvalidGoal, match='has not been measured; give velocity instead'):
+        one(cell, x=0.1, turn=(0.0, 0.0, 0.8), time=4.0, segment=segment)
+    assert one(cell, x=0.1, turn=(0.0, 0.0, 0.05), time=4.0, segment=segment)
 
 
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.PROCESS])
@@ -152,9 +184,10 @@ def test_a_speed_that_the_wire_would_round_to_nothing_is_refused(cell):
 # -- driven by the motion generator of the simulated controller -----------------------------------
 
 
-def drive(made, cell):
-    """Return time, position and speed of the tool in every cycle."""
+def drive(made, cell, turn_ratio=4.0):
+    """Return time, position, speed and angular speed of the tool in every cycle."""
     robot = MotionGenerator(cell.arm, CYCLE, made.start)
+    robot.turn_ratio = turn_ratio
     robot.T_flange_tcp = cell.T_flange_tcp
     rows = []
     for segment in made.segments:
@@ -170,9 +203,8 @@ def drive(made, cell):
 def step(robot, rows):
     robot.step(1.0)
     assert robot.fault is None
-    rows.append(
-        (CYCLE * (len(rows) + 1), *robot.T_base_tcp.position, np.linalg.norm(robot.tcp_twist[:3]))
-    )
+    speeds = np.linalg.norm(np.reshape(robot.tcp_twist, (2, 3)), axis=1)
+    rows.append((CYCLE * (len(rows) + 1), *robot.T_base_tcp.position, *speeds))
 
 
 def begin(robot, move, cell):
@@ -238,6 +270,8 @@ def round_trip(cell, kind, radius, timed_by, turn=0.0):
 @pytest.mark.parametrize(('radius', 'within'), [(0.0, 0.01), (0.02, 0.05)])
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
 def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, radius, within, turn):
+    if kind in (TYPE.PROCESS, TYPE.CIRCULAR):
+        turn /= 6.0  # where it is the larger number, times are refused
     made = plan(round_trip(cell, kind, radius, 4.0, turn), cell.state, cell.arm, OPTIONS)
     rows = drive(made, cell)
     assert rows[-1, 0] == pytest.approx(20.0, rel=within)

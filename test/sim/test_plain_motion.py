@@ -138,6 +138,16 @@ def test_servoj_follows_a_set_point_that_runs_evenly_to_the_new_one(realtime):
             assert moved == pytest.approx(law[k], abs=1e-9)
 
 
+def test_a_line_turns_the_tool_at_four_times_its_speed_and_acceleration(realtime):
+    turn = 'movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0, 0, 0, 1.5708]), a=1, v=1)'
+    samples = realtime.motion(script(turn))
+    whole, way = trapezoid(1.5708, 4.0, 4.0)
+    # Only wrist 3 turns the tool about its own axis.
+    for t, moved in joint_ways(samples, joint=5):
+        assert moved == pytest.approx(way(started(t)), abs=1e-6)
+    assert samples[-2].time - samples[0].time == pytest.approx(whole + 0.08, abs=CYCLE)
+
+
 @pytest.mark.parametrize('v', [0.1, 0.25])
 def test_a_stopped_program_slows_down_on_its_path_within_160_ms(robot, realtime, v):
     line = 'movel(pose_add(get_target_tcp_pose(), p[0, 0.6, 0, 0, 0, 0]), a=2, v='

@@ -107,6 +107,10 @@ class PlanningOptions:
     goal_tolerance_linear_acceleration: float = 0.0
     goal_tolerance_angular_acceleration: float = 0.0
 
+    #: How fast the robot turns the tool on a line for each m/s of its speed [rad/s]: 4 was
+    #: recorded once, 1 is the manual's word. Limits hold for both where a time is sent.
+    turn_ratio: float = 4.0
+
     #: Defaults of speed and acceleration: tool [m/s], [m/s^2],
     linear_velocity: float = 0.1
     linear_acceleration: float = 0.5

@@ -97,6 +97,7 @@ class Controller:
         self.cycles = 0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
+        self.motion.turn_ratio = config.turn_ratio
         #: The measured motion: equal to the targets, unless imperfect or a fault interferes.
         self.actual = ActualMotion(self.motion, config.imperfections)
         self.sockets = MemorySockets() if sockets is None else sockets

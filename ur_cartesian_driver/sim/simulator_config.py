@@ -17,6 +17,8 @@ from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
+#: One recording of a UR3 in URSim and one forum thread; movec, movep and optimovel have 1 here.
+TURN_RATIO = 4.0
 _PRIMARY_PORT = 30001
 #: Not port 80, which only root may open.
 _ROBOT_API_PORT = 8000
@@ -57,6 +59,9 @@ class SimulatorConfig:
     #: False = the feature is off in the robot's settings: scripts are taken, and the dashboard
     #: says that the robot is not in remote control.
     has_remote_control: bool = True
+    #: Turn of a movel that counts as much as a metre [rad]; 4 was recorded, 1 is what the manual
+    #: says.
+    turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
     #: How far the arm fails to follow its targets, and the controller to keep up; None = not at

@@ -21,6 +21,7 @@ from ur_cartesian_driver.planning.geometry.speed_profile import (
     min_duration,
     peak_speed_and_acceleration,
     profile_for_time,
+    RAMP_SHARE,
     SpeedProfile,
     trapezoid,
 )
@@ -42,6 +43,11 @@ MIN_SPEED = 1e-5
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 #: Motions that take a time on the wire.
 _TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
+#: Motions that take none, whose turn has never been measured.
+_UNMEASURED_TURNS = (SegmentType.CIRCULAR, SegmentType.PROCESS)
+#: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
+#: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
+_PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
 #: Iterations until speeds and the times in blends agree.
 _MAX_ITERATIONS = 12
 
@@ -139,6 +145,16 @@ class _SegmentTimer:
         self._speed_unit = speed_unit(self._unit)
         self._limits = speed_limits(geometry, self._length, options, model)
         self._rests = geometry.blend_before is None, geometry.blend_after is None
+        self._turn_leads_line = self._unit == 'rad' and geometry.kind == SegmentType.LINEAR
+        self._peak = _PEAK_OF_TURN if self._turn_leads_line else _PEAK
+        self._ramp_share = RAMP_SHARE
+        #: Part of its length that the robot counts, by the turn ratio.
+        self._counted = 1.0
+        if self._turn_leads_line:
+            counted = max(geometry.curve.length, self._length / options.turn_ratio)
+            self._counted = counted / self._length
+            # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
+            self._ramp_share = 1.0 / (1.0 + max(1.0, 2.0 * self._counted))
 
     @property
     def takes_time(self) -> bool:
@@ -155,7 +171,17 @@ class _SegmentTimer:
         """Return the timing, final unless the segment has to meet a time by its speed."""
         if self.geometry.time is None:
             return self._by_speed()
-        return self._by_time() if self.takes_time else self.by_speed_for_time(0.0, strict=False)
+        if self.takes_time:
+            return self._by_time()
+        if self._unit == 'rad' and self.geometry.kind in _UNMEASURED_TURNS:
+            raise InvalidGoal(
+                point_field(self.geometry.index, 'time_from_start'),
+                f'is the time of a {self.geometry.kind.name} segment that turns the tool by '
+                f'{self._length:.3f} rad over {self.geometry.curve.length:.3f} m; how fast the '
+                'robot runs it where the turn is the larger number has not been measured',
+                'give velocity instead of times, or turn the tool on LINEAR segments',
+            )
+        return self.by_speed_for_time(0.0, strict=False)
 
     def check_wire(self, timing: SegmentTiming) -> None:
         """Refuse speeds too small for the wire, and times too large for it."""
@@ -190,7 +216,9 @@ class _SegmentTimer:
         if timing.wire_time > 0.0 and time_in_blends > 0.0:
             # The time on the wire is met in total: blends are shorter, so the rest takes longer.
             left = max(timing.wire_time - time_in_blends, 0.05 * timing.wire_time)
-            profile = timing.profile = profile_for_time(profile.length, left, *self._rests)
+            profile = timing.profile = profile_for_time(
+                profile.length, left, *self._rests, self._ramp_share
+            )
         timing.duration = profile.duration + time_in_blends
 
     # -- speeds ----------------------------------------------------------------------------------
@@ -199,10 +227,7 @@ class _SegmentTimer:
         """Return the timing of a segment without a time."""
         geometry, limits = self.geometry, self._limits
         bound, name, unit = limits.speed, limits.name, self._speed_unit
-        turn_leads = (
-            geometry.kind == SegmentType.LINEAR and self._unit == 'rad' and translates(geometry)
-        )
-        if turn_leads:
+        if self._turn_leads_line and translates(geometry):
             bound, name, unit = self._options.max_tool_speed or inf, 'max_tool_speed', 'm/s'
         wanted, source = self._wanted_speed()
         velocity = min(wanted, bound)
@@ -218,7 +243,7 @@ class _SegmentTimer:
             rate *= _OPTIMIZED_JOINT_ACCELERATION / min(self._model.max_joint_speed)
         else:
             rate = acceleration = min(acceleration, limits.acceleration)
-        if turn_leads:
+        if self._turn_leads_line:
             return self._turning_line(velocity, acceleration, source, remark)
         profile = self._profile_by_speed(velocity, rate)
         return SegmentTiming(velocity, acceleration, profile, source, remark)
@@ -264,25 +289,28 @@ class _SegmentTimer:
         """
         Return the timing of a line on which the turn leads.
 
-        One number for both would turn the tool as slowly as it moves: a time is sent instead, in
-        which the tool keeps its speed [m/s] and turns no faster than the default.
+        The robot may turn the tool as slowly as it moves it, or several times as fast: a time is
+        sent instead, in which the tool keeps its speed [m/s] and turns no faster than the default
+        (without a way: than was asked for), whichever it is.
         """
-        options = self._options
-        time = max(
-            min_duration(self.geometry.curve.length, velocity, acceleration),
-            min_duration(self._length, options.angular_velocity, options.angular_acceleration),
+        options, limits, peak = self._options, self._limits, self._peak
+        turn = velocity, acceleration
+        line_time = 0.0
+        if translates(self.geometry):
+            line_time = min_duration(self.geometry.curve.length, velocity, acceleration, peak)
+            turn = options.angular_velocity, options.angular_acceleration
+            source = f'{source}, turn within angular_velocity'
+        turn_time = min_duration(
+            self._length, min(turn[0], limits.speed), min(turn[1], limits.acceleration), peak
         )
+        time = max(line_time, turn_time)
+        speed, rate = peak_speed_and_acceleration(self._length, time)
         timing = SegmentTiming(
-            velocity,
-            acceleration,
-            self._profile_by_time(time),
-            f'{source}, turn within angular_velocity',
-            remark,
-            wire_time=time,
+            speed, rate, self._profile_by_time(time), source, remark, wire_time=time
         )
         if not self.takes_time:
-            timing.velocity, timing.wire_time = timing.profile.cruise, 0.0
-            _, timing.acceleration = peak_speed_and_acceleration(self._length, time)
+            timing.wire_time = 0.0
+            timing.velocity, timing.acceleration = speed * self._counted, rate * self._counted
         return timing
 
     def _profile_by_speed(self, velocity: float, acceleration: float) -> SpeedProfile:
@@ -301,9 +329,10 @@ class _SegmentTimer:
 
     def _by_time(self) -> SegmentTiming:
         """Return the timing of a segment for which the wire carries the time."""
-        min_time = min_duration(self._length, self._limits.speed, self._limits.acceleration)
+        limits = self._limits
+        min_time = min_duration(self._length, limits.speed, limits.acceleration, self._peak)
         time, remark = self._time_within_limits(min_time)
-        # The robot ignores speed and acceleration when it has a time; these are what it will need.
+        # These make the robot speed up, cruise and brake for a third of the time each.
         velocity, acceleration = peak_speed_and_acceleration(self._length, time)
         profile = self._profile_by_time(time)
         return SegmentTiming(
@@ -313,7 +342,8 @@ class _SegmentTimer:
     def _profile_by_time(self, time: float) -> SpeedProfile:
         """Return the profile between the blends of a segment that is sent with a time [s]."""
         fraction = self.geometry.unblended_fraction
-        return profile_for_time(self._length * fraction, time * fraction, *self._rests)
+        length, share = self._length * fraction, self._ramp_share
+        return profile_for_time(length, time * fraction, *self._rests, share)
 
     def by_speed_for_time(self, time_in_blends: float, strict: bool = True) -> SegmentTiming:
         """
@@ -347,8 +377,13 @@ class _SegmentTimer:
         velocity = cruise_speed_for(distance, between, acceleration, ramps)
         if velocity is None:  # only before the blends are known, or within rounding
             velocity = 2.0 * distance / between
-        profile = self._profile_by_speed(velocity, acceleration)
-        return SegmentTiming(velocity, acceleration, profile, self._time_source(), remark)
+        return SegmentTiming(
+            velocity * self._counted,
+            acceleration * self._counted,
+            self._profile_by_speed(velocity, acceleration),
+            self._time_source(),
+            remark,
+        )
 
     def _time_source(self) -> str:
         return f'time from points[{self.geometry.index}].time_from_start'
@@ -379,6 +414,7 @@ class _SegmentTimer:
                 f'because of {limits.name}'
             )
         speed, acceleration = peak_speed_and_acceleration(self._length, time)
+        speed *= self._peak / _PEAK
         raise TooFast(
             where,
             f'gives the segment {time:.3f} s for {self._length:.3f} {self._unit}, which needs up '

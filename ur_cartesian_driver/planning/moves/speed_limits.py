@@ -80,7 +80,12 @@ def speed_limits(
     )
     if geometry.curve.angle > 0.0:
         bound = min(bound, options.max_angular_acceleration * length / geometry.curve.angle)
-    return SpeedLimits(speed=speed, name=name, acceleration=bound)
+    # Where the robot turns the tool faster than it moves it, it gets ahead of the turn.
+    faster = 1.0
+    if geometry.kind in (SegmentType.CIRCULAR, SegmentType.PROCESS):
+        turn = min(geometry.curve.angle, length)  # a FIXED arc turns the tool by its angle
+        faster = min(1.0, max(geometry.curve.length, turn / options.turn_ratio) / length)
+    return SpeedLimits(speed=speed * faster, name=name, acceleration=bound * faster)
 
 
 def _limit_in_blends(

@@ -82,6 +82,8 @@ class MotionGenerator:
         self.arm = arm
         self.cycle = cycle
         self.max_tool_speed = MAX_TOOL_SPEED
+        #: How fast movel turns the tool for each m/s of its speed [rad/s].
+        self.turn_ratio = 1.0
         self._target = ArmTarget(arm, cycle, q)
         self._active = RunningMotion(self._target)
         self._reports = MotionReports()
@@ -168,9 +170,11 @@ class MotionGenerator:
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move straight with the tool; a, v [m/s^2, m/s; for rotations rad], t [s], r [m]."""
-        parameters = ProfileParameters(acceleration=a, speed=v, time=t)
-        return self._start_path('movel', _linear_path(T_base_tcp), parameters, r)
+        """Move straight with the tool; a, v [m/s^2, m/s; for rotations :attr:`turn_ratio`]."""
+        parameters, ratio = ProfileParameters(acceleration=a, speed=v, time=t), self.turn_ratio
+        return self._start_path(
+            'movel', lambda start: LinearMovePath(start.pose, T_base_tcp, ratio), parameters, r
+        )
 
     def movep(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0) -> Move:
         """

@@ -4,7 +4,7 @@
 The geometry of motion: the set-point at a path parameter, without time.
 
 A move path runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and
-arcs of the tool in metres (in radians where the rotation is the larger number). A blend path runs
+arcs of the tool in metres (by their rotation where that takes longer). A blend path runs
 from 0 to 1 and replaces the end of one move path and the beginning of the next. A set-point is six
 joint positions or a pose of the TCP in the base.
 """
@@ -107,15 +107,17 @@ class LinearMovePath:
     """
     A straight line of the tool with the shortest rotation.
 
-    Its length is the distance [m] or the angle [rad], whichever number is larger: the robot has
-    one speed for both, which neither may exceed.
+    Its length is the distance [m] or the angle over the turn ratio [rad], whichever number is
+    larger: the robot has one speed for both.
+
+    :param turn_ratio: turn that counts as much as a metre [rad].
     """
 
-    def __init__(self, start: Pose, end: Pose) -> None:
+    def __init__(self, start: Pose, end: Pose, turn_ratio: float = 1.0) -> None:
         """Measure distance and length."""
         self.start, self.end = start, end
         self.distance = start.distance_to(end)
-        length = max(self.distance, start.angle_to(end))
+        length = max(self.distance, start.angle_to(end) / turn_ratio)
         self.length = length if length > _MIN_LENGTH else 0.0
 
     def at(self, s: float) -> Pose:
