@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OutputKind,
     Posture,
+    SafeOutput,
     Segment,
     SegmentType,
     Tolerance,
@@ -43,6 +44,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
     return Waypoint(pose=Pose((x, y, z)), time=time, **fields)
 
 
+GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
@@ -192,6 +194,21 @@ REFUSALS = [
         ),
         NotAvailable,
         'io_commands is not empty, but SERVO switches no outputs',
+    ),
+    (
+        replace(PLAIN, safe_outputs=(replace(GLUE, pin=8),)),
+        InvalidGoal,
+        'safe_outputs[0].pin is 8, but there are standard digital outputs 0 to 7; name one of',
+    ),
+    (
+        replace(PLAIN, safe_outputs=(replace(GLUE, value=0.5),)),
+        InvalidGoal,
+        'safe_outputs[0].value is 0.5; a standard digital output takes 0 (off) or 1 (on)',
+    ),
+    (
+        replace(PLAIN, safe_outputs=(GLUE, replace(GLUE, value=1.0))),
+        InvalidGoal,
+        'safe_outputs[1] names standard digital output 3 again; name it once',
     ),
     (
         replace(PLAIN, controlled_frame='nozzle'),

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.framing import encode_result
 from ur_cartesian_driver.protocol.program.script_command import (
     COMMAND_SIZE,
@@ -21,12 +23,14 @@ from ur_cartesian_driver.protocol.program.script_command import (
     EndForceModeCommand,
     EndToolContactCommand,
     FtRtdeInputEnableCommand,
+    SafeOutputsAction,
     ScriptCommand,
     ScriptCommandDecoder,
     SetFrictionCompensationCommand,
     SetFrictionScalesCommand,
     SetGravityCommand,
     SetPayloadCommand,
+    SetSafeOutputsCommand,
     SetTargetPayloadCommand,
     SetTcpOffsetCommand,
     SetToolVoltageCommand,
@@ -105,8 +109,26 @@ def test_a_command_that_the_software_lacks_is_refused(case):
 
 
 def test_all_commands_are_covered():
-    assert {cls.command for cls in CLASSES.values()} == set(ScriptCommand)
+    ours = {ScriptCommand.SET_SAFE_OUTPUTS}
+    assert {cls.command for cls in CLASSES.values()} == set(ScriptCommand) - ours
     assert {case['command'] for case in SENT} == set(CLASSES)
+
+
+def test_safe_outputs_come_back_from_their_words():
+    outputs = (
+        SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0),
+        SafeOutput(output=OutputKind.CONFIGURABLE_DIGITAL, pin=7, value=1.0),
+        SafeOutput(output=OutputKind.TOOL_DIGITAL, pin=1, value=0.0),
+        SafeOutput(
+            output=OutputKind.STANDARD_ANALOG, pin=1, value=0.25, domain=AnalogDomain.VOLTAGE
+        ),
+    )
+    command = SetSafeOutputsCommand(action=SafeOutputsAction.ARM, token=2**31 - 1, outputs=outputs)
+    assert decode(encode(command)) == command
+    words = struct.unpack('>28i', encode(command))
+    assert words[:3] == (100, 1, 2**31 - 1)
+    assert words[3:21] == (*(-1, -1, -1, 0), *(-1,) * 11, 1, -1, 0)
+    assert words[21:25] == (-1, 0, 250_000, 1)
 
 
 SIX = (0.0,) * 6

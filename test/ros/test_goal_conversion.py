@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
 )
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SafeOutput, SegmentType
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.msg import (
@@ -25,6 +25,7 @@ from ur_cartesian_driver.msg import (
     IOCommand,
     MotionSegment,
 )
+from ur_cartesian_driver.msg import SafeOutput as SafeOutputMessage
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.ros.message_fields import seconds
 from ur_cartesian_driver.ros.messages.goal_conversion import (
@@ -95,6 +96,9 @@ def test_every_other_field_of_a_goal_arrives():
             IOCommand(point_index=0, output=2, pin=1, value=1.0, offset=Duration(nanosec=1)),
             IOCommand(output=3, analog_domain=1),
         ],
+        safe_outputs=[
+            SafeOutputMessage(output=3, pin=1, value=0.5, analog_domain=1, restore=True)
+        ],
     )
     message.path_tolerance.position_error.x = 0.1
     message.goal_tolerance.orientation_error.z = -1.0
@@ -110,6 +114,15 @@ def test_every_other_field_of_a_goal_arrives():
     assert (command.output, command.pin, command.value) == (OutputKind.TOOL_DIGITAL, 1, 1.0)
     assert command.offset == 1e-9
     assert analog.domain is AnalogDomain.VOLTAGE
+    assert result.safe_outputs == (
+        SafeOutput(
+            output=OutputKind.STANDARD_ANALOG,
+            pin=1,
+            value=0.5,
+            domain=AnalogDomain.VOLTAGE,
+            restore=True,
+        ),
+    )
 
 
 def test_a_plain_goal_passes_the_checks_of_planning():

@@ -165,7 +165,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     if not cell.owner.silent:
         goal.send_remaining_points(phase)
     if row.waits:
-        await check_waiting_goal(cell, goal, row, context)
+        await check_waiting_goal(cell, goal, row, phase, context)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:
         await end_faults(cell)  # what kept it from settling
     await cell.until(
@@ -180,6 +180,9 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         context,
     )
     goal.record_end()
+    has_crashed = row.state_after is ConnectionState.DISCONNECTED and 'crash' in row.cause
+    if not has_crashed:
+        await goal.check_process(context)
     if not row.waits:
         await cell.until(lambda: cell.status.state is row.state_after, row.state_within, context)
         assert cell.is_ready() or cell.status.message, context
@@ -187,18 +190,22 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
             await end_faults(cell)
         travel = await recover(cell, row.steps)
         assert travel <= row.travel + ROUNDING, f'{context}: a joint has moved by {travel} rad'
+        await goal.check_process(context)
     await cell.until(cell.is_ready, row.ready_within, context)
     await return_home(cell, home, context)
     goal.check_result(row, phase)
     return goal.motion.ended_at - begin
 
 
-async def check_waiting_goal(cell, goal, row, context):
+async def check_waiting_goal(cell, goal, row, phase, context):
     """Check that a goal waits for an operator, then do the steps after which it goes on."""
     await cell.until(cell.at_rest, row.rest_within, context)
     await cell.sleep(WATCH_TIME)
     assert goal.motion.outcome is None, context
     assert cell.at_rest(), context
+    if cell.robot.controller.programs.state is RuntimeState.PAUSED:
+        assert not goal.is_process_on(), context
+        goal.may_end_in_pause = phase == 'settling'
     cell.robot.clear_faults()
     for step in row.steps:
         await perform(cell, step)

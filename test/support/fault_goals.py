@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.goal import (
     Goal,
     IOCommand,
     OutputKind,
+    SafeOutput,
     Segment,
     Tolerance,
     Waypoint,
@@ -45,6 +46,14 @@ SIDE, BLEND = 0.05, 0.015
 #: Tolerance of the position along the path (blends included) and at the goal [m], of the twist
 #: [m/s], and time for settling [s].
 PATH_TOLERANCE, GOAL_TOLERANCE, TWIST_TOLERANCE, SETTLING = 0.004, 0.001, 0.3, 1.4
+
+#: The output of a process, which is on while a goal runs and off when it does not go on [pin].
+PROCESS = 5
+SAFE_OUTPUTS = (
+    SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PROCESS, value=0.0, restore=True),
+)
+#: How long it may take until a robot that was out of reach is written to [s].
+REACHED_WITHIN = 1.0
 
 ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(max_tool_speed=1.0)
@@ -88,9 +97,40 @@ class FaultGoal:
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion: CellMotion | None = None
 
+    #: Whether its process has an output that has to be safe.
+    has_process = True
+    #: Whether the arm was in place already in a pause: the output is restored if the goal goes on
+    #: after the pause, and stays off if it ended in it.
+    may_end_in_pause = False
+
     def send(self):
+        """Send it to the robot loop, with the output of its process switched on."""
+        self.switch_process(True)
+        self.send_motion()
+
+    def send_motion(self):
         """Send it to the robot loop."""
         self.motion = self.cell.owner.start(self.plan)
+
+    def switch_process(self, on):
+        """Switch the output of the process, as the program of a cell would."""
+        self.cell.robot.controller.io.digital_out.standard[PROCESS] = on
+
+    def is_process_on(self):
+        """Return the output of the process, as the controller has it."""
+        return self.cell.robot.controller.io.digital_out.standard[PROCESS]
+
+    async def check_process(self, context):
+        """Check the output of the process after the end of a goal: off unless it succeeded."""
+        code = self.motion.outcome.code
+        if not self.has_process or code is ErrorCode.ROBOT_NOT_READY:  # it has not begun
+            return
+        if self.may_end_in_pause:
+            return
+        expected = code is ErrorCode.SUCCESSFUL
+        await self.cell.until(
+            lambda: self.is_process_on() is expected, REACHED_WITHIN, f'process, {context}'
+        )
 
     def plan_from(self, start: StartState):
         """Return the plan, cached: the arm begins at the same pose each time."""
@@ -174,6 +214,7 @@ def square_plan(state, **goal):
         ),
         goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
         goal_time_tolerance=SETTLING,
+        safe_outputs=SAFE_OUTPUTS,
         **goal,
     )
 
@@ -252,6 +293,7 @@ def half_circle_goal(state, execution):
         path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
         goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
         goal_time_tolerance=SETTLING,
+        safe_outputs=SAFE_OUTPUTS,
     )
 
 
@@ -354,13 +396,15 @@ class OutputGoal(BlendGoal):
         self._at_end = self._outputs(self.cell)
 
     def check_result(self, row, phase):
-        """Check that all outputs switched, or that none switched after the end of the goal."""
+        """Check that all outputs switched, or that none was switched on or later."""
         now, here = self._outputs(self.cell), (row.fault, phase)
         if row.code is ErrorCode.SUCCESSFUL:
             assert now == [not value for value in self._before], here
         else:
             assert now == self._at_end, here
-            assert row.result_within > IMMEDIATE_END or now == self._at_fault, here
+            assert row.result_within > IMMEDIATE_END or all(
+                after <= before for after, before in zip(now, self._at_fault, strict=True)
+            ), here
 
     @staticmethod
     def _outputs(cell):
@@ -391,7 +435,7 @@ class AppendGoal(SplineGoal):
         self._beginning = start
         return half_circle_to_append(start)[0].plan
 
-    def send(self):
+    def send_motion(self):
         part, _ = half_circle_to_append(self._beginning)
         self.motion = self.cell.owner.run(*encode_plan(part, NEWEST_DIALECT))
 
@@ -425,7 +469,9 @@ class FreedriveGoal(FaultGoal):
     def plan_from(self, start):
         return stationary_plan(start.state)
 
-    def send(self):
+    has_process = False
+
+    def send_motion(self):
         self.motion = self.cell.owner.run(b'', stationary_job(self.plan), freedrive=True)
 
     def is_in(self, phase):

@@ -302,7 +302,7 @@ SERVO = _mode(
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
-    'after the end. When a goal does not succeed, pending outputs do not switch.',
+    'after the end. When a goal does not succeed, pending outputs are switched off, but not on.',
     {
         'before the trigger pose': 'before the output at the second blend',
         'before the time': 'the arm is at rest at the last point, an output is pending',

@@ -69,7 +69,7 @@ class CellMotion:
     """A goal that was started, as its owner sees it."""
 
     def __init__(self):
-        self.outcome = None
+        self.outcome: Any = None
         self.ended_at = None
         self.progress = []
 

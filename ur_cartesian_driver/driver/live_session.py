@@ -25,7 +25,7 @@ from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal import Goal, SafeOutput, Waypoint
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
@@ -33,6 +33,7 @@ from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.output_names import parse_safe_outputs
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3
@@ -106,7 +107,9 @@ class InteractiveMotions(ABC):
         state = self._state_for('follow live targets')
         check_target(T_base_tcp, state, self.options)
         motion = self._start_stationary(
-            stationary_plan(state), None, live=live_setup(self.arm, state.target_q, self.options)
+            stationary_plan(state, parse_safe_outputs(self.options.safe_outputs)),
+            None,
+            live=live_setup(self.arm, state.target_q, self.options),
         )
         self._live = LiveSession(motion, self._send_target)
         self._live.set_target(T_base_tcp, age=age)
@@ -242,11 +245,15 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
     )
 
 
-def stationary_plan(state: RobotState) -> Plan:
+def stationary_plan(state: RobotState, safe_outputs: tuple[SafeOutput, ...] = ()) -> Plan:
     """Return the plan of a motion without a path of its own."""
     here = state.target_tcp_pose
     return Plan(
-        goal=Goal(waypoints=(Waypoint(pose=here),), execution=ExecutionMode.SERVO),
+        goal=Goal(
+            waypoints=(Waypoint(pose=here),),
+            execution=ExecutionMode.SERVO,
+            safe_outputs=safe_outputs,
+        ),
         segments=(),
         reference=ReferencePath(
             poses=pose_rows((here, here)), point=np.zeros(2, dtype=np.int32), time=np.zeros(2)
@@ -266,4 +273,5 @@ def stationary_job(plan: Plan) -> MotionJob:
         has_speed_profile=False,
         T_flange_active=plan.T_flange_active,
         execution=plan.execution,
+        safe_outputs=plan.goal.safe_outputs,
     )

@@ -10,6 +10,7 @@ from math import nan
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
+from ur_cartesian_driver.motion.goal import SafeOutput
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback
@@ -73,6 +74,16 @@ class ServoReceived:
     feedback: ServoFeedback
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputsSecured:
+    """The outputs that have to be safe were written to the robot, as far as possible."""
+
+    #: Those that had another value, with that value.
+    changed: tuple[SafeOutput, ...] = ()
+    #: Which ones are as they were, and why, as a sentence; empty = all are safe.
+    failure: str = ''
+
+
 Event: TypeAlias = (
     StateReceived
     | ServoReceived
@@ -80,6 +91,7 @@ Event: TypeAlias = (
     | CancelRequested
     | PreemptRequested
     | LinkLost
+    | OutputsSecured
     | Tick
 )
 

@@ -110,6 +110,19 @@ class IOCommand:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SafeOutput:
+    """The value that an output takes when the motion does not go on as planned."""
+
+    output: OutputKind
+    pin: int
+    #: Digital 0 or 1; analog a fraction of the range.
+    value: float
+    domain: AnalogDomain = AnalogDomain.CURRENT
+    #: Whether it gets its value back after a pause; if not, a pause that changed it ends the goal.
+    restore: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerance:
     """
     Largest deviations by axis: 0 = the default, negative = unchecked, positive = the limit.
@@ -147,3 +160,4 @@ class Goal:
     execution: ExecutionMode = ExecutionMode.AUTO
     io_commands: tuple[IOCommand, ...] = ()
     keep_open: bool = False
+    safe_outputs: tuple[SafeOutput, ...] = ()

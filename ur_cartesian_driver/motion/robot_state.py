@@ -157,6 +157,8 @@ class RobotState:
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
+    #: The token of the last order for safe outputs that our robot program has carried out.
+    safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and those before.
     effective_speed: Annotated[float, None] = 1.0

@@ -9,6 +9,7 @@ from math import isfinite
 from typing import get_args, Literal, TypeAlias
 
 from ur_cartesian_driver.motion.workspace import parse_planes
+from ur_cartesian_driver.planning.output_names import parse_safe_outputs
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 #: The wire carries joint positions no finer than this [m].
@@ -73,6 +74,9 @@ class PlanningOptions:
     tool_radius: float = 0.0
     #: Planes that the arm must not cross, each 'name x y z nx ny nz [margin]' in base [m].
     workspace_planes: tuple[str, ...] = ()
+    #: Values that outputs take when a motion does not go on as planned, each 'kind pin value
+    #: [current | voltage] [restore]'.
+    safe_outputs: tuple[str, ...] = ()
     #: How close a line or an arc may come to a singularity: angle of wrist 2 [rad], angle of the
     #: elbow [rad], distance of the wrist centre from the plane of axes 1 and 2 [m]; 0 = off.
     singularity_margin_wrist: float = 0.05
@@ -175,5 +179,6 @@ class PlanningOptions:
                 f'{NEWEST_DIALECT.max_duration} s can be sent'
             )
         parse_planes(self.workspace_planes)
+        parse_safe_outputs(self.safe_outputs)
         if self.max_points < 1:
             raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

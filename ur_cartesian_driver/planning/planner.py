@@ -80,6 +80,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
 )
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
+from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
@@ -119,7 +120,8 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     check(goal, options)
-    retargeted = retarget_to_tcp(apply_default_tolerances(goal, options), state, options)
+    goal = add_safe_outputs(apply_default_tolerances(goal, options), options)
+    retargeted = retarget_to_tcp(goal, state, options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
     return plan_goal(planner)

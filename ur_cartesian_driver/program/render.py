@@ -219,6 +219,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'STREAM_LENGTH = {2**31 - 1}'
     yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
     yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
+    yield f'REGISTER_SAFE_OUTPUTS_TOKEN = {int(registers.OutputInteger.SAFE_OUTPUTS_TOKEN)}'
     yield f'REGISTER_PROGRAM_VERSION = {int(registers.OutputInteger.PROGRAM_VERSION)}'
     yield f'REGISTER_PROGRAM_NUMBER = {int(registers.OutputInteger.PROGRAM_NUMBER)}'
     yield f'REGISTER_PROGRAM_RUN = {int(registers.OutputInteger.PROGRAM_RUN)}'
@@ -233,6 +234,16 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
         yield f'SPLINE_{name} = {value:.10f}'
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
+    yield f'NO_COMMAND = {[0] * (script_command.COMMAND_WORDS + 1)}'
+    yield from _enum('SAFE_OUTPUTS', script_command.SafeOutputsAction)
+    # Index in the list that the robot reads: behind its length, command, action and token.
+    yield 'SAFE_DIGITAL = 4'
+    yield f'SAFE_ANALOG = {4 + script_command.DIGITAL_OUTPUTS}'
+    yield f'DIGITAL_OUTPUTS = {script_command.DIGITAL_OUTPUTS}'
+    yield f'ANALOG_OUTPUTS = {script_command.ANALOG_OUTPUTS}'
+    for kind in (OutputKind.CONFIGURABLE_DIGITAL, OutputKind.TOOL_DIGITAL):
+        name = kind.name.removesuffix('_DIGITAL')
+        yield f'FIRST_{name}_OUTPUT = {script_command.FIRST_DIGITAL_OUTPUT[kind]}'
     yield from _enum('TCP', script_command.TcpPersistence)
     yield f'MAX_PENDING_OUTPUTS = {trajectory.MAX_PENDING_OUTPUTS}'
     yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'

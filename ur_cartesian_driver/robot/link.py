@@ -168,6 +168,10 @@ class RobotLink:
             last_error=timestamped(f'{text} {"; ".join(self.event_log.event_chain())}.')
         )
 
+    def report_error(self, text: str) -> None:
+        """Take a sentence as the last error of the status, and log it."""
+        self._status.error(text)
+
     def set_serial_number(self, serial_number: str) -> None:
         """Set the serial number of the robot."""
         self._status.update(serial_number=serial_number)

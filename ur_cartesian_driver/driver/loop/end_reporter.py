@@ -8,6 +8,7 @@ import asyncio
 from dataclasses import replace
 
 from ur_cartesian_driver.driver.ipc.channel import MotionEnded
+from ur_cartesian_driver.driver.loop.output_securer import OutputSecurer
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.recordings.recorder import Recorder
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -32,24 +33,33 @@ CAUSE_TIMEOUT = 0.05
 class EndReporter:
     """Tells the owner, the recording and the status of the link."""
 
-    def __init__(self, link: RobotLink, pipe: OwnerPipe, recorder: Recorder) -> None:
+    def __init__(
+        self, link: RobotLink, pipe: OwnerPipe, recorder: Recorder, outputs: OutputSecurer
+    ) -> None:
         """Begin with nothing to report."""
         self._link, self._pipe, self._recorder = link, pipe, recorder
-        #: An end that waits for its cause.
+        self._outputs = outputs
+        #: An end that waits for its cause, or for its outputs.
         self._pending: MotionEnded | None = None
 
     @property
     def is_pending(self) -> bool:
-        """Tell whether the end of a motion waits for its cause."""
+        """Tell whether the end of a motion waits for its cause, or for its outputs."""
         return self._pending is not None
 
     def report(self, ended: MotionEnded) -> None:
-        """Report an end, as soon as its cause is known."""
+        """Report an end, as soon as its cause is known, and whether its outputs are safe."""
+        self._pending = ended
+        self._outputs.when_done(self._report_with_cause)
+
+    def _report_with_cause(self) -> None:
+        ended = self._pending
+        if ended is None:
+            return
         if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.event_log.robot_error():
-            self._pending = ended
             asyncio.get_running_loop().call_later(CAUSE_TIMEOUT, self.report_pending)
         else:
-            self._report_now(ended)
+            self.report_pending()
 
     def report_pending(self) -> None:
         """Report the end that waits for its cause, with what is known by now."""
@@ -59,6 +69,8 @@ class EndReporter:
 
     def _report_now(self, ended: MotionEnded) -> None:
         outcome = ended.outcome
+        if failure := self._outputs.failure:
+            outcome = replace(outcome, text=f'{outcome.text} {failure}')
         if outcome.code in CODES_WITH_CAUSE:
             text = outcome.text
             if error := self._link.event_log.robot_error():

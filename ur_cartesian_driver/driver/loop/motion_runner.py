@@ -27,6 +27,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.end_reporter import EndReporter
 from ur_cartesian_driver.driver.loop.goal_machine_factory import is_slow_to_make, make_machine
 from ur_cartesian_driver.driver.loop.newest_state import NewestState
+from ur_cartesian_driver.driver.loop.output_securer import OutputSecurer
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.point_buffer import PointBuffer
 from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
@@ -41,9 +42,12 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     OpenServo,
     ReportProgress,
     ReportServo,
+    RestoreOutputs,
     RestoreTcp,
+    SecureOutputs,
     SendControl,
     SendPoints,
+    SendSafeOutputs,
     SetTemporaryTcp,
     StopProgram,
     WriteServo,
@@ -65,6 +69,7 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.rtde.servo_connection import ServoConnection
 
@@ -111,7 +116,10 @@ class MotionRunner:
             config.record_max_size,
             partial(_call_soon, asyncio.get_running_loop(), pipe.log, logging.WARNING),
         )
-        self._ends = EndReporter(link, pipe, self._recorder)
+        self._outputs = OutputSecurer(
+            config, link, pipe, spawn, lambda event: self.handle_event(event)
+        )
+        self._ends = EndReporter(link, pipe, self._recorder, self._outputs)
 
     @property
     def is_running(self) -> bool:
@@ -139,6 +147,7 @@ class MotionRunner:
         assert state is not None  # else the link is not ready
         self._number, self._points = request.motion, PointBuffer(request.points)
         self._machine = machine
+        self._outputs.forget()
         self._link.set_executing(True)
         self._record(request, state)
         self._execute(machine.start(state))
@@ -225,6 +234,18 @@ class MotionRunner:
                     self._set_temporary_tcp(T_flange_tcp)
                 case RestoreTcp(T_flange_tcp=T_flange_tcp):
                     self._link.restore_tcp(T_flange_tcp)
+                case SendSafeOutputs(action=action, token=token, outputs=outputs):
+                    self._link.program.send_command(
+                        script_command.encode(
+                            script_command.SetSafeOutputsCommand(
+                                action=action, token=token, outputs=outputs
+                            )
+                        )
+                    )
+                case SecureOutputs(outputs=outputs):
+                    self._outputs.secure(outputs)
+                case RestoreOutputs(outputs=outputs):
+                    self._outputs.restore(outputs)
                 case StopProgram(reason=reason):
                     self._link.stop_program(reason)
                 case ReportProgress(progress=progress):

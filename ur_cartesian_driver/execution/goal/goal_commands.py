@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import SafeOutput
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +43,29 @@ class RestoreTcp:
     """Restore the TCP that the robot had before :class:`SetTemporaryTcp`."""
 
     T_flange_tcp: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendSafeOutputs:
+    """Tell the robot program about outputs that have to be safe."""
+
+    action: SafeOutputsAction
+    token: int
+    outputs: tuple[SafeOutput, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecureOutputs:
+    """Write the safe values of outputs to the robot: its program is paused or gone."""
+
+    outputs: tuple[SafeOutput, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestoreOutputs:
+    """Write the values to the robot that its outputs had before a pause."""
+
+    outputs: tuple[SafeOutput, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +141,9 @@ GoalCommand: TypeAlias = (
     | SendPoints
     | SetTemporaryTcp
     | RestoreTcp
+    | SendSafeOutputs
+    | SecureOutputs
+    | RestoreOutputs
     | StopProgram
     | ReportProgress
     | AnswerAppend

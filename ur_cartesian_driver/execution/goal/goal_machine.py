@@ -22,6 +22,7 @@ from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     Finish,
     GoalCommand,
+    LogWarning,
     ReportProgress,
     RestoreTcp,
     SetTemporaryTcp,
@@ -32,6 +33,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalSignal,
     GoalState,
     INITIAL_STATE,
+    INTERRUPTIBLE_STATES,
     is_at_rest,
     Meaning,
     NO_MEANING,
@@ -45,12 +47,14 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 from ur_cartesian_driver.execution.goal.missed_deadlines import missed_deadline
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.outcome_text import failure_text, tcp_report
+from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import (
     ARMING_TIMEOUT,
     CAUSE_TIMEOUT,
     DEFAULT_GOAL_TIME_TOLERANCE,
     EARLY_CANCELED_TIMEOUT,
+    SAFE_OUTPUTS_TIMEOUT,
     STOP_TIMEOUT,
 )
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -59,6 +63,7 @@ from ur_cartesian_driver.motion.events import (
     Event,
     LinkLost,
     Outcome,
+    OutputsSecured,
     PreemptRequested,
     StateReceived,
     Tick,
@@ -99,6 +104,8 @@ class GoalMachine:
         #: is not ``is_restored`` when the goal ends.
         self.temporary_tcp: TemporaryTcp | None = None
         self._monitor = feeder.monitor
+        #: Its outputs that have to be safe, if any.
+        self._guard: OutputGuard | None = None
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self._feedback_period = feedback_period
         self._next_report = -inf
@@ -125,10 +132,13 @@ class GoalMachine:
         self._packet = packet
         commands = self.feeder.prepare()
         T_flange_tcp = self.job.T_flange_tcp
+        if self.job.safe_outputs:
+            self._guard = OutputGuard(self.job.safe_outputs, packet)
+            commands.append(self._guard.arm())
         if T_flange_tcp is not None:
             self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, T_flange_tcp)
             commands.append(SetTemporaryTcp(T_flange_tcp=T_flange_tcp))
-        elif not self.feeder.explain_not_ready(packet):
+        elif self._guard is None and not self.feeder.explain_not_ready(packet):
             # No time is needed: MOVING has no deadline.
             commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
@@ -148,6 +158,11 @@ class GoalMachine:
         commands = self.feeder.take(event, now)
         if isinstance(event, StateReceived):
             self._observe(event.state, now)
+            if self._guard is not None:
+                goes_on = self.state in INTERRUPTIBLE_STATES
+                commands += self._guard.observe(event.state, goes_on=goes_on)
+        elif isinstance(event, OutputsSecured):
+            return commands + self._take_secured(event)
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
@@ -175,6 +190,11 @@ class GoalMachine:
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
 
+    def _take_secured(self, event: OutputsSecured) -> list[GoalCommand]:
+        assert self._guard is not None
+        self._guard.take(event)
+        return [LogWarning(text=event.failure)] if event.failure else []
+
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
         answer = self.feeder.append(append_job, self.state)
         if answer.refusal:
@@ -192,7 +212,11 @@ class GoalMachine:
             return meaning
         match event:
             case StateReceived(state=packet):
-                return detect_stop(packet, self._ignored_stops) or self._check_packet(packet, now)
+                return (
+                    detect_stop(packet, self._ignored_stops)
+                    or self._check_outputs()
+                    or self._check_packet(packet, now)
+                )
             case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
                 self._deadline = now + EARLY_CANCELED_TIMEOUT
                 return NO_MEANING
@@ -210,6 +234,13 @@ class GoalMachine:
                 return self._check_deadline(now)
         raise TypeError(f'unknown event {event!r}')
 
+    def _check_outputs(self) -> Meaning | None:
+        """Return that a goal must not go on, because a pause has changed its outputs."""
+        if self._guard is None or self.state not in INTERRUPTIBLE_STATES:
+            return None
+        fault = self._guard.fault()
+        return (GoalSignal.DEVIATION, fault) if fault else None
+
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
         """Return what a packet means in the present state, when nothing stops the robot."""
         if self.state in RUNNING_STATES:
@@ -221,7 +252,11 @@ class GoalMachine:
             return self._arrival(packet, now)
         if self.state is GoalState.COMING_TO_REST and is_at_rest(packet):
             return GoalSignal.AT_REST, ''
-        if self.state is GoalState.RESTORING and self._is_tcp_restored():
+        if (
+            self.state is GoalState.RESTORING
+            and self._is_tcp_restored()
+            and self._are_outputs_confirmed()
+        ):
             return GoalSignal.RESTORED, ''
         signal, text = self._check_deadline(now)
         return (signal, text) if signal is not None else self.feeder.supply(self.state)
@@ -230,11 +265,16 @@ class GoalMachine:
         """Tell whether the robot is ready, with the TCP of the goal where the plan begins."""
         tcp = self.temporary_tcp
         return (
-            tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None)
-        ) and not self.feeder.explain_not_ready(packet)
+            (tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None))
+            and (self._guard is None or self._guard.is_confirmed(packet))
+            and not self.feeder.explain_not_ready(packet)
+        )
 
     def _is_tcp_restored(self) -> bool:
         return self.temporary_tcp is None or self.temporary_tcp.is_restored
+
+    def _are_outputs_confirmed(self) -> bool:
+        return self._guard is None or self._guard.is_confirmed(self._packet)
 
     def _arrival(self, packet: RobotState, now: float) -> Meaning:
         """Return the meaning of an arm at rest after the program's SUCCESS."""
@@ -260,7 +300,7 @@ class GoalMachine:
         if now < self._deadline:
             return NO_MEANING
         if self.state not in RUNNING_STATES:
-            return missed_deadline(self.state, self.feeder, self.temporary_tcp)
+            return missed_deadline(self.state, self.feeder, self.temporary_tcp, self._guard)
         # Only an early CANCELED sets a deadline in these states; it counts if nothing has begun.
         self._deadline = inf
         if self._has_not_begun():
@@ -279,8 +319,16 @@ class GoalMachine:
             self._code, self._text = transition.code, text
         if self.state is before:
             return []
-        commands = self.feeder.enter(self.state, self._packet)
+        commands = [] if self._awaits_disarming() else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
+
+    def _awaits_disarming(self) -> bool:
+        """Tell whether a motion that leaves its mode now would set the outputs of a success."""
+        return (
+            self.state is GoalState.RESTORING
+            and self._code is ErrorCode.SUCCESSFUL
+            and self._guard is not None
+        )
 
     def _apply_supply(self, now: float) -> list[GoalCommand]:
         signal, text = self.feeder.supply(self.state)
@@ -303,6 +351,7 @@ class GoalMachine:
                 return self._enter_restoring(now)
             case GoalState.PROGRAM_LOST:
                 self._deadline = now + CAUSE_TIMEOUT
+                return [] if self._guard is None else self._guard.secure()
             case GoalState.ENDED:
                 return self._enter_ended(signal)
         return []
@@ -334,17 +383,36 @@ class GoalMachine:
         )
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
-        """Restore the TCP; a goal that did not change it ends at once."""
+        """Restore the TCP, see to the outputs; a goal that has neither ends at once."""
         self._is_decided = True
-        if self.temporary_tcp is None:
+        if self.temporary_tcp is None and self._guard is None:
             return self._apply(GoalSignal.RESTORED, '', now)
-        self._deadline = now + ARMING_TIMEOUT
-        return [
-            *self._final_progress(),
-            RestoreTcp(T_flange_tcp=self.temporary_tcp.T_flange_original),
-        ]
+        commands: list[GoalCommand] = [*self._final_progress()]
+        if self._guard is not None:
+            self._deadline = now + SAFE_OUTPUTS_TIMEOUT
+            succeeded = self._code is ErrorCode.SUCCESSFUL
+            commands.append(self._guard.release(succeeded=succeeded))
+        if self.temporary_tcp is not None:
+            self._deadline = now + ARMING_TIMEOUT
+            commands.append(RestoreTcp(T_flange_tcp=self.temporary_tcp.T_flange_original))
+        return commands
 
     def _enter_ended(self, signal: GoalSignal) -> list[GoalCommand]:
+        return [*self._secure_unconfirmed(), *self._end(signal)]
+
+    def _secure_unconfirmed(self) -> list[GoalCommand]:
+        """Write the safe outputs, unless the robot program has confirmed that they are."""
+        if (
+            self._guard is None
+            or self._code is ErrorCode.SUCCESSFUL
+            or (self._is_decided and self._guard.is_safe(self._packet))
+        ):
+            return []
+        if self._is_decided:  # it was told to
+            return self._guard.secure()
+        return [self._guard.release(succeeded=False), *self._guard.secure()]
+
+    def _end(self, signal: GoalSignal) -> list[GoalCommand]:
         if self._is_decided:  # no motion is left that could resume
             return self._finish()
         unconfirmed = signal is GoalSignal.TIMEOUT and self._code is ErrorCode.EXECUTION_FAILED

@@ -114,6 +114,9 @@ INITIAL_STATE = GoalState.ARMING
 #: In these the robot program runs points of the goal.
 RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
+#: In these a goal that must not go on after a pause ends.
+INTERRUPTIBLE_STATES = RUNNING_STATES | {GoalState.AWAITING_POINTS, GoalState.SETTLING}
+
 #: Signals that stop the arm in every state but ENDED, and the code with which the goal ends where
 #: none is decided yet.
 STOP_SIGNALS: Mapping[GoalSignal, ErrorCode] = {

@@ -11,11 +11,14 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     is_at_rest,
     Meaning,
 )
+from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, STOP_TIMEOUT
 
 
-def missed_deadline(state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None) -> Meaning:
+def missed_deadline(
+    state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard | None
+) -> Meaning:
     """
     Return the signal, with a clause for the outcome's text.
 
@@ -23,7 +26,7 @@ def missed_deadline(state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None) 
     """
     match state:
         case GoalState.ARMING:
-            return GoalSignal.TIMEOUT, _why_not_armed(feeder, tcp)
+            return GoalSignal.TIMEOUT, _why_not_armed(feeder, tcp, guard)
         case GoalState.AWAITING_POINTS:
             return GoalSignal.TIMEOUT, (
                 'no more points, and no word that there are none, came within '
@@ -41,10 +44,15 @@ def missed_deadline(state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None) 
     )
 
 
-def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None) -> str:
+def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard | None) -> str:
     packet = feeder.monitor.latest
     if clause := feeder.explain_not_ready(packet):
         return clause
+    if guard is not None and not guard.is_confirmed(packet):
+        return (
+            f'the robot program did not take the safe_outputs of the goal within '
+            f'{ARMING_TIMEOUT:g} s: it is paused, or its command socket is dead; nothing was moved'
+        )
     if packet is not None and tcp is not None and tcp.is_active(packet):
         return feeder.monitor.start_offset(packet) or ''
     return (

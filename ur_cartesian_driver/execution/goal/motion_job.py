@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.goal import SafeOutput, Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -63,6 +63,8 @@ class MotionJob:
     keep_open: bool = False
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
+    #: What outputs become when the motion does not go on as planned.
+    safe_outputs: tuple[SafeOutput, ...] = ()
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
@@ -84,6 +86,8 @@ class MotionJob:
         """What only our robot program can do of this, as part of a sentence; empty = nothing."""
         if not self.is_motion.all():
             return 'outputs (io_commands)'
+        if self.safe_outputs:
+            return 'outputs that have to be safe (safe_outputs)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
 
 
@@ -141,6 +145,7 @@ def job_from_plan(
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
+        safe_outputs=goal.safe_outputs,
         ending_records=ending_records,
         has_speed_profile=not (
             goal.keep_open

@@ -9,6 +9,9 @@ from __future__ import annotations
 STOP_TIMEOUT = 3.0
 #: How long the robot may take to report a TCP that was set, or to get ready for set-points [s].
 ARMING_TIMEOUT = 1.0
+#: How long the robot program may take to confirm that the outputs of a goal are safe [s]; after
+#: that the driver writes them itself.
+SAFE_OUTPUTS_TIMEOUT = 0.2
 #: How long a program that answered CANCELED before its first point may take to begin anyway [s].
 EARLY_CANCELED_TIMEOUT = 1.0
 #: Longest time from the program's SUCCESS to rest inside the goal tolerance, where the goal does

@@ -71,7 +71,7 @@ class ServoFeeder(Feeder):
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
-        self._has_filled = False
+        self._has_filled = self._has_left = False
 
     # ---- what to send -------------------------------------------------------------------------
 
@@ -117,12 +117,22 @@ class ServoFeeder(Feeder):
             case GoalState.MOVING:
                 self.monitor.start(0)
                 self.stream.begin()  # the next packet is answered with the first set-point
-            case GoalState.CANCELLING | GoalState.RESTORING | GoalState.PROGRAM_LOST:
+            case GoalState.RESTORING:
+                # Nothing is written while this lasts, and the program must not wait for that.
+                return self._leave()
+            case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
                 # A program that begins after it was lost must not find set-points in the inputs.
                 return self._stop()
             case GoalState.ENDED:
-                return [*self._stop(), LeaveServo(), *self.extra_reports()]
+                return [*self._leave(), *self.extra_reports()]
         return []
+
+    def _leave(self) -> list[GoalCommand]:
+        """Leave the servo, once."""
+        if self._has_left:
+            return []
+        self._has_left = True
+        return [*self._stop(), LeaveServo()]
 
     def _stop(self) -> list[GoalCommand]:
         row = self.stream.stop()

@@ -4,22 +4,22 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind, SafeOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.output_names import (
+    output_fault,
+    output_name,
+    parse_safe_outputs,
+    repeated_output,
+)
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 
 #: Maximum time after a point [s].
 MAX_OUTPUT_OFFSET = 60.0
-_OUTPUTS = {
-    OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
-    OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
-    OutputKind.TOOL_DIGITAL: ('tool digital output', 2),
-    OutputKind.STANDARD_ANALOG: ('standard analog output', 2),
-}
 
 
 def check_outputs(goal: Goal, options: PlanningOptions) -> None:
@@ -44,12 +44,12 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
             f'{options.dialect.name} cannot switch outputs during a motion',
             'leave it empty, or let the driver send its own robot program',
         )
+    _check_safe_outputs(goal, options)
     for i, command in enumerate(goal.io_commands):
         _check_command(command, f'io_commands[{i}]', len(goal.waypoints))
 
 
 def _check_command(command: IOCommand, field: str, points: int) -> None:
-    name, pins = _OUTPUTS[command.output]
     if not 0 <= command.waypoint < points:
         raise InvalidGoal(
             f'{field}.point_index',
@@ -62,28 +62,49 @@ def _check_command(command: IOCommand, field: str, points: int) -> None:
             f'is {command.offset:g} s, outside 0 to {MAX_OUTPUT_OFFSET:g} s',
             'name another point',
         )
-    if not 0 <= command.pin < pins:
-        raise InvalidGoal(
-            f'{field}.pin',
-            f'is {command.pin}, but there are {name}s 0 to {pins - 1}',
-            'name one of these',
+    _check_output(field, command)
+
+
+def _check_output(field: str, named: IOCommand | SafeOutput) -> None:
+    if (fault := output_fault(named.output, named.pin, named.value)) is not None:
+        name, wrong, remedy = fault
+        raise InvalidGoal(f'{field}.{name}', wrong, remedy)
+
+
+def _check_safe_outputs(goal: Goal, options: PlanningOptions) -> None:
+    """Check the outputs that a goal, or the parameter, wants to be safe."""
+    if (goal.safe_outputs or options.safe_outputs) and not options.dialect.supports_outputs:
+        raise NotAvailable(
+            'safe_outputs',
+            'is not empty, but robot programs of wire dialect '
+            f'{options.dialect.name} do not know it',
+            'leave it empty (the parameter too), or let the driver send its own robot program',
         )
-    is_analog = command.output is OutputKind.STANDARD_ANALOG
-    if (
-        not isfinite(command.value)
-        or not 0.0 <= command.value <= 1.0
-        or (not is_analog and command.value not in (0.0, 1.0))
-    ):
+    for i, output in enumerate(goal.safe_outputs):
+        _check_output(f'safe_outputs[{i}]', output)
+    if (twice := repeated_output(goal.safe_outputs)) is not None:
+        output = goal.safe_outputs[twice]
         raise InvalidGoal(
-            f'{field}.value',
-            f'is {command.value:g}; a {name} takes '
-            + ('0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
+            f'safe_outputs[{twice}]',
+            f'names {output_name(output.output, output.pin)} again',
+            'name it once',
         )
+
+
+def add_safe_outputs(goal: Goal, options: PlanningOptions) -> Goal:
+    """Return a goal with the safe outputs of the parameter that it does not name itself."""
+    named = {(output.output, output.pin) for output in goal.safe_outputs}
+    added = tuple(
+        output
+        for output in parse_safe_outputs(options.safe_outputs)
+        if (output.output, output.pin) not in named
+    )
+    return replace(goal, safe_outputs=goal.safe_outputs + added) if added else goal
 
 
 def describe_command(command: IOCommand) -> str:
     """Return a command in words."""
-    name, _ = _OUTPUTS[command.output]
+    name = output_name(command.output, command.pin)
     if command.output is OutputKind.STANDARD_ANALOG:
-        return f'{name} {command.pin} to {command.value:g} ({command.domain.name.lower()})'
-    return f'{name} {command.pin} {"on" if command.value else "off"}'
+        return f'{name} to {command.value:g} ({command.domain.name.lower()})'
+    return f'{name} {"on" if command.value else "off"}'

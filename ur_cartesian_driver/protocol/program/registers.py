@@ -29,6 +29,7 @@ from the program   int         31         set-points lost to a full buffer
 from the program   int         32         version of the program (:data:`PROGRAM_VERSION`)
 from the program   int         33         number that was drawn when it was rendered
 from the program   int         34         count of connections, changes with each of them
+from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
 =================  ==========  =========  ====================================================
 
 The ints from 26 are ours; a program after the guide does not write them. The counts 27 to 31 start
@@ -76,6 +77,7 @@ class OutputInteger(IntEnum):
     PROGRAM_VERSION = 32
     PROGRAM_NUMBER = 33
     PROGRAM_RUN = 34
+    SAFE_OUTPUTS_TOKEN = 35
 
 
 class OutputDouble(IntEnum):

@@ -26,6 +26,10 @@ zeros. All words are scaled by 1,000,000 except those marked raw.
 11  SET_FRICTION_SCALES        1-6 viscous, 7-12 Coulomb, limited to [0, 1]
 12  SET_TARGET_PAYLOAD         1 mass [kg], 2-4 centre of gravity [m], 5-10 inertia
                                xx yy zz xy xz yz [kg m^2], 11 transition time [s]
+100 SET_SAFE_OUTPUTS           ours: 1 action, 2 token (both raw), 3-20 digital outputs, standard,
+                               configurable, tool (raw; -1 not named, 0 off, 1 on), 21 and 23
+                               analog outputs (fractions; negative: not named), 22 and 24 what
+                               they drive (raw)
 ==  =========================  =================================================================
 
 Only tool contact has an answer: one int32, 0 = contact, 1 = ended before a contact.
@@ -42,6 +46,8 @@ import struct
 from typing import Any, ClassVar, get_args, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
@@ -70,6 +76,7 @@ class ScriptCommand(IntEnum):
     SET_TCP_OFFSET = 10
     SET_FRICTION_SCALES = 11
     SET_TARGET_PAYLOAD = 12
+    SET_SAFE_OUTPUTS = 100
 
 
 class TcpPersistence(IntEnum):
@@ -81,6 +88,17 @@ class TcpPersistence(IntEnum):
     TEMPORARY = 1
     #: End of TEMPORARY: the program restores the remembered TCP, or sets the one given here.
     RESTORE = 2
+
+
+class SafeOutputsAction(IntEnum):
+    """What the robot program does with safe outputs; when it has, it reports the token."""
+
+    #: Forget them.
+    DISARM = 0
+    #: Remember them, and set them once in the next stop.
+    ARM = 1
+    #: Set them now, and forget them.
+    SET = 2
 
 
 class ToolContactResult(IntEnum):
@@ -97,6 +115,9 @@ _COMMAND = struct.Struct('>28i')
 Flags6: TypeAlias = tuple[bool, bool, bool, bool, bool, bool]
 #: Six numbers, limited to [0, 1] when they are sent.
 Fractions6: TypeAlias = Vector6
+#: A number that is not scaled.
+Token: TypeAlias = int
+SafeOutputs: TypeAlias = tuple[SafeOutput, ...]
 #: Software version: major, minor, bugfix.
 SoftwareVersion: TypeAlias = tuple[int, int, int]
 
@@ -237,6 +258,17 @@ class SetTargetPayloadCommand:
     transition_time: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetSafeOutputsCommand:
+    """Say what outputs become in a stop; our own robot program only."""
+
+    command: ClassVar = ScriptCommand.SET_SAFE_OUTPUTS
+    action: SafeOutputsAction
+    #: By which the robot program confirms that it has done it.
+    token: Token
+    outputs: SafeOutputs = ()
+
+
 AnyScriptCommand: TypeAlias = (
     ZeroFtSensorCommand
     | SetPayloadCommand
@@ -251,6 +283,7 @@ AnyScriptCommand: TypeAlias = (
     | SetTcpOffsetCommand
     | SetFrictionScalesCommand
     | SetTargetPayloadCommand
+    | SetSafeOutputsCommand
 )
 
 #: First software with a command: CB3 and e-Series (3 to 5), PolyScope X.
@@ -357,6 +390,48 @@ def _as_int(value: float, field: str) -> int:
     return int(value)
 
 
+#: The first digital output of a kind on the wire; the analog ones follow the digital ones.
+FIRST_DIGITAL_OUTPUT = {
+    OutputKind.STANDARD_DIGITAL: 0,
+    OutputKind.CONFIGURABLE_DIGITAL: 8,
+    OutputKind.TOOL_DIGITAL: 16,
+}
+DIGITAL_OUTPUTS, ANALOG_OUTPUTS = 18, 2
+_NOT_NAMED = -1
+
+
+def _safe_output_words(outputs: SafeOutputs) -> list[int]:
+    words = [_NOT_NAMED] * DIGITAL_OUTPUTS + [_NOT_NAMED, 0] * ANALOG_OUTPUTS
+    for output in outputs:
+        if output.output is OutputKind.STANDARD_ANALOG:
+            first = DIGITAL_OUTPUTS + 2 * output.pin
+            words[first : first + 2] = to_fixed(output.value, 'value'), int(output.domain)
+        else:
+            words[FIRST_DIGITAL_OUTPUT[output.output] + output.pin] = int(output.value)
+    return words
+
+
+def _safe_outputs(words: Sequence[int]) -> SafeOutputs:
+    """Return the outputs that are named; whether they are restored is not on the wire."""
+    digital = (
+        SafeOutput(output=kind, pin=i - first, value=float(words[i]))
+        for kind, first in FIRST_DIGITAL_OUTPUT.items()
+        for i in range(first, min(first + 8, DIGITAL_OUTPUTS))
+        if words[i] >= 0
+    )
+    analog = (
+        SafeOutput(
+            output=OutputKind.STANDARD_ANALOG,
+            pin=pin,
+            value=from_fixed(words[i]),
+            domain=AnalogDomain(words[i + 1]),
+        )
+        for pin, i in enumerate(range(DIGITAL_OUTPUTS, DIGITAL_OUTPUTS + 2 * ANALOG_OUTPUTS, 2))
+        if words[i] >= 0
+    )
+    return (*digital, *analog)
+
+
 _FLOAT = _Words(
     1, lambda value, name: [to_fixed(value, name)], lambda words, _: from_fixed(words[0])
 )
@@ -367,6 +442,13 @@ _ARGUMENTS: Mapping[str, _Words] = {
     'int': _Words(1, _FLOAT.encode, lambda words, name: _as_int(from_fixed(words[0]), name)),
     'bool': _raw(bool),
     'TcpPersistence': _raw(TcpPersistence),
+    'SafeOutputsAction': _raw(SafeOutputsAction),
+    'Token': _raw(int),
+    'SafeOutputs': _Words(
+        22,
+        lambda outputs, _: _safe_output_words(outputs),
+        lambda words, _: _safe_outputs(words),
+    ),
     'Vector3': _vector(3),
     'Vector6': _VECTOR6,
     # URCL limits these where it refuses other values; the bytes have to be the same.

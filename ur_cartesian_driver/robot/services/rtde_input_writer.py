@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose
 from typing import Any
 
@@ -67,6 +67,36 @@ def output_write(call: SetOutputCall) -> InputWrite:
     return _analog(call) if call.is_analog else _digital(call)
 
 
+def joint_write(calls: Sequence[SetOutputCall]) -> InputWrite:
+    """Return how several outputs of one kind are set at once."""
+    writes = [output_write(call) for call in calls]
+    inputs: dict[str, RtdeValue] = {}
+    for write in writes:
+        for name, value in write.inputs.items():  # masks and bits are joined, others differ
+            before = inputs.get(name)
+            if isinstance(value, int) and isinstance(before, int):
+                inputs[name] = before | value
+            else:
+                inputs[name] = value
+    return InputWrite(
+        inputs=inputs,
+        outputs=tuple(dict.fromkeys(name for write in writes for name in write.outputs)),
+        done=lambda values: all(write.done(values) for write in writes),
+    )
+
+
+def value_before(call: SetOutputCall, values: Mapping[str, Any]) -> SetOutputCall:
+    """Return the call that sets an output to what the RTDE outputs of its write report."""
+    if not call.is_analog:
+        _, first_bit = _DIGITAL[call.kind]
+        bit = values['actual_digital_output_bits'] >> (first_bit + call.pin) & 1
+        return replace(call, value=float(bit))
+    domain = AnalogDomain(values['analog_io_types'] >> (2 + call.pin) & 1)
+    low, high = RANGES[domain]
+    fraction = (values[f'standard_analog_output{call.pin}'] - low) / (high - low)
+    return replace(call, value=min(max(fraction, 0.0), 1.0), domain=domain)
+
+
 def _digital(call: SetOutputCall) -> InputWrite:
     name, first_bit = _DIGITAL[call.kind]
     return InputWrite(
@@ -103,10 +133,26 @@ async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
 
     :raises OSError: there is no connection, or another client has the inputs.
     """
-    done = asyncio.Event()
+    return (await write_and_compare(host, port, input_write))[0]
+
+
+async def write_and_compare(
+    host: str, port: int, input_write: InputWrite
+) -> tuple[bool, Mapping[str, Any]]:
+    """
+    Write, and return whether the robot reported the effect, and what it reported before.
+
+    :raises OSError: there is no connection, or another client has the inputs.
+    """
+    reported, done = asyncio.Event(), asyncio.Event()
+    before: dict[str, Any] = {}
 
     def check(names: Sequence[str], values: RtdeValues) -> None:
-        if input_write.done(dict(zip(names, values, strict=True))):
+        now = dict(zip(names, values, strict=True))
+        if not reported.is_set():
+            before.update(now)
+            reported.set()
+        if input_write.done(now):
             done.set()
 
     connection = RtdeConnection(
@@ -114,11 +160,13 @@ async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
     )
     try:
         await connection.open(host, port)
-        connection.write(input_write.inputs)
         async with asyncio.timeout(EFFECT_TIMEOUT):
+            await reported.wait()
+            done.clear()
+            connection.write(input_write.inputs)
             await done.wait()
     except TimeoutError:
-        return False
+        return False, before
     finally:
         connection.close()
-    return True
+    return True, before

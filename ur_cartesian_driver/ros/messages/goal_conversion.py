@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OutputKind,
     Posture,
+    SafeOutput,
     Segment,
     SegmentType,
     Tolerance,
@@ -75,6 +76,10 @@ def goal_from_message(
             execution=_member(ExecutionMode, message.execution, 'execution'),
             io_commands=_io_commands(message),
             keep_open=message.keep_open,
+            safe_outputs=tuple(
+                _safe_output(output, f'safe_outputs[{i}]')
+                for i, output in enumerate(message.safe_outputs)
+            ),
         ),
         trajectory,
         frames,
@@ -192,6 +197,16 @@ def _io_command(command: Message, field: str) -> IOCommand:
         pin=command.pin,
         value=command.value,
         domain=_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
+    )
+
+
+def _safe_output(output: Message, field: str) -> SafeOutput:
+    return SafeOutput(
+        output=_member(OutputKind, output.output, f'{field}.output'),
+        pin=output.pin,
+        value=output.value,
+        domain=_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
+        restore=output.restore,
     )
 
 

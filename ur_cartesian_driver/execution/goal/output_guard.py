@@ -1,0 +1,114 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The outputs of a goal that have to be safe whenever its motion does not go on as planned.
+
+The robot program gets their values before the motion, and sets them in the thread that stops the
+arm. A program that is paused or gone runs no thread: then the driver writes them to the robot.
+What counts is what the robot confirms: the program by a token, the write by what it changed.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.execution.goal.goal_commands import (
+    GoalCommand,
+    RestoreOutputs,
+    SecureOutputs,
+    SendSafeOutputs,
+)
+from ur_cartesian_driver.motion.events import OutputsSecured
+from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
+
+_PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
+_MOVABLE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+
+
+class OutputGuard:
+    """Knows whether the robot program has the values, and what a pause has changed."""
+
+    def __init__(self, outputs: tuple[SafeOutput, ...], packet: RobotState) -> None:
+        """
+        Prepare.
+
+        :param packet: the newest of the robot.
+        """
+        self._outputs = outputs
+        self._token = packet.safe_outputs_token
+        self._is_held = False
+        #: A write was ordered for this pause, or for the end; its result is not known.
+        self._is_ordered = False
+        #: What it has changed, with the values before.
+        self._changed: tuple[SafeOutput, ...] = ()
+        #: The driver has switched outputs on again: that may happen later than the goal ends.
+        self._has_restored = False
+
+    # ---- the robot program --------------------------------------------------------------------
+
+    def arm(self) -> GoalCommand:
+        """Give the values to the robot program."""
+        return self._order(SafeOutputsAction.ARM)
+
+    def release(self, *, succeeded: bool) -> GoalCommand:
+        """End a goal: the outputs stay as they are, or have to be safe now at the latest."""
+        return self._order(SafeOutputsAction.DISARM if succeeded else SafeOutputsAction.SET)
+
+    def is_confirmed(self, packet: RobotState | None) -> bool:
+        """Tell whether the robot program has carried out the last order."""
+        return packet is not None and packet.safe_outputs_token == self._token
+
+    def is_safe(self, packet: RobotState | None) -> bool:
+        """Tell whether the outputs are safe for good, after :meth:`release`."""
+        return self.is_confirmed(packet) and not self._has_restored
+
+    def _order(self, action: SafeOutputsAction) -> GoalCommand:
+        # The register wraps as the wire does; 0 is what a program that begins has.
+        self._token = self._token % (2**31 - 1) + 1
+        return SendSafeOutputs(action=action, token=self._token, outputs=self._outputs)
+
+    # ---- the driver ---------------------------------------------------------------------------
+
+    def secure(self) -> list[GoalCommand]:
+        """Write the values to the robot, once in a pause and once at the end."""
+        if self._is_ordered:
+            return []
+        self._is_ordered = True
+        return [SecureOutputs(outputs=self._outputs)]
+
+    def observe(self, packet: RobotState, *, goes_on: bool) -> list[GoalCommand]:
+        """
+        Take a packet of the robot: secure the outputs in a pause, restore them after it.
+
+        :param goes_on: whether the goal goes on after a pause.
+        """
+        is_held = packet.runtime_state in _PAUSED or packet.safety_mode not in _MOVABLE
+        was_held, self._is_held = self._is_held, is_held
+        if is_held:
+            return self.secure()
+        if was_held:
+            self._is_ordered = False
+        return self._restore() if goes_on else []
+
+    def take(self, event: OutputsSecured) -> None:
+        """Take the result of the write."""
+        self._changed = event.changed
+
+    def fault(self) -> str:
+        """Return why the goal cannot go on after a pause, as a clause; empty if it can."""
+        lost = [output for output in self._changed if not output.restore]
+        if self._is_held or not lost:
+            return ''
+        kind = lost[0].output.name.lower().replace('_', ' ')
+        return (
+            f'a pause has changed the {kind} output {lost[0].pin}, which safe_outputs does not '
+            'name as one to be restored'
+        )
+
+    def _restore(self) -> list[GoalCommand]:
+        """Restore what a pause has changed, if all of it may be."""
+        changed = self._changed
+        if not changed or self.fault():
+            return []
+        self._changed, self._has_restored = (), True
+        return [RestoreOutputs(outputs=changed)]

@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Writes the safe values of outputs to a robot whose program is paused or gone, or restores others.
+
+Each kind of output has a write of its own: where another client has the inputs of one kind, the
+others are still set.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from dataclasses import replace
+from math import isclose
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.motion.events import OutputsSecured
+from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.robot.services.rtde_input_writer import (
+    joint_write,
+    value_before,
+    write_and_compare,
+)
+from ur_cartesian_driver.robot.services.service_calls import SetOutputCall
+
+#: How long a write may take [s]: the end of a goal waits for it. The inputs of a connection that
+#: was just closed are not free at once, so it is tried again meanwhile.
+WRITE_TIMEOUT, RETRY_PERIOD = 0.25, 0.02
+
+
+async def write_outputs(host: str, port: int, outputs: Iterable[SafeOutput]) -> OutputsSecured:
+    """Write the values of outputs; return what that has changed, and what has failed."""
+    by_kind: dict[int, list[SafeOutput]] = {}
+    for output in outputs:
+        by_kind.setdefault(output.output, []).append(output)
+    results = await asyncio.gather(*(_write(host, port, group) for group in by_kind.values()))
+    return OutputsSecured(
+        changed=tuple(output for changed, _ in results for output in changed),
+        failure=' '.join(failure for _, failure in results if failure),
+    )
+
+
+async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[SafeOutput], str]:
+    """Write outputs of one kind; return those that were changed, as they were, and a failure."""
+    calls = [
+        SetOutputCall(kind=o.output, pin=o.pin, value=o.value, domain=o.domain) for o in outputs
+    ]
+    write, reason = joint_write(calls), f'the robot did not answer within {WRITE_TIMEOUT:g} s'
+    try:
+        async with asyncio.timeout(WRITE_TIMEOUT):
+            while True:
+                try:
+                    done, values = await write_and_compare(host, port, write)
+                    break
+                except (OSError, DriverError) as error:
+                    reason = str(error).rstrip('.')
+                    await asyncio.sleep(RETRY_PERIOD)
+    except TimeoutError:
+        done = False
+    if not done:
+        names = ' and '.join(f'{_name(output)} output {output.pin}' for output in outputs)
+        verb = 'is as it was' if len(outputs) == 1 else 'are as they were'
+        return [], f'The {names} {verb}, or not known to be safe: {reason}.'
+    before = [value_before(call, values) for call in calls]
+    return [
+        replace(output, value=old.value, domain=old.domain)
+        for output, call, old in zip(outputs, calls, before, strict=True)
+        if old.domain is not call.domain or not isclose(old.value, call.value, abs_tol=0.02)
+    ], ''
+
+
+def _name(output: SafeOutput) -> str:
+    return output.output.name.lower().replace('_', ' ')
