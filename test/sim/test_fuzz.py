@@ -26,7 +26,11 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.simulated_robot import Ports
 
 HOST = '127.0.0.1'
-PORTS = [field.name for field in fields(Ports)]
+#: Port and PolyScope version of each server; the two generations do not serve the same ones.
+PORTS = [
+    ('robot_api', '10.11') if field.name == 'robot_api' else (field.name, '')
+    for field in fields(Ports)
+]
 FREE: dict[str, Any] = {
     field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')
 }
@@ -76,7 +80,13 @@ SCRIPTS = [
         if b'socket_' not in (text := path.read_bytes())
     ),
 ]
-VALID = {'rtde': HANDSHAKE, 'dashboard': LINES}
+REQUESTS = [
+    b'PUT /universal-robots/robot-api/robotstate/v1/state HTTP/1.1\r\nHost: robot\r\n'
+    b'Content-Length: 23\r\n\r\n{"action": "POWER_OFF"}\n',
+    b'GET /universal-robots/robot-api/robotstate/v1/robotmode HTTP/1.1\r\nHost: robot\r\n\r\n',
+    b'GET / HTTP/1.1\r\nContent-Length: 99999999999\r\n\r\n',
+]
+VALID = {'rtde': HANDSHAKE, 'dashboard': LINES, 'robot_api': REQUESTS}
 
 
 def random_bytes(random, _):
@@ -150,9 +160,10 @@ class Watcher:
 
 
 @pytest.fixture(scope='module')
-def robot():
+def robot(polyscope):
     programs = {'a.urp': SCRIPTS[6].decode()}
-    with SimulatedRobot(SimulatorConfig(**FREE, programs=programs)) as robot:
+    config = SimulatorConfig(**FREE, programs=programs, polyscope=polyscope)
+    with SimulatedRobot(config) as robot:
         yield robot
 
 
@@ -179,7 +190,7 @@ def until_hung_up(wire: socket.socket) -> bytes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('port', PORTS)
+@pytest.mark.parametrize(('port', 'polyscope'), PORTS, scope='module')
 @pytest.mark.parametrize('attack', ATTACKS)
 def test_nonsense_ends_nothing_but_its_own_connection(robot, watcher, port, attack):
     for seed in SEEDS if attack is not slow else SEEDS[:4]:
@@ -203,6 +214,7 @@ def test_nonsense_ends_nothing_but_its_own_connection(robot, watcher, port, atta
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize('polyscope', [''], scope='module')
 @pytest.mark.parametrize('seed', SEEDS[:5])
 def test_each_line_of_the_dashboard_is_answered_by_one_line(robot, watcher, seed):
     random = Random(seed)
@@ -217,7 +229,7 @@ def test_each_line_of_the_dashboard_is_answered_by_one_line(robot, watcher, seed
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('port', PORTS)
+@pytest.mark.parametrize(('port', 'polyscope'), PORTS, scope='module')
 def test_clients_that_never_read_stall_nobody(robot, watcher, port):
     everything = struct.pack('>d', 0.0) + ','.join(OUTPUT_TYPES).encode()
     questions = {
@@ -237,7 +249,8 @@ def test_clients_that_never_read_stall_nobody(robot, watcher, port):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize('polyscope', [''], scope='module')
 def test_calls_that_are_given_up_at_once_stall_nobody(robot, watcher):
-    for port in PORTS * 5:
+    for port, _ in [server for server in PORTS if not server[1]] * 5:
         connect(robot, port).close()
     watcher.follow()
