@@ -454,7 +454,7 @@ def test_its_readings_and_its_outputs_are_those_of_the_robot():
     assert seen['outputs']['volts'] == pytest.approx(2.5)
     assert seen['cleared']['cleared']
     assert seen['slow']['fraction'] == 0.5
-    assert seen['slow']['scaling'] == pytest.approx(0.5)
+    assert seen['slow']['scaling'] == 0.0  # the arm rests; the slider is in the fraction alone
     # 0.5 rad at 0.5 rad/s and 2 rad/s^2 are 1.25 s, and twice that at half the speed.
     assert seen['slow']['took'] == pytest.approx(2.5, abs=0.5)
 
