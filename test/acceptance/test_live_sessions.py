@@ -23,7 +23,7 @@ ARM = Arm(robot_model('ur5e'))
 #: How often somebody tells a target [s].
 PERIOD = 0.02
 #: From a set-point to the arm: buffer, network and lookahead of the controller [s].
-LAG = 0.3
+LAG = 0.35
 
 
 class Session:

@@ -98,7 +98,8 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
         await run.end()
         return run
 
-    run = run_cell(scenario, feedback_rate=500.0)
+    # With these, servoj itself hardly deforms the path.
+    run = run_cell(scenario, feedback_rate=500.0, servoj_gain=2000.0, servoj_lookahead_time=0.03)
     assert run.motion.outcome.code is ErrorCode.SUCCESSFUL, run.motion.outcome
     goal, start = run.made.goal, SplineState(q=run.made.start)
     curve = ToolSpline.through(tool_points(goal, start.tool(ARM, run.made.T_flange_active)))

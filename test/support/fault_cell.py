@@ -20,8 +20,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 WATCH_TIME = 0.2
 #: Time for which an arm inside all tolerances may still creep [s].
 CREEP_TIME = 0.05
-#: Joint travel that is only the rounding of a motion's last cycles [rad].
-ROUNDING = 1e-12
+#: Joint travel that is only the rounding of a motion's last cycles, or servoj's creeping [rad].
+ROUNDING = 5e-6
 #: Time that the next goal may take [s].
 NEXT_GOAL_TIMEOUT = 2.0
 

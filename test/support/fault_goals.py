@@ -331,8 +331,11 @@ class ServoGoal(SplineGoal):
     execution = ExecutionMode.SERVO
 
     def is_in(self, phase):
-        if phase == 'entering':
-            return self.was_mode_sent(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
+        match phase:
+            case 'entering':
+                return self.was_mode_sent(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
+            case 'slowing down':
+                return self.fraction() > 0.94
         return super().is_in(phase)
 
     async def cancel(self):

@@ -261,7 +261,7 @@ SERVO = _mode(
     {
         'entering': 'the robot program was asked to take set-points, nothing has moved',
         'between points': 'on the way from the second point to the third',
-        'slowing down': 'on the way to the last point, a tenth of a second before it',
+        'slowing down': 'on the way to the last point, two tenths of a second before it',
         'cancelling': 'the driver has left the mode of set-points, the arm still moves',
     },
     1.8,
@@ -281,8 +281,6 @@ SERVO = _mode(
                 'steps': ('wait until the fault ends',),
             }
         },
-        'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
-        'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}},
     },
     faults=tuple(
         name

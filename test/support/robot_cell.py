@@ -59,6 +59,8 @@ UR5E = robot_model('ur5e')
 #: How long the owner may be silent [s]; the real one is 5 s.
 NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
+#: A slower arm is at rest [rad/s]; the bound of the robot program.
+REST_SPEED = 1e-4
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
 #: Program on the pendant that contains the External Control node.
@@ -260,8 +262,8 @@ class RobotCell:
         return self.status.state is ConnectionState.READY
 
     def at_rest(self):
-        """Tell whether no joint moves."""
-        return max(map(abs, self.robot.controller.motion.qd)) < 1e-6
+        """Tell whether the arm rests: servoj creeps up to its last set-point without an end."""
+        return max(map(abs, self.robot.controller.motion.qd)) < REST_SPEED
 
     async def until(self, condition, bound=2.0, purpose=''):
         """

@@ -50,8 +50,9 @@ def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard 
         return clause
     if guard is not None and not guard.is_confirmed(packet):
         return (
-            f'the robot program did not take the safe_outputs of the goal within '
-            f'{ARMING_TIMEOUT:g} s: it is paused, or its command socket is dead; nothing was moved'
+            f'the robot program did not confirm the safe_outputs of the goal within '
+            f'{ARMING_TIMEOUT:g} s: it is paused, its command socket is dead, or RTDE carries too '
+            'little; nothing was moved'
         )
     if packet is not None and tcp is not None and tcp.is_active(packet):
         return feeder.monitor.start_offset(packet) or ''
