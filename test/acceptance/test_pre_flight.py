@@ -32,7 +32,7 @@ GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '200'))
 MAX_DURATION = inf if GOALS >= 1000 else MAX_RUN_DURATION
 #: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
 MIN_SHARES = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
-MAX_SHARES = {'other': 0.05, 'long': 0.15, 'border': 0.05}
+MAX_SHARES = {'other': 0.01, 'long': 0.15, 'border': 0.05}
 #: Of the executed paths, compared with the other kinematics; 14 models make 210.
 POSES_OF_A_MODEL = 15
 #: What rounding on the wire may add up to [m] + [rad].

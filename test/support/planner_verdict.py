@@ -63,8 +63,8 @@ ARRIVAL_TOLERANCE = 1e-3
 class Verdict:
     """Verdict of the planner on a goal, and of the robot if it ran."""
 
-    #: ``passes``, ``reach``, ``limit``, ``branch``; ``other`` = not about the arm; ``long`` =
-    #: passes, and would take too long to run.
+    #: ``passes``, ``reach``, ``limit``, ``branch``; ``other`` = not about the arm; ``long`` = not
+    #: run, as it takes too long: the arm can follow the path, unless there is a refusal.
     planner: str
     refusal: str
     #: Why the robot failed; empty = it ran to the end and arrived where planned.
@@ -77,7 +77,7 @@ class Verdict:
     @property
     def passes(self):
         """Whether the planner accepts the goal."""
-        return self.planner in ('passes', 'long')
+        return self.planner in ('passes', 'long') and not self.refusal
 
     @property
     def agreed(self):
@@ -89,7 +89,7 @@ def compare(robot, case, options=OPTIONS, max_duration=inf) -> Verdict:
     """
     Plan a goal, and run it whether the planner accepts it or not.
 
-    :param longest: plans of motions that take longer are not run [s].
+    :param max_duration: plans of motions that take longer are not run [s].
     """
     arm = robot.controller.arm
     state = robot.place(case.q, case.T_flange_tcp)
@@ -113,10 +113,15 @@ def compare(robot, case, options=OPTIONS, max_duration=inf) -> Verdict:
             run=run,
             plan=planned,
         )
+    if _is_for_time(refusal):
+        return Verdict(planner='long', refusal='', failure='', point=-1)
     kind = KINDS.get(type(refusal), 'other')
     if kind == 'other':
         return Verdict(planner=kind, refusal=str(refusal), failure='', point=-1)
     point, before = _refused_point(case.goal, state, arm, options)
+    _check_named_point(refusal, case.goal.segments, point)
+    if point > 0 and (before is None or before.duration > max_duration):
+        return Verdict(planner='long', refusal=str(refusal), failure='', point=point)
     primitives = [] if before is None else [segment.primitive for segment in before.segments]
     q = case.q if before is None else before.segments[-1].joints
     if primitives:
@@ -125,7 +130,6 @@ def compare(robot, case, options=OPTIONS, max_duration=inf) -> Verdict:
         )
     run = robot.run([*primitives, unchecked_primitive(case, point, q, arm)])
     failure = run.failure or _posture_error(case, point, q, arm, run)
-    _check_named_point(refusal, case.goal.segments, point)
     return Verdict(
         planner=kind,
         refusal=f'{type(refusal).__name__}: {refusal}',
@@ -207,13 +211,22 @@ def _try_plan(goal, state, arm, options):
         return None, refusal
 
 
+def _is_for_time(refusal):
+    """Tell whether the arm can follow a refused path, beside a singularity say, but too slowly."""
+    return 'more than max_segment_time' in str(refusal)
+
+
 def _refused_point(goal, state, arm, options):
-    """Return the first point that makes a goal refused, and the plan of those before it."""
+    """
+    Return the first point to which the arm cannot go, and the plan of those before it.
+
+    That is None if they take too long to be sent.
+    """
     before = None
     for count in range(1, len(goal.waypoints) + 1):
         part = replace(goal, waypoints=goal.waypoints[:count], segments=goal.segments[:count])
         planned, refusal = _try_plan(part, state, arm, options)
-        if refusal is not None:
+        if refusal is not None and not _is_for_time(refusal):
             return count - 1, before
         before = planned
     raise AssertionError('every part of the goal passes, and the whole does not')

@@ -164,11 +164,7 @@ class _Draw:
     def goal(self) -> Goal:
         """Return the goal: with blends, with times in a third of those that can have them."""
         self._blend()
-        timed = self.rng.random() < 0.3 and not any(
-            s.type in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-            for s in self.segments
-        )
-        if timed:
+        if self.rng.random() < 0.3 and all(map(self._can_have_time, range(len(self.segments)))):
             time, before = 0.0, self.at(self.q)
             for i, point in enumerate(self.waypoints):
                 extent = before.distance_to(point.pose) + 0.3 * before.angle_to(point.pose)
@@ -182,6 +178,17 @@ class _Draw:
                     blend_radius=self.segments[i].blend_radius,
                 )
         return Goal(waypoints=tuple(self.waypoints), segments=tuple(self.segments))
+
+    def _can_have_time(self, i: int) -> bool:
+        """Tell whether a segment may have a time: not if it is OPTIMIZED or mostly turns."""
+        kind = self.segments[i].type
+        if kind in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT):
+            return False
+        before = self.waypoints[i - 1].pose if i else self.at(self.q)
+        target = self.waypoints[i].pose
+        return kind not in (CIRCULAR, PROCESS) or (
+            before.angle_to(target) < before.distance_to(target)
+        )
 
     def _blend(self) -> None:
         poses = [self.at(self.q), *(point.pose for point in self.waypoints)]
