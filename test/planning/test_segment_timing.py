@@ -10,7 +10,7 @@ controller, which shares nothing with the planner.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,6 +26,8 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.speed_profile import (
     cruise_speed_for,
     profile_for_time,
+    required_acceleration,
+    shortest_duration,
     trapezoid,
 )
 from ur_cartesian_driver.sim.motion import MotionGenerator
@@ -55,6 +57,28 @@ def test_the_derived_speed_takes_exactly_the_time(length, duration, acceleration
         assert acceleration * duration**2 < 4.0 * length * (1.0 + 1e-9)
     else:
         assert trapezoid(length, speed, acceleration).duration == pytest.approx(duration)
+
+
+@given(
+    length=positive,
+    speed=positive,
+    acceleration=positive,
+    ramps=st.integers(1, 2),
+    more=st.floats(1.0 + 1e-6, 3.0),
+)
+def test_the_least_acceleration_meets_every_time_within_the_speed(
+    length, speed, acceleration, ramps, more
+):
+    shortest = shortest_duration(length, speed, acceleration, ramps)
+    assert required_acceleration(length, shortest, speed, ramps) == pytest.approx(acceleration)
+    needed = required_acceleration(length, shortest * more, speed, ramps)
+    assert needed <= acceleration
+    cruise = cruise_speed_for(length, shortest * more, needed * (1.0 + 1e-9), ramps)
+    assert cruise <= speed * (1.0 + 1e-4)
+    profile = trapezoid(
+        length, cruise, needed * (1.0 + 1e-9), stop_distance=inf if ramps == 1 else 0.0
+    )
+    assert profile.duration == pytest.approx(shortest * more, rel=1e-4)
 
 
 @given(length=positive, duration=positive, before=st.booleans(), after=st.booleans())
@@ -241,6 +265,23 @@ def away(made, rows):
         u = np.clip(np.einsum('ij,ij->i', place - a, d) / length, 0.0, 1.0)
         worst = max(worst, float(np.linalg.norm(a + u[:, None] * d - place, axis=1).min()))
     return worst
+
+
+@pytest.mark.parametrize(('too_fast', 'share'), [('refuse', 1.0), ('slow', 1.0), ('slow', 0.5)])
+@pytest.mark.parametrize('max_tool_speed', [0.05, 0.25])
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
+def test_the_shortest_time_keeps_the_tool_speed(cell, kind, max_tool_speed, too_fast, share):
+    options = PlanningOptions(max_tool_speed=max_tool_speed)
+    segment = Segment(type=kind, via=cell.pose(0.15, 0.15) if kind == TYPE.CIRCULAR else None)
+    with pytest.raises(TooFast) as caught:
+        one(cell, options, x=0.3, time=0.1, segment=segment)
+    shortest = float(str(caught.value).split('at least ')[1].split(' s')[0])
+    goal = Goal(waypoints=(cell.point(x=0.3, time=share * shortest),), segments=(segment,))
+    options = replace(options, on_too_fast=too_fast)
+    made = plan(goal, cell.state, cell.arm, options)
+    rows = drive(made, cell)
+    assert rows[:, 4].max() <= max_tool_speed * (1.0 + 1e-4)
+    assert rows[-1, 0] == pytest.approx(shortest, abs=2 * CYCLE)
 
 
 CORNERS = ((0.1, 0.0), (0.1, 0.2), (-0.1, 0.2), (-0.1, 0.0), (0.1, 0.0))

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,6 +166,30 @@ def min_duration(
         peak * length / speed,
         sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
     )
+
+
+def shortest_duration(length: float, speed: float, acceleration: float, ramps: int) -> float:
+    """
+    Return the shortest time of a motion that is sent with a speed, within both bounds [s].
+
+    :param ramps: from and to rest, 0 to 2.
+    """
+    peak = min(speed, sqrt(2.0 * acceleration * length / ramps)) if ramps else speed
+    return length / peak + 0.5 * ramps * peak / acceleration
+
+
+def required_acceleration(length: float, duration: float, speed: float, ramps: int) -> float:
+    """
+    Return the least acceleration that does a length in a duration without exceeding a speed.
+
+    It is the inverse of :func:`shortest_duration`: a = n v / 2 (T - d/v), with the triangle's peak
+    2 d/T where that is less; inf if the speed alone is too low.
+    """
+    if ramps == 0:
+        return 0.0
+    peak = min(speed, 2.0 * length / duration)
+    time_in_ramps = duration - length / peak
+    return 0.5 * ramps * peak / time_in_ramps if time_in_ramps > 0.0 else inf
 
 
 def cruise_speed_for(

@@ -22,6 +22,8 @@ from ur_cartesian_driver.planning.geometry.speed_profile import (
     peak_speed_and_acceleration,
     profile_for_time,
     RAMP_SHARE,
+    required_acceleration,
+    shortest_duration,
     SpeedProfile,
     trapezoid,
 )
@@ -359,21 +361,18 @@ class _SegmentTimer:
         bound, ramps = self._max_acceleration(), sum(self._rests)
         time, remark = self.geometry.time, ''
         if strict:
-            # The shortest time accelerates to the peak, and brakes from it where it rests.
-            speed = self._limits.speed
-            peak = min(speed, sqrt(2.0 * bound * distance / ramps)) if ramps else speed
-            min_time = time_in_blends + (distance / peak + 0.5 * ramps * peak / bound)
-            time, remark = self._time_within_limits(min_time)
+            between = shortest_duration(distance, self._limits.speed, bound, ramps)
+            time, remark = self._time_within_limits(time_in_blends + between)
         between = max(time - time_in_blends, 0.05 * time)
         acceleration = self._own_acceleration() or max(
             self._default_acceleration(),
             # A third each of speeding up, cruising and braking; and no braking before a blend.
-            min(bound, 4.5 * distance / between**2),
-            min(
-                bound,
-                (distance / between) ** 2 / stop_distance if 0.0 < stop_distance < inf else 0.0,
-            ),
+            4.5 * distance / between**2,
+            (distance / between) ** 2 / stop_distance if 0.0 < stop_distance < inf else 0.0,
+            # With less, the speed that meets the time would be too high.
+            required_acceleration(distance, between, self._limits.speed, ramps),
         )
+        acceleration = min(acceleration, bound)
         velocity = cruise_speed_for(distance, between, acceleration, ramps)
         if velocity is None:  # only before the blends are known, or within rounding
             velocity = 2.0 * distance / between
