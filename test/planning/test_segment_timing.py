@@ -144,6 +144,23 @@ def test_both_readings_of_a_turn_keep_its_time_and_limits(cell, ratio, time, x):
         assert rows[:, 5].max() <= OPTIONS.angular_velocity * (1.0 + 1e-3)
 
 
+@pytest.mark.parametrize('x', [0.0, 0.01, 0.05])
+def test_a_turn_beside_the_wrist_singularity_keeps_the_joint_speeds_and_says_so(make_cell, x):
+    cell = make_cell(q=(0.0, -pi / 2, pi / 2, -pi / 2, -0.1, 0.0))
+    options = PlanningOptions(singularity_margin_wrist=0.05)
+    point = {'x': x, 'turn': (0.3, 0.0, 0.0)}
+    made = plan(Goal(waypoints=(cell.point(**point),)), cell.state, cell.arm, options)
+    with pytest.raises(TooFast, match='give it at least') as caught:
+        one(cell, options, time=0.9 * made.duration, **point)
+    at_least = float(str(caught.value).split('at least ')[1].split(' s')[0])
+    assert made.duration == pytest.approx(at_least, abs=1e-3)
+    # The simulated arm takes longer where a joint would be too fast.
+    assert drive(made, cell)[-1, 0] == pytest.approx(made.duration, abs=2 * CYCLE)
+    words = 'turns in 2.2' if x else 'slowed from 0.5 to 0.27'
+    assert made.remarks[0].startswith(f'point 0: {words}')
+    assert 'the joint speed limits (wrist_1_joint at' in made.remarks[0]
+
+
 @pytest.mark.parametrize('kind', [TYPE.PROCESS, TYPE.CIRCULAR])
 def test_a_time_where_the_turn_leads_is_refused_until_it_has_been_measured(cell, kind):
     segment = Segment(type=kind, via=cell.pose(0.05, 0.05) if kind == TYPE.CIRCULAR else None)

@@ -305,7 +305,13 @@ class _SegmentTimer:
         turn_time = min_duration(
             self._length, min(turn[0], limits.speed), min(turn[1], limits.acceleration), peak
         )
-        time = max(line_time, turn_time)
+        time, wanted = max(line_time, turn_time), max(line_time, peak * self._length / turn[0])
+        if limits.speed < turn[0] and time > wanted:
+            slowed = (
+                f'point {self.geometry.index}: turns in {time:.3f} s instead of {wanted:.3f} s, '
+                f'because of {limits.name}'
+            )
+            remark = f'{remark}; {slowed}' if remark else slowed
         speed, rate = peak_speed_and_acceleration(self._length, time)
         timing = SegmentTiming(
             speed, rate, self._profile_by_time(time), source, remark, wire_time=time
