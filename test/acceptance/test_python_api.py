@@ -2,17 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The driver as a library: mistakes of its users' code do no harm."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import os
 import socket
 import threading
+from typing import Any
 
+import numpy as np
 import pytest
 from waiting import wait_for
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, LocalProtocolError
+from ur_cartesian_driver.motion.goal import Goal, Segment, Tolerance, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -31,6 +34,71 @@ def test_a_callback_that_raises_does_not_cost_the_outcome(driver, short_goal, ca
     assert motion.result(5.0).succeeded
     assert 'a defect of the caller' in caplog.text
     assert driver.execute(short_goal, timeout=5.0).succeeded
+
+
+def of_user(value: Any) -> Any:
+    """Return a value whose type no checker knows."""
+    return value
+
+
+@pytest.mark.parametrize('number', [np.float32, np.float64])
+def test_numbers_of_numpy_are_numbers(driver, home, number: Any):
+    pose: Any = home(y=0.01)
+    point: Any = {
+        'pose': Pose(*of_user((np.array(pose.position, dtype=number), np.array(pose.quaternion)))),
+        'time': number(0.3),
+    }
+    parts: Any = {
+        'waypoints': [Waypoint(**point)],
+        'segments': [Segment(blend_radius=number(0.0))],
+        'goal_time_tolerance': number(2.0),
+        'path_tolerance': Tolerance(position=of_user(np.full(3, 0.01, dtype=number))),
+    }
+    goal = Goal(**parts)
+    outcome = driver.execute(goal, timeout=5.0)
+    assert outcome.succeeded, outcome.text
+    assert driver.set_payload(number(0.5), np.zeros(3, dtype=number)).ok
+
+
+@dataclass(frozen=True)
+class MyTolerance(Tolerance):
+    """A class that the robot process cannot import."""
+
+
+def test_what_cannot_be_sent_to_the_robot_process_is_refused_and_leaves_no_motion(
+    driver, short_goal
+):
+    planned = driver.plan(short_goal)
+    unpicklable = replace(planned, goal=replace(planned.goal, goal_time_tolerance=lambda: 1.0))
+    with pytest.raises(LocalProtocolError, match='StartMotion cannot be sent to the robot proc'):
+        driver.start(unpicklable)
+    with pytest.raises(LocalProtocolError, match='17 is no service call'):
+        driver.call(17)
+    assert driver.execute(short_goal, timeout=5.0).succeeded
+
+
+def test_what_the_robot_process_cannot_read_ends_with_the_reason(make_driver):
+    driver = make_driver(robot_loop='process')
+    driver.wait_ready(10.0)
+    goal = Goal(waypoints=(Waypoint(pose=Pose((0.0, 0.0, -0.01)), time=0.3),))
+    goal = replace(goal, T_base_frame=driver.state.actual_tcp_pose)
+    planned = driver.plan(goal)
+    foreign = replace(planned, goal=replace(planned.goal, path_tolerance=MyTolerance()))
+    outcome = driver.start(foreign).result(5.0)
+    assert outcome.code is ErrorCode.EXECUTION_FAILED
+    assert 'classes that only your program has' in outcome.text
+    assert driver.execute(goal, timeout=5.0).succeeded
+
+
+def test_a_live_target_that_is_none_is_refused_by_name(driver, home):
+    for target, age, sentence in (
+        ('there', 0.0, "T_base_tcp is 'there', which is no Pose"),
+        (home(), float('nan'), 'age is nan s; it must be finite, and at least 0'),
+        (home(), -1.0, 'age is -1.0 s'),
+        (home(), 'old', "age is 'old', which is no number"),
+    ):
+        with pytest.raises(InvalidGoal, match=sentence):
+            driver.start_live_session(target, age=age)
 
 
 def test_a_callback_may_close_the_driver(driver, short_goal):

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings that cannot work are refused with the name, the value and the bound."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver import DriverConfig
@@ -22,12 +25,33 @@ from ur_cartesian_driver.driver import DriverConfig
         ('keep_open_timeout', -1.0),
         ('rtde_frequency', 1),
         ('rtde_frequency', float('nan')),
+        ('rtde_port', -1),
+        ('primary_port', 65536),
+        ('dashboard_port', 70000),
+        ('reverse_port', -50001),
+        ('rtde_port', '30004'),
+        ('rtde_port', 30004.0),
+        ('robot_ip', 17),
+        ('headless_mode', 'yes'),
+        ('stop_deceleration', 'hard'),
+        ('stop_deceleration', float('inf')),
+        ('max_plan_deviation', float('inf')),
+        ('keep_open_timeout', float('nan')),
+        ('io_publish_rate', -1.0),
+        ('servo_buffer_depth', True),
     ],
 )
 def test_a_value_out_of_range_is_named(field, value):
     with pytest.raises(ValueError, match=field) as error:
         DriverConfig(**{field: value})
     assert str(value) in str(error.value)
+
+
+def test_numbers_of_numpy_become_plain_numbers():
+    given: dict[str, Any] = {'node_timeout': np.float32(5.0), 'rtde_port': np.int32(30004)}
+    config = DriverConfig(**given)
+    assert (type(config.node_timeout), type(config.rtde_port)) == (float, int)
+    assert config == DriverConfig()
 
 
 def test_keepalives_have_to_come_within_the_timeout():

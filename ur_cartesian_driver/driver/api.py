@@ -32,6 +32,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     MotionProgress,
     Notification,
     OwnerHeartbeat,
+    pack,
     Request,
     ResendProgram,
     ServoProgress,
@@ -46,6 +47,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.live_session import (
     check_target,
     InteractiveMotions,
+    plain_target,
     stationary_job,
 )
 from ur_cartesian_driver.driver.loop_connection import LoopConnection
@@ -61,6 +63,7 @@ from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.errors import (
     ErrorCode,
     GoalRefused,
+    LocalProtocolError,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome
@@ -354,14 +357,21 @@ class Driver(RobotServices, InteractiveMotions):
         self._send(ResendProgram())
 
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
-        """Start a call and return at once; the future always gets an answer, never an error."""
+        """
+        Start a call and return at once; the future always gets an answer, never an error.
+
+        :raises LocalProtocolError: it is no call.
+        """
+        if not isinstance(call, ServiceCall):
+            raise LocalProtocolError(f'{call!r:.60} is no service call.')
         future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
+        number = next(self._numbers)
+        data = pack(CallRobot(number=number, call=call))
         with self._lock:
             if self._loop.is_open:
-                number = next(self._numbers)
                 self._calls[number] = future
-                self._send(CallRobot(number=number, call=call))
+                self._loop.send_packed(data)
                 return future
         future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
         return future
@@ -402,31 +412,33 @@ class Driver(RobotServices, InteractiveMotions):
         Have the robot loop start a motion.
 
         :raises RobotNotReady: the robot is not ready, or another motion runs.
+        :raises LocalProtocolError: something of the motion cannot be sent to another process.
         """
+        number = next(self._numbers)
+        request = StartMotion(
+            motion=number,
+            points=points,
+            job=job,
+            live=live,
+            freedrive=freedrive,
+            plan_metadata=plan_metadata(plan, self.options)
+            if self.config.record_directory
+            else '',
+        )
+        data = pack(request)
         with self._lock:
             if self._active_motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
             if reason := self._status.not_ready():
                 raise RobotNotReady(reason)
-            active = ActiveMotion(next(self._numbers), plan, on_progress, self._send)
+            active = ActiveMotion(number, plan, on_progress, self._send)
             motion = active.motion
             if part is not None:
                 motion.appender = self._make_appender(motion, part)
-            self._active_motions[motion.number] = active
+            self._active_motions[number] = active
             # Sent under the lock: another thread may find the motion and cancel it, and the
             # cancel has to arrive after the start.
-            self._send(
-                StartMotion(
-                    motion=motion.number,
-                    points=points,
-                    job=job,
-                    live=live,
-                    freedrive=freedrive,
-                    plan_metadata=plan_metadata(plan, self.options)
-                    if self.config.record_directory
-                    else '',
-                )
-            )
+            self._loop.send_packed(data)
         return motion
 
     def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
@@ -459,6 +471,7 @@ class Driver(RobotServices, InteractiveMotions):
     def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
         state = self.state
         if state is not None and number in self._active_motions:
+            T_base_tcp, age = plain_target(T_base_tcp, age)
             check_target(T_base_tcp, state, self.options)
             self._send(SetLiveTarget(motion=number, T_base_tcp=T_base_tcp, age=age))
 

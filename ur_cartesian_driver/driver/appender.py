@@ -22,6 +22,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
 from ur_cartesian_driver.execution.points.append_feeder import CLOSED_BY_CLIENT
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.planning import PlanningOptions
@@ -122,6 +123,10 @@ class Appender:
 
         :raises GoalRefused: as of :meth:`append`.
         """
+        try:
+            new_points = with_declared_types(new_points, AppendedPoints, 'append')
+        except WrongType as error:
+            raise InvalidGoal(error.field, error.problem) from None
         if not self._is_open:
             raise RobotNotReady(CLOSED_BY_CLIENT)
         appended = yield from (
@@ -194,8 +199,8 @@ class Appender:
             if self._ended:
                 return AnswerAppend(number=number, refusal=self._ended)
             future = self._pending_answers[number] = Future()
-        self._send(offer)
         try:
+            self._send(offer)
             return future.result(self._timeout)
         except TimeoutError:
             # It may have taken them all the same, so it is unknown where more would begin.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
 from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, SafeOutput, Waypoint
@@ -105,6 +106,7 @@ class InteractiveMotions(ABC):
         :raises RobotNotReady: the robot cannot take a motion now, or one is running.
         """
         state = self._state_for('follow live targets')
+        T_base_tcp, age = plain_target(T_base_tcp, age)
         check_target(T_base_tcp, state, self.options)
         motion = self._start_stationary(
             stationary_plan(state, parse_safe_outputs(self.options.safe_outputs)),
@@ -185,6 +187,22 @@ def check_pose(pose: Pose) -> None:
             f'has length {sqrt(squared_norm):.6g}; a unit quaternion is needed',
             'divide it by its length',
         )
+
+
+def plain_target(T_base_tcp: Pose, age: float) -> tuple[Pose, float]:
+    """
+    Return a target and its age [s] in plain numbers.
+
+    :raises InvalidGoal: they are none, or the age is negative or not finite.
+    """
+    try:
+        T_base_tcp = with_declared_types(T_base_tcp, Pose, 'T_base_tcp')
+        age = with_declared_types(age, float, 'age')
+    except WrongType as error:
+        raise InvalidGoal(error.field, error.problem) from None
+    if not 0.0 <= age < inf:
+        raise InvalidGoal('age', f'is {age} s; it must be finite, and at least 0')
+    return T_base_tcp, age
 
 
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:

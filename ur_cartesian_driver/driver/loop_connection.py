@@ -97,8 +97,15 @@ class LoopConnection:
         return True
 
     def send(self, request: Request) -> None:
-        """Send a request; a loop that is gone is noticed by the reader thread."""
-        data = channel.pack(request)
+        """
+        Send a request; a loop that is gone is noticed by the reader thread.
+
+        :raises LocalProtocolError: it cannot be sent to another process.
+        """
+        self.send_packed(channel.pack(request))
+
+    def send_packed(self, data: bytes) -> None:
+        """Send a request that was packed before."""
         with self.lock, contextlib.suppress(OSError):
             if self.host is not None:
                 self.host.pipe.sendall(data)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import get_args, Literal, TypeAlias
 
+from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.output_names import parse_safe_outputs
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
@@ -152,7 +153,8 @@ class PlanningOptions:
     max_segment_time: float = 2147.483647
 
     def __post_init__(self) -> None:
-        """Check the ranges."""
+        """Check types and ranges."""
+        declare_types(self)
         for name in self.__slots__:
             value = getattr(self, name)
             if isinstance(value, float) and (not isfinite(value) or value < 0.0):

@@ -25,6 +25,7 @@ from pkgutil import resolve_name
 from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidPosture,
@@ -119,6 +120,10 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 
 
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
+    try:
+        goal = with_declared_types(goal, Goal, 'Goal')
+    except WrongType as error:
+        raise InvalidGoal(error.field, error.problem) from None
     check(goal, options)
     goal = add_safe_outputs(apply_default_tolerances(goal, options), options)
     retargeted = retarget_to_tcp(goal, state, options)

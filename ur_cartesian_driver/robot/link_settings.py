@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import ipaddress
+from math import isfinite
 
+from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
 #: A robot that reports less often cannot be monitored, nor be told from a lost one [Hz].
@@ -67,6 +69,7 @@ class LinkSettings:
 
         :raises ValueError: names the field, its value and the bound.
         """
+        self._check_numbers()
         self._check_dialect()
         self._require_within('servoj_gain', 100.0, 2000.0)
         self._require_within('servoj_lookahead_time', 0.03, 0.2)
@@ -74,6 +77,7 @@ class LinkSettings:
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
+        self._require_not_negative('io_publish_rate')
         if self.rtde_frequency != 0.0 and not self.rtde_frequency >= MIN_RTDE_FREQUENCY:
             raise ValueError(
                 f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
@@ -89,6 +93,16 @@ class LinkSettings:
     def dialect(self) -> Dialect:
         """What the robot program understands."""
         return DIALECTS[self.wire_dialect]
+
+    def _check_numbers(self) -> None:
+        """Convert all fields to their types; refuse numbers that no setting takes."""
+        declare_types(self)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not isfinite(value):
+                raise ValueError(f'{field.name} is {value}, it has to be finite.')
+            if field.name.endswith('_port'):
+                self._require_within(field.name, 0, 65535)
 
     def _check_dialect(self) -> None:
         if self.wire_dialect not in DIALECTS:
@@ -109,6 +123,12 @@ class LinkSettings:
         value = getattr(self, name)
         if not low <= value <= high:
             raise ValueError(f'{name} is {value:g}, it has to be within {low:g} and {high:g}.')
+
+    def _require_not_negative(self, *names: str) -> None:
+        for name in names:
+            value = getattr(self, name)
+            if value < 0.0:
+                raise ValueError(f'{name} is {value}, it must not be negative.')
 
     def _require_positive(self, *names: str) -> None:
         for name in names:

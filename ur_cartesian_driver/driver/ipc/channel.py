@@ -3,14 +3,16 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-A message is its length, then one of the dataclasses below, pickled. Both ends are this package and
-no other process can open the pipe, a pair of sockets; so pickle is safe here, and it moves the
-arrays of a large plan as they are.
+A message is its length, then two pickles: the notification that refuses it (None = it needs no
+answer), for a receiver that cannot read the rest, and one of the dataclasses below. Both ends are
+this package and no other process can open the pipe, a pair of sockets; so pickle is safe here, and
+it moves the arrays of a large plan as they are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import io
 import pickle
 import socket
 import struct
@@ -21,6 +23,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robot_models import DhTable
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProtocolError
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
@@ -30,6 +33,26 @@ from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGa
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 LENGTH = struct.Struct('>I')
+#: The reason of a refusal by a receiver that cannot read the message.
+UNREADABLE = (
+    'The robot process cannot read the request, because it contains objects of classes that only '
+    'your program has; use those of this package.'
+)
+
+
+class Unreadable(DriverError):
+    """A message that cannot be read."""
+
+    code = ErrorCode.INVALID_GOAL
+
+    def __init__(self, reason: str, refusal: Notification | None) -> None:
+        """
+        Build the error.
+
+        :param refusal: what answers the message, if somebody waits for an answer.
+        """
+        super().__init__(reason)
+        self.refusal = refusal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,15 +261,52 @@ Notification: TypeAlias = (
 )
 
 
+def refusal_of(message: Request | Notification, reason: str) -> Notification | None:
+    """
+    Return what answers a request that was not carried out; None if nobody waits for an answer.
+
+    :param reason: a sentence.
+    """
+    match message:
+        case StartMotion(motion=motion):
+            outcome = Outcome(code=ErrorCode.EXECUTION_FAILED, text=reason)
+            return MotionEnded(motion=motion, outcome=outcome)
+        case AppendToMotion(motion=motion, append_job=AppendJob(number=number)):
+            answer = AnswerAppend(number=number, refusal=reason)
+            return AppendAnswered(motion=motion, answer=answer)
+        case CallRobot(number=number):
+            return CallAnswered(number=number, answer=ServiceAnswer(ok=False, text=reason))
+    return None
+
+
 def pack(message: Request | Notification) -> bytes:
-    """Return a message as bytes, its length first."""
-    body = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    return LENGTH.pack(len(body)) + body
+    """
+    Return a message as bytes, its length first.
+
+    :raises LocalProtocolError: it contains something that cannot be sent to another process.
+    """
+    try:
+        refusal = pickle.dumps(refusal_of(message, UNREADABLE))
+        body = refusal + pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+        return LENGTH.pack(len(body)) + body
+    except Exception as error:  # pickling calls methods of what it finds
+        raise LocalProtocolError(
+            f'{type(message).__name__} cannot be sent to the robot process: {error}.'
+        ) from error
 
 
 def unpack(body: bytes) -> Request | Notification:
-    """Return the message of the bytes behind a length."""
-    message: Request | Notification = pickle.loads(body)
+    """
+    Return the message of the bytes behind a length.
+
+    :raises Unreadable: it is none, or contains what this process does not have.
+    """
+    stream, refusal = io.BytesIO(body), None
+    try:
+        refusal = pickle.load(stream)
+        message: Request | Notification = pickle.load(stream)
+    except Exception as error:  # unpickling calls what the bytes name
+        raise Unreadable(f'{type(error).__name__}: {error}', refusal) from error
     return message
 
 

@@ -70,11 +70,9 @@ class DriverConfig(LinkSettings):
             )
         self._require_within('servo_target_lag', 0.008, 0.2)
         self._require_within('servo_max_divergence', 0.01, 3.0)
-        for name in (
+        self._require_not_negative(
             'keep_open_timeout',
             'max_plan_deviation',
             'max_plan_deviation_angle',
             'max_calibration_difference',
-        ):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f'{name} is {getattr(self, name)}, it must not be negative.')
+        )

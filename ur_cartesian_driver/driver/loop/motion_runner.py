@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from functools import partial
 import logging
+import traceback
 from typing import TypeVar
 
 from ur_cartesian_driver.driver.ipc.channel import (
@@ -53,7 +54,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     WriteServo,
 )
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
-from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -145,12 +146,12 @@ class MotionRunner:
             return
         state = self._newest.latest
         assert state is not None  # else the link is not ready
-        self._number, self._points = request.motion, PointBuffer(request.points)
-        self._machine = machine
+        points, commands = PointBuffer(request.points), machine.start(state)
+        self._record(request, state)
+        self._number, self._points, self._machine = request.motion, points, machine
         self._outputs.forget()
         self._link.set_executing(True)
-        self._record(request, state)
-        self._execute(machine.start(state))
+        self._execute(commands)
 
     def _refusal(self, job: MotionJob) -> str:
         """Return why a motion cannot start now; empty if it can."""
@@ -185,7 +186,7 @@ class MotionRunner:
             self._refuse_append(request, foreign)
         else:
             self._pending_append = request
-            self._execute(self._machine.step(request.append_job, _now()))
+            self._step(self._machine, request.append_job)
 
     def _refuse_append(self, request: AppendToMotion, refusal: str) -> None:
         answer = AnswerAppend(number=request.append_job.number, refusal=refusal)
@@ -218,10 +219,22 @@ class MotionRunner:
     def handle_event(self, event: Event) -> None:
         """Give an event to the machine, and carry out what it commands."""
         if self._machine is not None:
-            self._execute(self._machine.step(event, _now()))
+            self._step(self._machine, event)
         elif isinstance(event, StateReceived):
             self._tcp_restorer.observe(event.state)
         self._newest.publish()
+
+    def _step(self, machine: GoalMachine, event: Event | AppendJob) -> None:
+        """Give an event to the machine; stop the arm if it fails at what its owner sent."""
+        try:
+            self._execute(machine.step(event, _now()))
+        except Exception as error:
+            if self._machine is None:
+                raise
+            text = f'The motion cannot go on ({type(error).__name__}: {error}).'
+            self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
+            self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
+            self._link.stop_program(text)
 
     def _execute(self, commands: list[GoalCommand]) -> None:
         for command in commands:

@@ -29,6 +29,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     LoopHeartbeat,
     Notification,
     OwnerHeartbeat,
+    refusal_of,
     Request,
     ResendProgram,
     SetLiveTarget,
@@ -37,6 +38,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     StartMotion,
     StatusChanged,
     unpack,
+    Unreadable,
 )
 from ur_cartesian_driver.driver.ipc.state_memory import StateMemory
 from ur_cartesian_driver.driver.loop.call_runner import CallRunner
@@ -132,12 +134,28 @@ class RobotLoop:
                 body = await requests.readexactly(size)
             except (asyncio.IncompleteReadError, ConnectionError):
                 return
-            request = await run_in_thread_if_large(size, unpack, body)
-            if isinstance(request, Shutdown) or not await self._handle_request(request):
+            try:
+                request = await run_in_thread_if_large(size, unpack, body)
+            except Unreadable as error:
+                self._refuse(error.refusal, f'a request cannot be read: {error}')
+                continue
+            if isinstance(request, Shutdown):
                 return
+            try:
+                await self._handle_request(request)
+            except Exception as error:  # nothing that an owner sends ends the loop
+                reason = f'{type(error).__name__}: {error}'
+                text = f'The request cannot be carried out ({reason.rstrip(".")}).'
+                self._refuse(refusal_of(request, text), f'{type(request).__name__}: {text}')
 
-    async def _handle_request(self, request: Request | Notification) -> bool:
-        """Carry out a request; False for one that makes no sense here."""
+    def _refuse(self, refusal: Notification | None, line: str) -> None:
+        """Answer a request that was not carried out, if its owner waits, and log why."""
+        self._pipe.log(logging.ERROR, line)
+        if refusal is not None:
+            self._pipe.send(refusal)
+
+    async def _handle_request(self, request: Request | Notification) -> None:
+        """Carry out a request."""
         self._last_heartbeat = self._now()
         match request:
             case StartMotion():
@@ -155,8 +173,9 @@ class RobotLoop:
             case OwnerHeartbeat():
                 pass
             case _:
-                return False
-        return True
+                self._pipe.log(
+                    logging.ERROR, f'{type(request).__name__} is no request to a robot loop'
+                )
 
     async def _tick(self) -> None:
         """Let time pass where nothing else happens, and monitor the owner."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import TypeAlias
 
+from ur_cartesian_driver.motion.declared_types import declare_types, WrongType
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
@@ -57,6 +58,7 @@ class DashboardCall:
 
     def __post_init__(self) -> None:
         """Check that the command exists and fits into a line."""
+        _declare_types(self)
         DashboardRequest(name=self.command, argument=self.argument)
         _check_length(self.argument)
 
@@ -69,6 +71,7 @@ class DashboardLineCall:
 
     def __post_init__(self) -> None:
         """Check that it is one line."""
+        _declare_types(self)
         if not self.line.strip() or '\n' in self.line or '\r' in self.line:
             raise LocalProtocolError(
                 f'A request to the dashboard is one line of text, not {self.line!r:.100}.'
@@ -84,6 +87,7 @@ class SetTcpCall:
 
     def __post_init__(self) -> None:
         """Check that it is a pose, in metres."""
+        _declare_types(self)
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
         if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN neither
             raise LocalProtocolError(
@@ -106,6 +110,7 @@ class SetPayloadCall:
 
     def __post_init__(self) -> None:
         """Check mass and centre of gravity."""
+        _declare_types(self)
         if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
             abs(value) <= MAX_TOOL_OFFSET for value in self.cog
         ):  # NaN neither
@@ -136,6 +141,9 @@ class SetOutputCall:
 
     def __post_init__(self) -> None:
         """Check number and value."""
+        _declare_types(self)
+        if self.kind not in PINS:
+            raise LocalProtocolError(f'kind is {self.kind}, which is no OutputKind.')
         if not 0 <= self.pin < PINS[self.kind]:
             raise LocalProtocolError(
                 f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {PINS[self.kind] - 1}.'
@@ -162,6 +170,7 @@ class SetSpeedSliderCall:
 
     def __post_init__(self) -> None:
         """Check the range."""
+        _declare_types(self)
         if not 0.0 <= self.fraction <= 1.0:
             raise LocalProtocolError(
                 f'speed_slider_fraction is {self.fraction}, but the slider takes 0 (the arm '
@@ -181,6 +190,10 @@ class RecoverCall:
     #: A person has looked at the cause of a protective stop, and it may be unlocked.
     unlock_protective_stop: bool = False
 
+    def __post_init__(self) -> None:
+        """Check the type."""
+        _declare_types(self)
+
 
 def succeeded(text: str) -> ServiceAnswer:
     """Return the answer of a call that succeeded."""
@@ -190,6 +203,13 @@ def succeeded(text: str) -> ServiceAnswer:
 def failed(text: str) -> ServiceAnswer:
     """Return the answer of a call that failed, with the reason."""
     return ServiceAnswer(ok=False, text=text)
+
+
+def _declare_types(call: object) -> None:
+    try:
+        declare_types(call)
+    except WrongType as error:
+        raise LocalProtocolError(f'{type(call).__name__}.{error}') from None
 
 
 def _check_length(text: str) -> None:

@@ -1,0 +1,218 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Values of exactly the types that a dataclass declares.
+
+Users of the Python API pass numpy's numbers for floats, and lists or arrays for tuples. Inside,
+``float`` is a float and a tuple a tuple: they are packed into messages, compared and sent to
+another process. So what users pass is converted once, where it comes in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import fields, is_dataclass, replace
+from enum import IntEnum
+from functools import cache
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
+
+import numpy as np
+
+T = TypeVar('T')
+Convert = Callable[[Any], Any]
+
+#: Longest part of a wrong value that an error text quotes.
+_MAX_QUOTED = 60
+
+
+class WrongType(ValueError):
+    """A value has no meaning as its declared type; the text names field and value."""
+
+    def __init__(self, problem: str, field: str = '') -> None:
+        """
+        Build the sentence.
+
+        :param problem: what is wrong with the value.
+        :param field: where, for example ``waypoints[2].time``.
+        """
+        super().__init__(f'{field} {problem}.')
+        self.problem, self.field = problem, field
+
+    def inside(self, outer: str) -> WrongType:
+        """Return the same error, of a part of an outer value."""
+        separator = '.' if self.field and not self.field.startswith('[') else ''
+        return WrongType(self.problem, f'{outer}{separator}{self.field}')
+
+
+def with_declared_types(value: T, kind: type[T], name: str) -> T:
+    """
+    Return a value of exactly a type; of a dataclass the fields, and theirs, have their types.
+
+    :param name: the first part of the field in the error.
+    :returns: the same object if nothing had to be converted.
+    :raises WrongType: a value is of another type. Numbers of an ``IntEnum`` may be unknown.
+    """
+    converted: T = _convert_part(_converter(kind), value, name)  # type: ignore[arg-type]
+    return converted
+
+
+def declare_types(instance: object) -> None:
+    """
+    Give the fields of a new dataclass their declared types; for ``__post_init__``.
+
+    :raises WrongType: a value is of another type.
+    """
+    for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]
+        value = getattr(instance, name)
+        converted = _convert_part(convert, value, name)
+        if converted is not value:
+            object.__setattr__(instance, name, converted)
+
+
+def _convert_part(convert: Convert, value: Any, name: str) -> Any:
+    try:
+        return convert(value)
+    except WrongType as error:
+        raise error.inside(name) from None
+
+
+def _wrong(value: Any, needed: str) -> WrongType:
+    text = repr(value)
+    quoted = text if len(text) <= _MAX_QUOTED else f'{text[:_MAX_QUOTED]}...'
+    return WrongType(f'is {quoted}, which is no {needed}')
+
+
+@cache
+def _converter(kind: Hashable) -> Convert:
+    """Return what converts values to a type."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind in _PLAIN:
+        return _PLAIN[kind]
+    if origin is tuple:
+        parts = [_converter(part) for part in arguments if part is not Ellipsis]
+        return _tuple_of_any(parts[0]) if Ellipsis in arguments else _tuple_of(parts)
+    if origin in (Union, UnionType) and len(arguments) == 2 and NoneType in arguments:
+        convert = _converter(next(part for part in arguments if part is not NoneType))
+        return lambda value: None if value is None else convert(value)
+    if origin is Literal:
+        return _text
+    if isinstance(kind, type) and issubclass(kind, IntEnum):
+        return _member_of(kind)
+    if isinstance(kind, type) and is_dataclass(kind):
+        return _dataclass(kind)
+    return lambda value: value  # what the field's own checks know
+
+
+@cache
+def _field_converters(kind: type) -> tuple[tuple[str, Convert], ...]:
+    hints = get_type_hints(kind)
+    return tuple((field.name, _converter(hints[field.name])) for field in fields(kind))
+
+
+def _dataclass(kind: type) -> Convert:
+    converters = _field_converters(kind)
+
+    def convert(value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise _wrong(value, kind.__name__)
+        changed = {}
+        for name, convert_field in converters:
+            old = getattr(value, name)
+            new = _convert_part(convert_field, old, name)
+            if new is not old:
+                changed[name] = new
+        if type(value) is not kind:  # a class that another process may not have
+            return kind(**{name: getattr(value, name) for name, _ in converters} | changed)
+        return replace(value, **changed) if changed else value  # type: ignore[type-var]
+
+    return convert
+
+
+def _tuple_of_any(convert: Convert) -> Convert:
+    """Return what converts tuples of any length."""
+
+    def convert_all(values: Any) -> Any:
+        plain = _sequence(values)
+        converted = tuple(_convert_part(convert, value, f'[{i}]') for i, value in enumerate(plain))
+        return values if type(values) is tuple and _same(values, converted) else converted
+
+    return convert_all
+
+
+def _tuple_of(converters: Sequence[Convert]) -> Convert:
+    """Return what converts tuples with one type for each element."""
+    count = len(converters)
+    types = (float,) * count if all(convert is _float for convert in converters) else None
+
+    def convert_all(values: Any) -> Any:
+        if type(values) is tuple and tuple(map(type, values)) == types:  # most are
+            return values
+        plain = _sequence(values)
+        if len(plain) != count:
+            raise WrongType(f'has {len(plain)} values, but needs {count}')
+        converted = tuple(
+            _convert_part(convert, value, f'[{i}]')
+            for i, (convert, value) in enumerate(zip(converters, plain, strict=True))
+        )
+        return values if type(values) is tuple and _same(values, converted) else converted
+
+    return convert_all
+
+
+def _sequence(values: Any) -> Sequence[Any]:
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if not isinstance(values, Sequence) or isinstance(values, str | bytes):
+        raise _wrong(values, 'sequence')
+    return values
+
+
+def _same(first: Iterable[Any], second: Iterable[Any]) -> bool:
+    return all(a is b for a, b in zip(first, second, strict=True))
+
+
+def _member_of(kind: type[IntEnum]) -> Convert:
+    def convert(value: Any) -> Any:
+        if type(value) is kind:
+            return value
+        number = _int(value)
+        try:
+            return kind(number)
+        except ValueError:
+            return number  # a rule refuses it, and names the members
+
+    return convert
+
+
+def _float(value: Any) -> Any:
+    if type(value) is float:
+        return value
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise _wrong(value, 'number')
+    try:
+        return float(value)
+    except OverflowError:
+        raise WrongType('is too large a number') from None
+
+
+def _int(value: Any) -> Any:
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise _wrong(value, 'integer')
+    return int(value)
+
+
+def _bool(value: Any) -> Any:
+    if not isinstance(value, bool | np.bool_):
+        raise _wrong(value, 'truth value')
+    return bool(value)
+
+
+def _text(value: Any) -> Any:
+    if not isinstance(value, str):
+        raise _wrong(value, 'text')
+    return value if type(value) is str else str.__str__(value)
+
+
+_PLAIN: dict[Any, Convert] = {float: _float, int: _int, bool: _bool, str: _text}
