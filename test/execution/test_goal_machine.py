@@ -656,7 +656,7 @@ def test_a_robot_that_does_not_take_the_tcp_is_not_moved():
     assert commands == [RestoreTcp(T_flange_tcp=OWN)]
     end = outcome(machine.step(with_tcp(OWN), ARMING_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
-    assert 'did not take the TCP of the goal within 1 s' in end.text
+    assert 'did not take the TCP of the goal within 1.2 s' in end.text
     assert 'nothing was moved' in end.text
 
 

@@ -20,6 +20,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 WATCH_TIME = 0.2
 #: Time for which an arm inside all tolerances may still creep [s].
 CREEP_TIME = 0.05
+#: Name of a fault, and of the program that it starts.
+FOREIGN_MOTION = 'foreign_motion'
 #: Joint travel that is only the rounding of a motion's last cycles, or servoj's creeping [rad].
 ROUNDING = 5e-6
 #: Time that the next goal may take [s].
@@ -115,6 +117,8 @@ async def perform(cell: RobotCell, step: str):
             await cell.until(lambda: controller.programs.state in PLAYABLE_STATES)
             await cell.dashboard('play')
         case 'resend':
+            # What runs on the robot is known from the newest packet.
+            await cell.sleep(cell.max_packet_gap)
             cell.resend()
             if cell.is_ready():
                 await cell.until(lambda: not cell.is_ready())
@@ -146,6 +150,14 @@ async def recover(cell: RobotCell, steps):
     return max_travel
 
 
+def has_other_program_ended(cell: RobotCell, row: Row) -> bool:
+    """Tell whether the motion of another client, if it is the fault, has begun and ended."""
+    programs = cell.robot.controller.programs
+    return not row.cause[0].startswith(FOREIGN_MOTION) or (
+        programs.name == FOREIGN_MOTION and not programs.running
+    )
+
+
 async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     """
     Run one cell of the matrix; the robot cell is ready before and afterwards.
@@ -175,7 +187,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     assert outcome.code is row.code, f'{context}: {outcome}'
     assert outcome.text, context
     await cell.until(
-        lambda: cell.at_rest() and goal.is_over(),
+        lambda: cell.at_rest() and goal.is_over() and has_other_program_ended(cell, row),
         max(CREEP_TIME, begin + row.rest_within - cell.loop.time()),
         context,
     )

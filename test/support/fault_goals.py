@@ -335,7 +335,7 @@ class ServoGoal(SplineGoal):
             case 'entering':
                 return self.was_mode_sent(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
             case 'slowing down':
-                return self.fraction() > 0.94
+                return self.fraction() > 0.9
         return super().is_in(phase)
 
     async def cancel(self):

@@ -255,20 +255,22 @@ _SILENT = {
     }
 }
 
+#: Whether the last point is reached before a timeout would be a matter of milliseconds.
+_NEVER_LATE = {'': {'phases': ('entering', 'between points', 'cancelling')}}
+
 SERVO = _mode(
     'SERVO',
     'The same half circle as set-points, which the robot program buffers.',
     {
         'entering': 'the robot program was asked to take set-points, nothing has moved',
         'between points': 'on the way from the second point to the third',
-        'slowing down': 'on the way to the last point, two tenths of a second before it',
+        'slowing down': 'on the way to the last point, 0.2 s before it',
         'cancelling': 'the driver has left the mode of set-points, the arm still moves',
     },
     1.8,
     {
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': _NOT_ENTERED
-        | {'': {'steps': ('wait until the fault ends', 'resend')}},
+        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
         'RTDE is half-open': _SILENT,
@@ -281,6 +283,8 @@ SERVO = _mode(
                 'steps': ('wait until the fault ends',),
             }
         },
+        'the reverse socket is half-open': _NEVER_LATE,
+        'the node is silent': _NEVER_LATE,
     },
     faults=tuple(
         name
@@ -291,8 +295,7 @@ SERVO = _mode(
     more=SETPOINTS,
     pendant_changes={
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': _NOT_ENTERED
-        | {'': {'steps': ('wait until the fault ends', 'play')}},
+        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'play')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
     },
 )

@@ -219,8 +219,6 @@ HEADLESS = (
         rest_within=0.7,
         state_after=S.CONNECTED,
         steps=('resend',),
-        # It has no answer to the outputs of the goal, a moment before the robot counts as lost.
-        differs=_in(('planning',), code=E.ROBOT_NOT_READY, result_within=1.7),
     ),
     *(
         Row(
@@ -253,7 +251,6 @@ HEADLESS = (
         code=E.CONNECTION_LOST,
         result_within=1.3,
         rest_within=1.7,
-        differs=_in(('planning',), code=E.ROBOT_NOT_READY, result_within=1.7),
     ),
     Row(
         fault='RTDE is silent for 1.5 s',
@@ -263,7 +260,6 @@ HEADLESS = (
         rest_within=1.7,
         state_after=S.DISCONNECTED,
         ready_within=4.0,
-        differs=_in(('planning',), code=E.ROBOT_NOT_READY, result_within=1.7),
     ),
     _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until the fault ends',)),
     replace(
@@ -284,8 +280,6 @@ HEADLESS = (
         state_after=S.DISCONNECTED,
         steps=('wait until the fault ends',),
         ready_within=4.0,
-        # The robot program confirms over RTDE which outputs have to be safe.
-        differs=_in(('planning',), code=E.ROBOT_NOT_READY),
     ),
     Row(
         fault='garbage on RTDE',
@@ -516,7 +510,6 @@ LOCAL = (
         rest_within=0.7,
         state_after=S.CONNECTED,
         steps=('play',),
-        differs=_in(('planning',), code=E.ROBOT_NOT_READY, result_within=1.7),
     ),
     Row(
         fault="the program's sockets are cut",
