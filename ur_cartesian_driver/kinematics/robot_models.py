@@ -107,6 +107,11 @@ class RobotModel:
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
 
+    @property
+    def control_cycle(self) -> float:
+        """The cycle of its controller [s]."""
+        return 0.008 if self.series == 'CB3' else 0.002
+
 
 def dh_table(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> DhTable:
     """Return the table of an arm without calibration from its six lengths [m]."""

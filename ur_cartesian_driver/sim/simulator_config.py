@@ -177,4 +177,4 @@ class SimulatorConfig:
         """Return the controller's cycle [s]: 2 ms, for CB3 models 8 ms."""
         if self.frequency is not None:
             return 1.0 / self.frequency
-        return 0.008 if self.robot_model.series == 'CB3' else 0.002
+        return self.robot_model.control_cycle

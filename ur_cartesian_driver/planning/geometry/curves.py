@@ -11,7 +11,7 @@ waypoint to waypoint; :mod:`~.blend` rounds the transitions.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import asin, atan2, ceil, hypot, pi, sqrt
+from math import asin, atan2, ceil, degrees, hypot, pi, sqrt
 from typing import ClassVar, Protocol, TypeAlias
 
 import numpy as np
@@ -45,6 +45,10 @@ SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Minimum height of the via above the chord [m] at which three points make a circle.
 MIN_ARC_HEIGHT = 1e-5
+#: How far rounding to micrometres on the wire moves three points against each other [m].
+_ROUNDING = 1.5e-6
+#: By how much that may turn the tool at the end of an arc whose tangent it follows [rad].
+MAX_ARC_TURN_ERROR = 0.005
 #: Arcs through points that are farther apart are refused [m]: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
 #: Chord error of sampled arcs and of sampled joint lines [m].
@@ -158,6 +162,8 @@ class ArcCurve:
         :raises ValueError: the three positions make no circle; the text is a clause that says why.
         """
         center, axis, radius = _circle(start.position, via, end.position)
+        if mode is ArcMode.FIXED:
+            _check_turn_error(start.position, via, end.position)
         e1 = scale(subtract(start.position, center), 1.0 / radius)
         e2 = cross(axis, e1)
         sweep = _angle_on(e1, e2, subtract(end.position, center))
@@ -349,6 +355,23 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
     offset = scale(cross(mixed, normal), 0.5 / area**2)
     center = (a[0] + offset[0], a[1] + offset[1], a[2] + offset[2])
     return center, scale(normal, 1.0 / area), hypot(*offset)
+
+
+def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
+    """
+    Refuse an arc at whose end rounded points turn the tool.
+
+    They tilt the circle by rounding / height of the triangle. Turned by the sweep that makes
+    2 sin(sweep / 2) of it, which the law of sines puts into the distances from the via.
+    """
+    from_start, to_end = distance(a, b), distance(b, c)
+    error = 2.0 * _ROUNDING * max(from_start, to_end, distance(a, c)) / (from_start * to_end)
+    if error > MAX_ARC_TURN_ERROR:
+        raise ValueError(
+            f'its via is {1e3 * from_start:.3f} mm and {1e3 * to_end:.3f} mm from its ends, so '
+            f'that micrometres on the wire may turn the tool by {degrees(error):.1f} degrees at '
+            f'its end, more than {degrees(MAX_ARC_TURN_ERROR):.1f}'
+        )
 
 
 def _angle_on(e1: Vector3, e2: Vector3, v: Vector3) -> float:

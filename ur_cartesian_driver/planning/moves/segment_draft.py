@@ -33,6 +33,9 @@ _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+#: What is left of a segment between blends that touch, or that reach its end [m]: more than the
+#: rounding of two poses and two radii to micrometres.
+_WIRE_ROOM = 5e-6
 #: Motions that only some others can be blended into; all others stop before them.
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
@@ -119,6 +122,8 @@ class SegmentDraftBuilder:
             drafts.append(draft)
             before = draft.curve.end if draft.curve else self._targets[i]
         self._check_first_blend(drafts[0], start)
+        if any(draft.radius > 0.0 for draft in drafts):
+            self._part_touching_blends(drafts, start)
         return drafts
 
     def line_or_arc(self, draft: SegmentDraft, start: Pose) -> SegmentCurve:
@@ -155,6 +160,24 @@ class SegmentDraftBuilder:
             first.radius = 0.0  # the robot is already there, as the report says
             return
         check_blends_fit(first.index, start.distance_to(target), 0.0, first.radius)
+
+    def _part_touching_blends(self, drafts: Sequence[SegmentDraft], start: Pose) -> None:
+        """
+        Shorten blends that touch each other or the end of a segment.
+
+        Rounded to micrometres they would overlap on the wire, and the robot would skip a point.
+        """
+        before, last = start, 0.0
+        for n, draft in enumerate(drafts):
+            target = self._targets[draft.index]
+            if draft.radius > 0.0 or last > 0.0:
+                excess = last + draft.radius - (before.distance_to(target) - _WIRE_ROOM)
+                if excess > 0.0:
+                    shortened = draft if draft.radius >= last else drafts[n - 1]
+                    shortened.radius = self._options.dialect.round_down_radius(
+                        max(shortened.radius - excess, 0.0)
+                    )
+            before, last = target, draft.radius
 
 
 def can_blend(first: SegmentDraft, second: SegmentDraft) -> bool:

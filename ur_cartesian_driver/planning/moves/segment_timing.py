@@ -36,7 +36,11 @@ from ur_cartesian_driver.planning.moves.speed_limits import (
     translates,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized, point_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_optimized,
+    point_field,
+    segment_field,
+)
 
 #: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
@@ -47,6 +51,8 @@ _OPTIMIZED_JOINT_ACCELERATION = 40.0
 _TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
 #: Motions that take none, whose turn has never been measured.
 _UNMEASURED_TURNS = (SegmentType.CIRCULAR, SegmentType.PROCESS)
+#: Motions whose blends the robot leaves out if it passes their radius within a control cycle.
+_NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
 #: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
@@ -68,6 +74,7 @@ def schedule(
     _meet_times_by_speed(timers, timings)
     for timer, timing in zip(timers, timings, strict=True):
         timer.check_wire(timing)
+        timer.check_blend(timing)
     for k, geometry in enumerate(geometries):
         if geometry.blend_before is not None and geometry.time is None:
             timings[k].profile = _profile_after_blend(geometries, timings, k)
@@ -207,6 +214,21 @@ class _SegmentTimer:
                     if self.geometry.time
                     else 'raise velocity or acceleration',
                 )
+
+    def check_blend(self, timing: SegmentTiming) -> None:
+        """Refuse a blend that the robot does not make: it would stop at the point (C171)."""
+        blend = self.geometry.blend_after
+        if blend is None or self.geometry.kind not in _NEEDS_A_CYCLE:
+            return
+        way = timing.velocity * self._model.control_cycle
+        if blend.radius < way:
+            raise InvalidGoal(
+                segment_field(self.geometry.index, 'blend_radius'),
+                f'is {1e3 * blend.radius:g} mm, less than the {1e3 * way:.3g} mm that the robot '
+                f'moves in one control cycle at {timing.velocity:.3g} {self._speed_unit}: it '
+                'would stop at the point',
+                'enlarge it, move slower, or set it to 0 to stop there',
+            )
 
     def add_time_in_blends(self, timing: SegmentTiming, time_in_blends: float) -> None:
         """

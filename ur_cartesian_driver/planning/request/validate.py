@@ -306,7 +306,7 @@ def arc_through_via(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode
         raise InvalidGoal(
             segment_field(index, 'via'),
             f'defines no arc to point {index}: {error}',
-            'move the via off the line, or use LINEAR',
+            'put the via near the middle of a larger arc, or use LINEAR',
         ) from None
 
 

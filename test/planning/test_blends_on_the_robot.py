@@ -1,0 +1,134 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+No blend that is accepted is left out by the robot, and no arc arrives turned.
+
+The goals run in the simulated controller, through the bytes of the wire: whether a blend fits may
+depend on their rounding to micrometres.
+"""
+
+from itertools import pairwise
+from math import cos, sin
+
+import numpy as np
+import pytest
+from robot_in_memory import RobotInMemory
+
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+TYPE = SegmentType
+HOME = (0.3, -1.4, 1.5, -1.2, -1.3, 0.4)
+TOOL = Pose((0.01, 0.02, 0.1))
+
+
+@pytest.fixture(scope='module')
+def robot():
+    """A robot in memory with the cycle of CB3, because the tests pay each."""
+    return RobotInMemory('ur5')
+
+
+def run(robot, goal):
+    """Plan a goal and run it; return both."""
+    made = plan(goal, robot.place(HOME, TOOL), robot.controller.arm, PlanningOptions())
+    return made, robot.run([segment.primitive for segment in made.segments])
+
+
+def corners(robot, rng, kind, lengths, radii, velocity=0.1):
+    """Return a goal of corners in any direction, with segments of these lengths [m]."""
+    home = robot.place(HOME, TOOL).actual_tcp_pose
+    places, d = [np.array(home.position)], rng.normal(size=3)
+    for length in lengths:
+        d = np.cross(d, rng.normal(size=3))
+        d /= np.linalg.norm(d)
+        places.append(places[-1] + length * d)
+    vias = [0.5 * (a + b) + 0.3 * np.cross(b - a, d[[1, 2, 0]]) for a, b in pairwise(places)]
+    return Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose(tuple(place.tolist()), home.quaternion)) for place in places[1:]
+        ),
+        segments=tuple(
+            Segment(
+                type=kind,
+                blend_radius=radius,
+                velocity=velocity,
+                via=Pose(tuple(via.tolist()), home.quaternion) if kind == TYPE.CIRCULAR else None,
+            )
+            for radius, via in zip(radii, vias, strict=True)
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ('lengths', 'radii'),
+    [
+        ((0.06, 0.06, 0.06), (0.03, 0.03, 0.0)),
+        ((0.06, 0.03), (0.03, 0.0)),
+        ((0.03, 0.06), (0.03, 0.0)),
+    ],
+    ids=['blends touch', 'the last segment is in one', 'the first segment is in one'],
+)
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.PROCESS, TYPE.CIRCULAR, TYPE.JOINT])
+def test_no_point_is_skipped_where_blends_take_a_whole_segment(robot, kind, lengths, radii):
+    rng = np.random.default_rng(int(kind))
+    for _ in range(5):
+        made, ran = run(robot, corners(robot, rng, kind, lengths, radii))
+        assert ran.failure == ''
+        radius = made.segments[0].primitive.blend_radius
+        assert radii[0] - 10e-6 < radius <= radii[0]
+
+
+@pytest.mark.parametrize('radius', [1e-4, 5e-4, 7.9e-4, 8.1e-4, 2e-3])
+@pytest.mark.parametrize('kind', [TYPE.PROCESS, TYPE.CIRCULAR])
+def test_a_blend_that_the_robot_passes_within_a_cycle_is_refused(robot, kind, radius):
+    goal = corners(robot, np.random.default_rng(2), kind, (0.06, 0.06), (radius, 0.0))
+    if radius > 8e-4:
+        assert run(robot, goal)[1].failure == ''
+        return
+    with pytest.raises(InvalidGoal) as caught:
+        run(robot, goal)
+    assert str(caught.value) == (
+        f'segments[0].blend_radius is {1e3 * radius:g} mm, less than the 0.8 mm that the robot '
+        'moves in one control cycle at 0.1 m/s: it would stop at the point; enlarge it, move '
+        'slower, or set it to 0 to stop there.'
+    )
+
+
+def test_an_arc_that_follows_its_tangent_arrives_as_planned_or_is_too_small(robot):
+    rng, run_ones, small = np.random.default_rng(3), 0, 0
+    home = robot.place(HOME, TOOL).actual_tcp_pose
+    for number in range(40):
+        radius = (2e-4, 5e-4, 2e-3, 1e-2)[number % 4]
+        x, other = rng.normal(size=(2, 3))
+        x /= np.linalg.norm(x)
+        y = np.cross(x, other) / np.linalg.norm(np.cross(x, other))
+        sweep, part = rng.uniform(0.3, 3.0), rng.uniform(0.2, 0.8)
+
+        def at(angle, x=x, y=y, radius=radius):
+            offset = radius * ((cos(angle) - 1.0) * x + sin(angle) * y)
+            return Pose(tuple((np.array(home.position) + offset).tolist()), home.quaternion)
+
+        goal = Goal(
+            waypoints=(Waypoint(pose=at(sweep)),),
+            segments=(
+                Segment(
+                    type=TYPE.CIRCULAR,
+                    via=at(part * sweep),
+                    arc_mode=ArcMode.FIXED,
+                    velocity=0.02,
+                ),
+            ),
+        )
+        try:
+            made, ran = run(robot, goal)
+        except GoalRefused as refusal:
+            small += 'micrometres on the wire' in str(refusal)
+            continue
+        run_ones += 1
+        assert ran.failure == ''
+        end = made.reference.poses[-1].tolist()
+        assert ran.pose.angle_to(Pose(tuple(end[:3]), tuple(end[3:]))) < 0.005
+    assert run_ones >= 10
+    assert small >= 10
