@@ -35,7 +35,7 @@ _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 #: What is left of a segment between blends that touch, or that reach its end [m]: more than the
 #: rounding of two poses and two radii to micrometres.
-_WIRE_ROOM = 5e-6
+_MIN_BLEND_GAP = 5e-6
 #: Motions that only some others can be blended into; all others stop before them.
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
@@ -171,7 +171,7 @@ class SegmentDraftBuilder:
         for n, draft in enumerate(drafts):
             target = self._targets[draft.index]
             if draft.radius > 0.0 or last > 0.0:
-                excess = last + draft.radius - (before.distance_to(target) - _WIRE_ROOM)
+                excess = last + draft.radius - (before.distance_to(target) - _MIN_BLEND_GAP)
                 if excess > 0.0:
                     shortened = draft if draft.radius >= last else drafts[n - 1]
                     shortened.radius = self._options.dialect.round_down_radius(

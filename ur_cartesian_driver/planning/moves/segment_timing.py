@@ -220,13 +220,13 @@ class _SegmentTimer:
         blend = self.geometry.blend_after
         if blend is None or self.geometry.kind not in _NEEDS_A_CYCLE:
             return
-        way = timing.velocity * self._model.control_cycle
-        if blend.radius < way:
+        travel = timing.velocity * self._model.control_cycle
+        if blend.radius < travel:
             raise InvalidGoal(
                 segment_field(self.geometry.index, 'blend_radius'),
-                f'is {1e3 * blend.radius:g} mm, less than the {1e3 * way:.3g} mm that the robot '
-                f'moves in one control cycle at {timing.velocity:.3g} {self._speed_unit}: it '
-                'would stop at the point',
+                f'is {1e3 * blend.radius:g} mm, less than the {1e3 * travel:.3g} mm that the '
+                f'robot moves in one control cycle at {timing.velocity:.3g} {self._speed_unit}: '
+                'it would stop at the point',
                 'enlarge it, move slower, or set it to 0 to stop there',
             )
 
