@@ -133,5 +133,7 @@ def cartesian_driver(
 
 
 def _marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
-    marker = request.node.get_closest_marker(name)
-    return {} if marker is None else dict(marker.kwargs)
+    values: dict[str, Any] = {}
+    for marker in reversed(list(request.node.iter_markers(name))):  # the closest comes last
+        values |= marker.kwargs
+    return values

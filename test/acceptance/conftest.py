@@ -3,6 +3,7 @@
 """A driver on a simulated robot, and independent records: RTDE packets and socket bytes."""
 
 from contextlib import contextmanager
+import os
 import socket
 import threading
 
@@ -10,10 +11,13 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import POINT_SIZE
 from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec
+from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sim.motion.imperfect_arm import typical_imperfections
 
 READY = 10.0
 
@@ -170,3 +174,38 @@ def home(driver):
         return Pose((px + x, py + y, pz + z), q)
 
     return offset
+
+
+@pytest.fixture(autouse=True)
+def simulated_arm(request, monkeypatch):
+    """The seed of the imperfections of the simulated arm; empty = it is ideal."""
+    seed = getattr(request, 'param', '')
+    if seed:
+        monkeypatch.setenv('IMPERFECT', seed)
+    return seed
+
+
+def pytest_generate_tests(metafunc):
+    """
+    Run tests marked ``both_arms`` with an ideal arm and with one as recordings show it.
+
+    With ``IMPERFECT=N``, all tests run once, with the imperfections of that seed.
+    """
+    definition = metafunc.definition
+    fixed = os.environ.get('IMPERFECT', '')
+    if fixed or definition.get_closest_marker('both_arms'):
+        model = {
+            name: value
+            for mark in reversed(list(definition.iter_markers('ur_sim')))
+            for name, value in mark.kwargs.items()
+        }.get('model', SimulatorConfig().model)
+        seed = fixed or '1'
+        imperfections = typical_imperfections(robot_model(model), int(seed))
+        imperfect = pytest.param(
+            seed, id='imperfect', marks=pytest.mark.ur_sim(imperfections=imperfections)
+        )
+        metafunc.parametrize(
+            'simulated_arm',
+            [imperfect] if fixed else [pytest.param('', id='ideal'), imperfect],
+            indirect=True,
+        )

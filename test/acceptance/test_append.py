@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 #: The defaults [s].
 HORIZON, MARGIN = 1.0, 0.2

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
 TOOL = Pose((0.0, 0.02, 0.12))

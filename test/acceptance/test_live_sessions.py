@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 ARM = Arm(robot_model('ur5e'))
 #: How often somebody tells a target [s].

@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, LocalProto
 from ur_cartesian_driver.motion.goal import Goal, Segment, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 
 @pytest.fixture

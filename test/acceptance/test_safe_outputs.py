@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 ARM = Arm(robot_model('ur5e'))
 GLUE, VALVE = OutputKind.STANDARD_DIGITAL, OutputKind.CONFIGURABLE_DIGITAL

@@ -28,7 +28,7 @@ from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 ARM = Arm(robot_model('ur5e'))
 

@@ -7,7 +7,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 
 TIGHT = Tolerance(
     position=(0.001,) * 3, orientation=(0.01,) * 3, twist=(0.05,) * 6, acceleration=(0.5,) * 6

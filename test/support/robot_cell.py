@@ -327,15 +327,18 @@ def run_cell(
     *,
     headless: bool = True,
     threads: str = os.environ.get('THREADS', ''),
-    imperfect: str = os.environ.get('IMPERFECT', ''),
+    imperfect: str | None = None,
     **settings: Any,
 ) -> T:
     """
     Run ``scenario(cell)`` in a cell that is ready for goals; return its result.
 
     :param threads: how the controller schedules threads, see :func:`thread_schedule`.
-    :param imperfect: seed of the imperfections of the arm; empty = it has none.
+    :param imperfect: seed of the imperfections of the arm, empty = it has none; by default that of
+        the environment.
     """
+    if imperfect is None:
+        imperfect = os.environ.get('IMPERFECT', '')
     loop = VirtualLoop()
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
         return runner.run(
