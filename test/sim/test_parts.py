@@ -52,9 +52,10 @@ def test_it_does_not_matter_how_a_stream_is_cut(cuts):
 
 def test_a_program_without_end_is_not_collected_for_ever():
     uploads = UploadDecoder()
-    uploads.feed(b'def a():\n' + (b'  ' + b'x' * 2**20 + b'\n') * 15)
-    with pytest.raises(UploadTooLong):
-        uploads.feed(b'x' * 2**20)
+    uploads.feed(b'def a():\n' + (b'  ' + b'x' * 2**16 + b'\n') * 15)
+    assert uploads.feed(b'x' * 2**17) == [UploadTooLong()]
+    assert uploads.feed(b'x' * 2**21) == []
+    assert uploads.feed(b'x\n  end\ndef a():\nend\npower off\n') == [UploadedLine('power off')]
 
 
 def test_one_line_blocks_in_a_program_count_once():

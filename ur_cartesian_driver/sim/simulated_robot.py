@@ -34,6 +34,7 @@ from ur_cartesian_driver.sim.interfaces.realtime_stream import RealtimeStream
 from ur_cartesian_driver.sim.interfaces.robot_api_session import FIRST_VERSION, RobotApiSession
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import TcpServer
+from ur_cartesian_driver.sim.programs.compile_thread import CompileThread
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
 from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
@@ -142,6 +143,7 @@ class SimulatedRobot:
         self._thread: threading.Thread | None = None
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None
+        self._compiler: CompileThread | None = None
 
     # Life
 
@@ -207,10 +209,15 @@ class SimulatedRobot:
         self._loop, self._running = asyncio.get_running_loop(), asyncio.current_task()
         try:
             await self._listen()
+            if isinstance(self._clock, RealClock | VirtualClock):
+                self._compiler = CompileThread(self._loop)
+                self.controller.programs.compile_aside = self._compiler.compile
             listening.set_result(None)
             await self._cycles()
         finally:
             self._loop = None
+            if self._compiler is not None:
+                self._compiler.close()
             self.controller.sockets.close_all()
             for server in self._servers:
                 await server.close()
@@ -247,6 +254,9 @@ class SimulatedRobot:
         took_scripts = self.controller.takes_scripts
         while True:
             await self._clock.next_cycle()
+            if self._compiler is not None and isinstance(self._clock, VirtualClock):
+                # How long the computer compiles must not decide when a program starts.
+                await self._compiler.wait_until_idle()
             self.controller.step()
             if took_scripts and not self.controller.takes_scripts:
                 for server in (self._primary, self._secondary, self._realtime):

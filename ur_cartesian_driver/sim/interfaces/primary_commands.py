@@ -13,7 +13,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.programs.script_upload import UploadedLine, UploadedProgram
+from ur_cartesian_driver.sim.programs.script_upload import (
+    UploadedItem,
+    UploadedProgram,
+    UploadTooLong,
+)
 
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
@@ -31,9 +35,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 )
 
 
-def execute_command(
-    controller: Controller, item: UploadedProgram | UploadedLine, *, may_send: bool
-) -> None:
+def execute_command(controller: Controller, item: UploadedItem, *, may_send: bool) -> None:
     """
     Execute what a client has sent; answers go to all clients.
 
@@ -43,6 +45,8 @@ def execute_command(
         controller.messages.error(
             READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
         )
+    elif isinstance(item, UploadTooLong):
+        controller.messages.text(item.text)
     elif isinstance(item, UploadedProgram):
         controller.programs.submit(item.text)
     elif item.text in _CONTROL:

@@ -12,8 +12,8 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
 from ur_cartesian_driver.sim.interfaces.primary_stream import version_frame
-from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
-from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder, UploadTooLong
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
+from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 
 class ScriptSession(ClientSession):
@@ -27,12 +27,9 @@ class ScriptSession(ClientSession):
 
     def feed(self, data: bytes) -> bytes:
         """Execute what is complete; answers go to all clients."""
-        try:
-            for item in self._uploads.feed(data):
-                may_send = self._may_send and self._controller.takes_scripts
-                execute_command(self._controller, item, may_send=may_send)
-        except UploadTooLong:
-            raise HangUp from None
+        for item in self._uploads.feed(data):
+            may_send = self._may_send and self._controller.takes_scripts
+            execute_command(self._controller, item, may_send=may_send)
         return b''
 
 

@@ -21,7 +21,7 @@ from collections.abc import Callable, Hashable
 from functools import lru_cache
 import logging
 from random import Random
-from typing import Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins, refuse_timed_functions
@@ -36,6 +36,8 @@ from ur_cartesian_driver.urscript import (
 
 _log = logging.getLogger(__name__)
 
+T = TypeVar('T')
+
 #: Clients send the same program again and again; its tree is immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
 
@@ -43,6 +45,24 @@ _parse_cached = lru_cache(maxsize=8)(parse)
 RUNNING = frozenset(
     {RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
 )
+
+
+class CompiledProgram(NamedTuple):
+    """A program that can start."""
+
+    program: ScriptProgram
+    interpreter: ScriptInterpreter
+
+
+class CompileAside(Protocol):
+    """Does work, and then something with its result, sooner or later."""
+
+    def __call__(self, work: Callable[[], T], then: Callable[[T], None]) -> None:
+        """Do the work and what follows."""
+
+
+def _compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
+    then(work())
 
 
 class ProgramArm(Protocol):
@@ -107,6 +127,10 @@ class ProgramRunner:
         self.name = ''
         #: Called when a program has ended or before another starts: sockets are closed here.
         self.on_end: Callable[[], None] | None = None
+        #: How often programs were stopped: what was sent before a stop does not start after it.
+        self._stops = 0
+        #: Compiles, and passes the result on: at once, unless cycles go on meanwhile.
+        self.compile_aside: CompileAside = _compile_at_once
 
     @property
     def current_thread(self) -> Hashable:
@@ -130,20 +154,33 @@ class ProgramRunner:
 
         :param line_offset: number of lines put before the text of the client.
         """
+        stops = self._stops
+
+        def start(compiled: CompiledProgram | CompileError) -> None:
+            if isinstance(compiled, CompileError):
+                self._messages.exception(
+                    compiled.line - line_offset, compiled.column, compiled.text
+                )
+            elif compiled.program.kind == 'sec':
+                self._secondaries.append(compiled.interpreter)
+            elif stops == self._stops:
+                self._start_submitted(*compiled)
+
+        self.compile_aside(lambda: self._compile_text(text), start)
+
+    def _compile_text(self, text: str) -> CompiledProgram | CompileError:
+        """Compile a program; called in another thread, perhaps."""
         try:
             program = _parse_cached(text)
-            secondary = program.kind == 'sec'
-            interpreter = (
-                ScriptInterpreter(program, self._secondary_builtins)
-                if secondary
-                else self._compile(program)
-            )
+            if program.kind == 'sec':
+                interpreter = ScriptInterpreter(program, self._secondary_builtins)
+            else:
+                interpreter = self._compile(program)
         except CompileError as error:
-            self._messages.exception(error.line - line_offset, error.column, error.text)
-            return
-        if secondary:
-            self._secondaries.append(interpreter)
-            return
+            return error
+        return CompiledProgram(program, interpreter)
+
+    def _start_submitted(self, program: ScriptProgram, interpreter: ScriptInterpreter) -> None:
         reason = self._arm.start_refusal()
         if reason:
             self._messages.text(f'Program {program.name} was not started: {reason}.')
@@ -177,7 +214,7 @@ class ProgramRunner:
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:
         if self.running:
-            self.stop()
+            self._end()
         self._queued = (name, interpreter)
         self._start_waiting()
 
@@ -217,8 +254,13 @@ class ProgramRunner:
         return ''
 
     def stop(self) -> None:
-        """End the program; the arm brakes."""
+        """End the program, also one that is being compiled; the arm brakes."""
+        self._stops += 1
         self._queued = None
+        self._end()
+
+    def _end(self) -> None:
+        """End the program that runs; the arm brakes."""
         if not self.running:
             return
         self.state = RuntimeState.STOPPING

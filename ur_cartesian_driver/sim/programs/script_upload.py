@@ -12,15 +12,19 @@ leave one that lacks an `end` without an answer.) Any other line is a command or
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+import re
+from typing import TypeAlias
 
 from ur_cartesian_driver.urscript.parsing.scanner import scan, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Bound on the length of a program [bytes].
-MAX_UPLOAD_SIZE = 16 * 1024 * 1024
+#: Bound on the length of a program [bytes], which takes some ten seconds to compile. That of a
+#: robot is not published.
+MAX_UPLOAD_SIZE = 1024 * 1024
 
 _BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})
+#: What a line without blocks has not; most lines are such.
+_BLOCK_WORD = re.compile(rf'\b(?:end|{"|".join(sorted(_BLOCKS))})\b')
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +41,17 @@ class UploadedLine:
     text: str
 
 
-class UploadTooLong(Exception):
-    """A line or program exceeds the bound."""
+@dataclass(frozen=True, slots=True)
+class UploadTooLong:
+    """A line or program that exceeds the bound; what follows of it is skipped."""
+
+    text: str = (
+        f'The program is longer than {MAX_UPLOAD_SIZE >> 20} MiB, which this controller does not '
+        'take; split it.'
+    )
+
+
+UploadedItem: TypeAlias = UploadedProgram | UploadedLine | UploadTooLong
 
 
 class UploadDecoder:
@@ -51,21 +64,29 @@ class UploadDecoder:
         self._size = 0
         self._open_blocks = 0
         self._indented = True
+        #: Whether the rest of a program that is too long is being received.
+        self._skipping = False
 
-    def feed(self, data: bytes) -> list[UploadedProgram | UploadedLine]:
-        """
-        Return what is complete now.
-
-        :raises UploadTooLong: a line or program exceeds 16 MiB.
-        """
+    def feed(self, data: bytes) -> list[UploadedItem]:
+        """Return what is complete now; of what is too long, once that it is."""
         *lines, self._rest = (self._rest + data).split(b'\n')
         found = [item for line in lines if (item := self._line(line)) is not None]
         if self._size + len(self._rest) > MAX_UPLOAD_SIZE:
-            raise UploadTooLong
+            self._rest = b''
+            if not self._skipping:
+                found.append(self._skip())
         return found
 
-    def _line(self, data: bytes) -> UploadedProgram | UploadedLine | None:
+    def _skip(self) -> UploadTooLong:
+        """Forget the program, and what follows of it up to its `end` in column 1."""
+        self._program, self._size, self._skipping = [], 0, True
+        return UploadTooLong()
+
+    def _line(self, data: bytes) -> UploadedItem | None:
         line = data.decode('latin-1').rstrip('\r')
+        if self._skipping:
+            self._skipping = line.rstrip() != 'end'
+            return None
         if not self._program:
             if not line.startswith(('def ', 'sec ')):
                 bare = line.strip()
@@ -75,6 +96,8 @@ class UploadDecoder:
             self._indented = False
         self._program.append(line)
         self._size += len(data)
+        if self._size > MAX_UPLOAD_SIZE and line.rstrip() != 'end':
+            return self._skip()
         self._open_blocks += _block_balance(line)
         if line.rstrip() != 'end' or not (self._indented or self._open_blocks <= 0):
             return None
@@ -83,9 +106,10 @@ class UploadDecoder:
         return UploadedProgram(text)
 
 
-@lru_cache(maxsize=1024)  # clients send the same program again and again
 def _block_balance(line: str) -> int:
     """Return how many more blocks a line opens than it closes."""
+    if not _BLOCK_WORD.search(line):
+        return 0
     try:
         words = [token.text for token in scan(line) if token.kind is TokenKind.KEYWORD]
     except CompileError:
