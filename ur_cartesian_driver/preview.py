@@ -23,7 +23,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ, Spline
+from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ, OptimoveL, Spline
 from ur_cartesian_driver.motion.vectors import vector6
 
 
@@ -73,7 +73,7 @@ def table(plan: Plan) -> str:
     length = sum(segment.length for segment in plan.segments)
     lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
     lines += [_line(segments) for segments in _to_points(plan)]
-    lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {plan.duration:7.3f} s')
+    lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {_time(plan.segments)}')
     return '\n'.join(lines)
 
 
@@ -103,14 +103,20 @@ def _line(segments: Sequence[PlannedSegment]) -> str:
     primitive, pieces = segments[-1].primitive, len(segments)
     name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
-    length, angle, duration = (
-        sum(getattr(segment, quantity) for segment in segments)
-        for quantity in ('length', 'angle', 'duration')
+    length, angle = (
+        sum(getattr(segment, quantity) for segment in segments) for quantity in ('length', 'angle')
     )
     return (
         f'{segments[0].waypoint:>5}  {name:<10} {length:7.3f} m {degrees(angle):6.1f}'
-        f'\N{DEGREE SIGN} {duration:7.3f} s {blend:4.0f} mm'
+        f'\N{DEGREE SIGN} {_time(segments)} {blend:4.0f} mm'
     )
+
+
+def _time(segments: Sequence[PlannedSegment]) -> str:
+    """Return the time of segments; OPTIMIZED moves have none that is known before."""
+    if any(isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in segments):
+        return '      ? s'
+    return f'{sum(segment.duration for segment in segments):7.3f} s'
 
 
 def _spline(plan: Plan) -> JointSpline:

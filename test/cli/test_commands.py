@@ -109,6 +109,15 @@ def test_validate_reads_standard_input_and_puts_a_prefix_before_names(capsys, mo
     assert 'left_base' in capsys.readouterr().err
 
 
+def test_validate_reads_pipes_as_of_a_process_substitution(capsys):
+    read, write = os.pipe()
+    os.write(write, goal_file('square').read_bytes())
+    os.close(write)
+    assert main(['validate', f'/dev/fd/{read}']) == 0
+    os.close(read)
+    assert 'MOVE' in capsys.readouterr().out
+
+
 def test_a_goal_that_is_nowhere_is_named_with_the_examples(capsys):
     assert main(['validate', 'no_such_goal']) == 1
     error = capsys.readouterr().err

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 
 from ur_cartesian_driver.cli import commands, main, parser
@@ -38,6 +40,30 @@ def test_a_calibration_that_there_is_not_is_one_sentence(capsys):
     error = capsys.readouterr().err
     assert '/nowhere.yaml' in error
     assert error.count('\n') == 1
+
+
+@pytest.mark.parametrize(
+    ('options', 'sentence'),
+    [
+        (['sim', '--joints', '0,0,0,0,0,nan'], 'nan is not within -25.1327 and 25.1327'),
+        (['sim', '--joints', '0,0,0,0,0,inf'], 'inf is not within'),
+        (['sim', '--joints', '0,0,0,0,0,1e300'], '1e+300 is not within'),
+        (['sim', '--joints', '0,0,0,0,0,x'], "could not convert string to float: 'x'"),
+        (['validate', 'square', '--tcp', '0,0,10,0,0,0'], '10 is not within -5 and 5'),
+        (['sim', '--rtde-port', '65536'], '65536 is no port; give 0 to 65535'),
+        (['where', '--rtde-port', '-1'], '-1 is no port'),
+        (['check-robot', '--robot-ip', 'localhost', '--primary-port', '1e9'], 'invalid'),
+        (['sim', '--rate', 'nan'], 'rate is nan; use'),
+        (['sim', '--rate', 'inf'], 'rate is inf; use'),
+        (['sim', '--rate', '1e300'], 'rate is 1e+300; use 1 for real time'),
+        (['sim', '--rate', '-1'], 'rate is -1.0; use'),
+    ],
+)
+def test_a_number_that_means_nothing_is_one_sentence(options, sentence, capsys):
+    with contextlib.suppress(SystemExit):
+        assert main(options) == 1
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert sentence in last
 
 
 def test_options_reach_the_robot():

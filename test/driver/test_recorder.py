@@ -336,6 +336,36 @@ def test_what_is_no_recording_is_refused(tmp_path, data):
         Recording.load(file)
 
 
+def test_a_damaged_recording_is_refused_in_a_sentence_or_read(tmp_path):
+    record(tmp_path, [packet(i) for i in range(20)])
+    file = only_file(tmp_path)
+    whole = file.read_bytes()
+    cuts = [whole[:size] for size in range(0, len(whole), len(whole) // 20)]
+    turned = [
+        whole[:i] + bytes([whole[i] ^ 0xFF]) + whole[i + 1 :]
+        for i in range(0, len(whole), len(whole) // 80)
+    ]
+    sentences = []
+    for data in cuts + turned:
+        file.write_bytes(data)
+        try:
+            Recording.load(file)
+        except ValueError as error:
+            sentences.append(str(error))
+    assert len(sentences) > 40
+    assert all(sentence.startswith(f'{file} is ') for sentence in sentences)
+
+
+def test_a_recording_with_a_column_too_short_is_refused(tmp_path):
+    record(tmp_path, [packet(i) for i in range(20)])
+    file = only_file(tmp_path)
+    with np.load(file) as recorded:
+        columns = dict(recorded)
+    np.savez(file, **columns | {'actual_q': columns['actual_q'][:-1]})
+    with pytest.raises(ValueError, match=r'is damaged: actual_q has \d+ rows, not \d+'):
+        Recording.load(file)
+
+
 def test_a_session_that_nothing_was_planned_for_has_no_plan(tmp_path):
     metadata = motion_metadata(JOB, robot={}, parameters=DriverConfig(), mode='LIVE_TARGETS')
     record(tmp_path, [packet(i) for i in range(10)], metadata=metadata)

@@ -40,6 +40,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.preview import table
 
 TYPE = SegmentType
 OPTIONS = PlanningOptions()
@@ -122,6 +123,22 @@ def test_each_segment_type_has_its_primitive_and_joint_moves_always_a_q_near(
     if has_q_near:
         assert segment.primitive.q_near == segment.joints
         assert cell.tool(segment.joints).distance_to(goal.waypoints[0].pose) < 1e-9
+
+
+def test_no_time_is_predicted_of_optimized_moves(cell):
+    goal = Goal(
+        waypoints=(cell.point(0.1), cell.point(0.1, 0.1)),
+        segments=(Segment(), Segment(type=TYPE.OPTIMIZED_LINEAR)),
+    )
+    made = plan(goal, cell.state, cell.arm, OPTIONS)
+    known, unknown = made.report[:2]
+    assert ' s (0.' in known
+    assert 'in a time that the controller chooses and that is not predicted' in unknown
+    assert not re.search(r'\d s\b', unknown)
+    *_, first, second, total = table(made).splitlines()
+    assert '? s' not in first
+    assert '? s' in second
+    assert '? s' in total
 
 
 # -- postures -------------------------------------------------------------------------------------

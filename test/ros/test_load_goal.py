@@ -24,6 +24,22 @@ def test_a_goal_reads_as_in_ros2_action_send_goal():
     assert goal.validate_only
 
 
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        ('[' * 100_000, 'the goal is nested too deeply to be one.'),
+        ('trajectory: ' + '{a: ' * 100_000, 'the goal is nested too deeply to be one.'),
+        ('trajectory: &a {points: [*a]}', 'not a field'),
+        ('trajectory: {header: {frame_id: 2026-99-99}}', 'month must be in 1..12.'),
+    ],
+)
+def test_a_text_that_yaml_chokes_on_is_one_sentence(text, sentence):
+    with pytest.raises(GoalFileError) as error:
+        load_goal(text)
+    assert sentence in str(error.value)
+    assert '\n' not in str(error.value)
+
+
 def test_fields_that_are_not_named_keep_their_defaults():
     (point,) = load_goal('trajectory: {points: [{}]}').trajectory.points
     assert point.pose.orientation.w == 1.0

@@ -23,6 +23,8 @@ from types import FrameType
 from ur_cartesian_driver.cli import check_robot, commands, recording_plot, validate_command
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.planning.request.validate import MAX_JOINT_VALUE
+from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 
@@ -144,7 +146,7 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
         help='software version, such as 5.21; empty = the newest for the model',
     )
     for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
-        sim.add_argument(f'--{name}-port', type=int, default=port, help='0 = any free port')
+        sim.add_argument(f'--{name}-port', type=_port, default=port, help='0 = any free port')
     for name, port in (
         ('secondary', 30002),
         ('realtime', 30003),
@@ -153,13 +155,13 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
     ):
         sim.add_argument(
             f'--{name}-port',
-            type=int,
+            type=_port,
             default=None,
             help=f'0 = any free port; by default {port} if the primary port is 30001, else any',
         )
     sim.add_argument(
         '--joints',
-        type=_six_numbers,
+        type=_joints,
         metavar='Q1,...,Q6',
         help='initial joint positions [rad]',
     )
@@ -282,13 +284,13 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     validate.add_argument(
         '--joints',
-        type=_six_numbers,
+        type=_joints,
         metavar='Q1,...,Q6',
         help='initial joint positions [rad]; by default home',
     )
     validate.add_argument(
         '--tcp',
-        type=_six_numbers,
+        type=_tcp,
         metavar='X,Y,Z,RX,RY,RZ',
         help='active TCP in the flange frame, as the pendant shows it [m, rad]; by default the '
         'flange',
@@ -325,7 +327,7 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
         'print the pose of the robot, as a point to paste into a goal',
     )
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
+    where.add_argument('--rtde-port', type=_port, default=30004, help='its RTDE port')
 
 
 def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
@@ -343,7 +345,7 @@ def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
         ('dashboard', 29999),
         ('robot-api', 80),
     ):
-        check.add_argument(f'--{name}-port', type=int, default=port, help='its port')
+        check.add_argument(f'--{name}-port', type=_port, default=port, help='its port')
     check.add_argument(
         '--seconds', type=float, default=5.0, help='how long the RTDE stream is recorded [s]'
     )
@@ -387,9 +389,35 @@ def _fault(text: str) -> Fault:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _six_numbers(text: str) -> tuple[float, ...]:
-    """Return six numbers separated by commas."""
-    numbers = tuple(float(part) for part in text.split(','))
+def _six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
+    """
+    Return six numbers separated by commas.
+
+    :param bounds: of the first three, and of the last three.
+    """
+    try:
+        numbers = tuple(float(part) for part in text.split(','))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{error}; give six numbers, with commas') from None
     if len(numbers) != 6:
         raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
+    for i, number in enumerate(numbers):
+        bound = bounds[i // 3]
+        if not abs(number) <= bound:  # NaN neither
+            raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
     return numbers
+
+
+def _joints(text: str) -> tuple[float, ...]:
+    return _six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
+
+
+def _tcp(text: str) -> tuple[float, ...]:
+    return _six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f'{port} is no port; give 0 to 65535')
+    return port

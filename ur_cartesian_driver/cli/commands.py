@@ -270,7 +270,7 @@ def goal_file(name: str) -> Path:
     :raises OSError: neither exists.
     """
     for path in (Path(name), share_path() / 'config' / 'examples' / f'{name}.yaml'):
-        if path.is_file():
+        if path.exists() and not path.is_dir():  # also a pipe
             return path
     examples = sorted(p.stem for p in (share_path() / 'config' / 'examples').glob('*.yaml'))
     raise OSError(f'{name} is neither a file nor one of the examples {", ".join(examples)}')

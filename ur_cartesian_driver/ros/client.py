@@ -80,8 +80,10 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
         _fill(goal, {} if values is None else values, '')
     except yaml.YAMLError as error:
         raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
-    except GoalFileError as error:
-        raise GoalFileError(f'{name}{error}') from None
+    except RecursionError:
+        raise GoalFileError(f'{name}the goal is nested too deeply to be one.') from None
+    except ValueError as error:  # PyYAML's, of a date that does not exist, say
+        raise GoalFileError(f'{name}{str(error).rstrip(".")}.') from None
     return goal
 
 

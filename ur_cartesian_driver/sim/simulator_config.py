@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import isfinite, pi
 from typing import Literal
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
+from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
@@ -19,6 +20,8 @@ HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
 #: One recording of a UR3 in URSim and one forum thread; movec, movep and optimovel have 1 here.
 TURN_RATIO = 4.0
+#: More simulated seconds per second than any computer can do.
+MAX_RATE = 1e4
 _PRIMARY_PORT = 30001
 #: Not port 80, which only root may open.
 _ROBOT_API_PORT = 8000
@@ -93,7 +96,15 @@ class SimulatorConfig:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, naming the field."""
+        if len(self.q) != 6:
+            raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
+        declare_types(self)
         model = self.robot_model  # raises for an unknown name
+        for field_name in ('rate', 'unlock_delay', 'power_on_time', 'brake_release_time'):
+            if not isfinite(getattr(self, field_name)):
+                raise ValueError(f'{field_name} is {getattr(self, field_name)}; use a number.')
+        if not all(map(isfinite, self.q)):
+            raise ValueError(f'q is {self.q}; give the joint positions in radians.')
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
         if self.program and self.program not in self.programs:
@@ -103,8 +114,11 @@ class SimulatorConfig:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
         if self.thread_delay < 0:
             raise ValueError(f'thread_delay is {self.thread_delay} cycles; use 0 or more.')
-        if self.rate < 0.0:
-            raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
+        if not 0.0 <= self.rate <= MAX_RATE:
+            raise ValueError(
+                f'rate is {self.rate}; use 1 for real time, at most {MAX_RATE:g}, or 0 for no '
+                'waiting.'
+            )
         for name in (
             'rtde_port',
             'primary_port',
@@ -117,8 +131,6 @@ class SimulatorConfig:
             port = getattr(self, name)
             if port is not None and not 0 <= port <= 65535:
                 raise ValueError(f'{name} is {port}; use 0 (any free one) to 65535.')
-        if len(self.q) != 6:
-            raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
         if (self.version[0] >= 5) == (model.series == 'CB3'):
             raise ValueError(
                 f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '

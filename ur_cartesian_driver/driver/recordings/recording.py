@@ -31,6 +31,10 @@ Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int32]
 
 
+class _NoRecording(ValueError):
+    """A file of another kind."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordedDeviation:
     """Distance of the tool from the planned path; n rows, as the recording has."""
@@ -107,7 +111,27 @@ class Recording:
         :raises ValueError: it is no recording.
         """
         path = Path(path)
-        return _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
+        try:
+            found = _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
+        except (OSError, _NoRecording):
+            raise
+        except Exception as error:  # NumPy, zipfile, zlib and json each raise their own
+            raise ValueError(f'{path} is damaged: {error}') from error
+        found._check_lengths(path)
+        return found
+
+    def _check_lengths(self, path: Path) -> None:
+        """Refuse columns of different lengths: a part of the file was changed."""
+        for names, rows in (
+            (_EXECUTED_COLUMNS, len(self.time)),
+            (_PLANNED_COLUMNS, len(self.planned_time)),
+        ):
+            for name in names:
+                if len(getattr(self, name)) != rows:
+                    raise ValueError(
+                        f'{path} is damaged: {name} has {len(getattr(self, name))} rows, not '
+                        f'{rows}'
+                    )
 
     @property
     def tool_speed(self) -> Floats:
@@ -182,9 +206,9 @@ class Recording:
 
 def _from_file(path: Path, max_rows: int) -> Recording:
     if path.is_file() and not zipfile.is_zipfile(path):
-        raise ValueError(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
+        raise _NoRecording(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
     try:
-        with np.load(path) as file:
+        with path.open('rb') as opened, np.load(opened) as file:
             metadata, times, kinds, texts = (
                 file[name] for name in ('metadata', 'event_time', 'event_kind', 'event_text')
             )
@@ -194,7 +218,7 @@ def _from_file(path: Path, max_rows: int) -> Recording:
                 for name in _COLUMNS
             }
     except KeyError as error:
-        raise ValueError(f'{path} is no recording: {error.args[0]}') from None
+        raise _NoRecording(f'{path} is no recording: {error.args[0]}') from None
     events = [
         (float(time), str(kind), str(text))
         for time, kind, text in zip(times, kinds, texts, strict=True)
@@ -220,3 +244,5 @@ def _step(rows: int, max_rows: int) -> int:
 
 
 _COLUMNS = tuple(f.name for f in fields(Recording) if f.name not in ('metadata', 'events'))
+_PLANNED_COLUMNS = tuple(name for name in _COLUMNS if name.startswith('planned_'))
+_EXECUTED_COLUMNS = tuple(name for name in _COLUMNS if not name.startswith('planned_'))

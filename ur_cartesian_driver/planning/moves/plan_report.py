@@ -60,11 +60,12 @@ def _extent(geometry: SegmentGeometry) -> str:
 
 
 def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
-    about = 'about ' if is_optimized(geometry.kind) else ''
+    if is_optimized(geometry.kind):
+        return 'a time that the controller chooses and that is not predicted'
     amount, unit = geometry.curve.angle, 'rad/s mean'
     if geometry.curve.length > 1e-6:
         amount, unit = geometry.curve.length, 'm/s mean'
     elif isinstance(geometry.curve, JointLineCurve):  # another posture of the same pose
         amount, unit = geometry.curve.joint_travel, 'rad/s mean of the leading joint'
     speed = f'{amount / max(timing.duration, 1e-9):.3f} {unit}'
-    return f'{about}{timing.duration:.3f} s ({speed})'
+    return f'{timing.duration:.3f} s ({speed})'
