@@ -43,7 +43,7 @@ def test_cycles_go_on_while_a_large_program_is_compiled():
 
 def test_a_program_that_is_stopped_while_it_is_compiled_does_not_start():
     with SimulatedRobot(SimulatorConfig(**FREE, frequency=125.0)) as robot:
-        robot.run_script(program(50_000))
+        robot.call(lambda controller: controller.programs.submit(program(50_000)))
         robot.stop_program()
         robot.run_script('def second():\n  sleep(60)\nend\n')
         wait_for(lambda: is_playing(robot))

@@ -34,7 +34,7 @@ def robot():
 def realtime(robot):
     with PlainRealtime(robot.config.host, robot.ports.realtime) as client:
         client.socket.sendall(b'def home():\n  set_pos([0, -1.57, 1.57, -1.57, -1.57, 0])\nend\n')
-        while client.next().q[0] != 0.0:
+        while client.next().q != (0.0, -1.57, 1.57, -1.57, -1.57, 0.0):
             pass
         yield client
 

@@ -43,6 +43,7 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
+_COMPILE_TIMEOUT = 120.0
 #: The first version without a dashboard.
 POLYSCOPE_X = 10
 
@@ -382,8 +383,20 @@ class SimulatedRobot:
         self._checked(lambda controller: controller.programs.play())
 
     def run_script(self, text: str) -> None:
-        """Start a program as if a client had sent it."""
-        self.call(lambda controller: controller.programs.submit(text))
+        """
+        Start a program as if a client had sent it; return when it is compiled.
+
+        On the thread of the robot's own event loop: at once.
+        """
+        compiled: Future[None] = Future()
+
+        def submit(controller: Controller) -> None:
+            controller.programs.submit(text)
+            controller.programs.compile_aside(lambda: None, compiled.set_result)
+
+        self.call(submit)
+        if self._loop is not None and not _is_running_in(self._loop):
+            compiled.result(_COMPILE_TIMEOUT)
 
     def close_popups(self) -> None:
         """Confirm all popups."""
