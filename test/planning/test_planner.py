@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
+    NotAvailable,
     RobotNotReady,
     TooFast,
     Unreachable,
@@ -37,10 +38,19 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
+from ur_cartesian_driver.motion.primitive import (
+    MoveC,
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+    Spline,
+)
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.preview import table
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 TYPE = SegmentType
 OPTIONS = PlanningOptions()
@@ -400,13 +410,29 @@ def test_a_first_point_at_time_0_in_another_posture_is_refused(cell):
     assert text.startswith('trajectory.points[0].posture')
 
 
-def test_the_same_goal_can_be_sent_again_where_it_ended(cell):
-    goal = Goal(waypoints=(cell.point(time=1.0), cell.point(0.1, time=3.0)))
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS])
+def test_a_first_point_where_the_arm_stands_keeps_its_time(cell, kind):
+    points = (cell.point(time=2.0), cell.point(0.02, time=4.0))
+    goal = Goal(waypoints=points, segments=(Segment(type=kind), Segment()))
     made = plan(goal, cell.state, cell.arm, OPTIONS)
-    assert 'the robot is already there; it does not wait 1 s' in made.remarks[0]
-    assert made.segments[0].duration < 0.01
-    one = plan(Goal(waypoints=(cell.point(),)), cell.state, cell.arm, OPTIONS)
-    assert len(one.segments) == 1
+    assert 'point 0: the robot is already there, and waits 2 s' in made.remarks
+    wait = made.segments[0].primitive
+    assert wait == Spline(target=cell.state.actual_q, velocities=(0.0,) * 6, duration=2.0)
+    assert [segment.duration for segment in made.segments] == pytest.approx([2.0, 2.0])
+    at_2_s = made.reference.poses[made.reference.time <= 2.0]
+    assert np.ptp(at_2_s, axis=0) == pytest.approx(np.zeros(7), abs=1e-6)
+    only = plan(Goal(waypoints=points[:1]), cell.state, cell.arm, OPTIONS)
+    assert only.duration == pytest.approx(2.0)
+    # Without times nothing waits.
+    untimed = plan(Goal(waypoints=(cell.point(),)), cell.state, cell.arm, OPTIONS)
+    assert untimed.duration < 0.01
+
+
+def test_a_robot_program_without_times_cannot_wait_at_the_first_point(cell):
+    coarse = replace(OPTIONS, dialect=DIALECTS['2.0'])
+    goal = Goal(waypoints=(cell.point(time=2.0), cell.point(0.02, time=4.0)))
+    text = refusal(NotAvailable, cell, goal, coarse)
+    assert text.startswith('trajectory.points[0].time_from_start is 2 s, but the robot is already')
 
 
 def test_a_joint_move_to_where_the_arm_is_is_refused(cell):

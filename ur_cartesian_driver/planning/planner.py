@@ -43,9 +43,11 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveJ,
     OptimoveL,
     Primitive,
+    Spline,
     Target,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
@@ -364,6 +366,8 @@ class GoalPlanner:
     def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
         blend = geometry.blend_after.radius if geometry.blend_after else 0.0
         v, a, target = timing.velocity, timing.acceleration, self.targets[geometry.index]
+        if geometry.waits:  # no move of the robot does: a spline in which the joints rest
+            return Spline(target=self.state.actual_q, velocities=ZERO6, duration=timing.wire_time)
         if geometry.kind == SegmentType.CIRCULAR:
             return self._arc(geometry, v, a, blend)
         q_near = (

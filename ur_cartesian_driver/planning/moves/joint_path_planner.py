@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
+    NotAvailable,
     Unreachable,
 )
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
@@ -416,14 +417,22 @@ class JointPathPlanner:
         i = geometry.index
         if i > 0:
             raise duplicate_point_error(self.goal, i)
-        wait_clause = f'; it does not wait {geometry.time:g} s' if geometry.time else ''
+        waits = bool(geometry.time)
+        wait_clause = f', and waits {geometry.time:g} s' if waits else ''
+        if waits and self.options.dialect.is_coarse:
+            raise NotAvailable(
+                point_field(i, 'time_from_start'),
+                f'is {geometry.time:g} s, but the robot is already there and cannot wait, because '
+                f'no times are sent in wire dialect {self.options.dialect.name}',
+                'set it to 0, and the later times accordingly',
+            )
         self.remarks.append(f'point 0: the robot is already there{wait_clause}')
-        self.reasons[0] = ['the robot is already there']
+        self.reasons[0] = [f'the robot is already there{wait_clause}']
         kind = geometry.kind if geometry.kind == _JOINT else SegmentType.LINEAR
         return replace(
             geometry,
             kind=kind,
-            time=None,
             segment=replace(DEFAULT_SEGMENT, type=geometry.segment.type),
             waypoint=replace(geometry.waypoint, twist=(0.0,) * 6),
+            waits=waits,
         )

@@ -53,6 +53,8 @@ class SegmentGeometry:
     u_leave: float = 1.0
     #: The fraction of it between its blends; blends that touch leave nearly nothing.
     unblended_fraction: float = 1.0
+    #: Whether the arm stands there already, and waits until its time.
+    waits: bool = False
 
 
 @dataclass(slots=True)

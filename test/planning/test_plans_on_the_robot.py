@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-No blend that is accepted is left out by the robot, and no arc arrives turned.
+What plans promise of blends, arcs and waits is what the simulated controller does.
 
-The goals run in the simulated controller, through the bytes of the wire: whether a blend fits may
-depend on their rounding to micrometres.
+The goals run through the bytes of the wire: whether a blend fits may depend on their rounding to
+micrometres.
 """
 
 from itertools import pairwise
@@ -132,3 +132,21 @@ def test_an_arc_that_follows_its_tangent_arrives_as_planned_or_is_too_small(robo
         assert ran.pose.angle_to(Pose(tuple(end[:3]), tuple(end[3:]))) < 0.005
     assert run_ones >= 10
     assert small >= 10
+
+
+@pytest.mark.parametrize('aside', [0.0, 5e-6])
+def test_the_robot_waits_where_it_stands_until_the_time_of_the_first_point(robot, aside):
+    home = robot.place(HOME, TOOL).actual_tcp_pose
+    x, y, z = home.position
+    goal = Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose((x + offset, y, z), home.quaternion), time=time)
+            for offset, time in ((aside, 2.0), (0.02, 4.0))
+        )
+    )
+    _, ran = run(robot, goal)
+    assert ran.failure == ''
+    # A program sets out slowly, which costs up to 80 ms of its first move.
+    assert ran.duration == pytest.approx(4.05, abs=0.06)
+    moved = np.array([pose.distance_to(home) for pose in ran.poses])
+    assert moved[: int(2.0 / robot.controller.cycle)].max() < 10e-6
