@@ -7,7 +7,12 @@ from math import inf, nan, pi, radians
 
 import pytest
 
-from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS, robot_model
+from ur_cartesian_driver.kinematics.robot_models import (
+    DhTable,
+    JointLimits,
+    MODELS,
+    robot_model,
+)
 
 UR20_SPEED_DEG_S = [120, 120, 150, 210, 210, 210]
 
@@ -55,3 +60,24 @@ def test_the_difference_of_two_tables_is_that_of_their_worst_number():
     other = replace(geometry, theta=(0.0, 0.0, -2e-4, 0.0, 0.0, 0.0), a=(1e-4, *geometry.a[1:]))
     assert geometry.difference(other) == 2e-4
     assert geometry.difference(geometry) == 0.0
+
+
+def test_limits_of_a_controller_count_where_they_are_tighter_and_possible():
+    model = robot_model('ur3e')
+    limits = JointLimits(
+        position=((-1.0, 1.0), (-9.0, 9.0), (2.0, 1.0), (nan, nan), (-inf, 0.5), (-3.0, 3.0)),
+        speed=(1.0, 99.0, 0.0, -1.0, nan, inf),
+    )
+    limited = model.limited_to(limits)
+    low = model.position_limits[4][0]
+    assert limited.position_limits == (
+        (-1.0, 1.0),
+        *model.position_limits[1:4],
+        (low, 0.5),
+        (-3.0, 3.0),
+    )
+    assert limited.max_joint_speed == (1.0, *model.max_joint_speed[1:])
+    assert limited.reported_ranges == {0, 4, 5}
+    assert limited.reported_speeds == {0}
+    own = JointLimits(position=model.position_limits, speed=model.max_joint_speed)
+    assert model.limited_to(own) == model

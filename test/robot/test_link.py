@@ -38,6 +38,7 @@ class Ear:
             on_event=lambda event: None,
             on_status=self._status,
             on_geometry=lambda geometry: None,
+            on_limits=lambda limits: None,
             on_log=lambda level, text: self.log.append((level, text)),
         )
 

@@ -25,6 +25,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     CallRobot,
     Configure,
     GeometryReceived,
+    LimitsReceived,
     LiveSetup,
     LogMessage,
     LoopHeartbeat,
@@ -59,7 +60,12 @@ from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJ
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.execution.goal.timeouts import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
+from ur_cartesian_driver.kinematics.robot_models import (
+    DhTable,
+    JOINT_NAMES,
+    JointLimits,
+    robot_model,
+)
 from ur_cartesian_driver.motion.errors import (
     ErrorCode,
     GoalRefused,
@@ -523,6 +529,8 @@ class Driver(RobotServices, InteractiveMotions):
                 self._gaps = gaps
             case GeometryReceived(geometry=geometry):
                 self._update_geometry(geometry)
+            case LimitsReceived(limits=limits):
+                self._update_limits(limits)
             case TemporaryTcpSet():
                 self._temporary_tcp = notification
             case TemporaryTcpRestored():
@@ -534,6 +542,16 @@ class Driver(RobotServices, InteractiveMotions):
         active = self._active_motions.get(number)
         if active is not None and active.motion.appender is not None:
             active.motion.appender.answer(answer)
+
+    def _update_limits(self, limits: JointLimits) -> None:
+        """Plan within the limits that the robot reports, where they are tighter, from now on."""
+        model = robot_model(self.config.ur_type).limited_to(limits)
+        self._arm = Arm(model, self._arm.geometry)
+        for k in sorted(model.reported_ranges):
+            LOG.info('%s turns within %s', JOINT_NAMES[k], model.range_text(k))
+        for k in sorted(model.reported_speeds):
+            speed, source = model.max_joint_speed[k], model.speed_source(k)
+            LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
 
     def _update_geometry(self, geometry: DhTable) -> None:
         """Plan with the robot's calibrated kinematics from now on; warn if it is far off."""

@@ -257,7 +257,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
             max_age=options.live_target_max_age,
             timeout=options.live_target_timeout,
         ),
-        ur_type=arm.model.name,
+        model=arm.model,
         geometry=arm.geometry,
         start=start,
     )

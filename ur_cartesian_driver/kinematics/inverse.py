@@ -24,7 +24,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
     wrist_solutions,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits, RobotModel
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
@@ -146,7 +146,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     found = solutions(arm, T_base_flange)
     if found:
-        return _explain_outside_limits(found, arm.model.position_limits)
+        return _explain_outside_limits(found, arm.model)
     ideal = ideal_arm_of(arm)
     px, py, _ = wrist_centre(ideal, T_base_flange)
     if hypot(px, py) < ideal.d4:
@@ -358,17 +358,17 @@ def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
     )
 
 
-def _explain_outside_limits(found: list[Joints], limits: PositionLimits) -> str:
+def _explain_outside_limits(found: list[Joints], model: RobotModel) -> str:
     """Explain which joint exceeds its limits in the best solution; empty if none does."""
-    worst = [max(_outside(q, limits)) for q in found]
+    worst = [max(_outside(q, model.position_limits)) for q in found]
     excess, joint, angle = min(worst)
     if excess <= 0.0:
         return ''
-    low, high = limits[joint]
+    low, high = model.position_limits[joint]
     value, _ = format_distinct(angle, low if angle < low else high)
     return (
-        f'{JOINT_NAMES[joint]} would be at {value} rad, outside its range of {low:.4f} to '
-        f'{high:.4f} rad'
+        f'{JOINT_NAMES[joint]} would be at {value} rad, outside its range of '
+        f'{model.range_text(joint)}'
     )
 
 

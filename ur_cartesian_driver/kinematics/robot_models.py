@@ -26,12 +26,12 @@ latter. UR7e and UR12e have the mechanics of UR5e and UR10e.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, pi, radians
 from types import MappingProxyType
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6
 
 PositionLimits: TypeAlias = tuple[tuple[float, float], ...]
 
@@ -84,6 +84,22 @@ class DhTable:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLimits:
+    """The limits of the joints as a controller reports them."""
+
+    #: Lowest and highest position of each joint [rad].
+    position: PositionLimits
+    #: [rad/s]
+    speed: Vector6
+
+
+#: Names the source of a limit that is tighter than the model's.
+REPORTED = ', which the controller reports in its configuration'
+#: A limit is tighter than another one by more than this [rad], [rad/s].
+_ROUNDING = 1e-4
+
+
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """One model of the product line."""
@@ -106,6 +122,43 @@ class RobotModel:
     max_reach: float
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
+    #: Joints whose range, and whose speed, is not the model's but what the controller reports.
+    reported_ranges: frozenset[int] = frozenset()
+    reported_speeds: frozenset[int] = frozenset()
+
+    def limited_to(self, limits: JointLimits) -> RobotModel:
+        """
+        Return the model with the limits of a controller where they are tighter.
+
+        Limits that no joint can have (an empty range, no speed, NaN) are ignored.
+        """
+        ranges, speeds = list(self.position_limits), list(self.max_joint_speed)
+        for k, (low, high) in enumerate(limits.position):
+            own_low, own_high = self.position_limits[k]
+            tighter = max(low, own_low), min(high, own_high)
+            if tighter[0] < tighter[1] and (
+                low > own_low + _ROUNDING or high < own_high - _ROUNDING
+            ):
+                ranges[k] = tighter
+        for k, speed in enumerate(limits.speed):
+            if 0.0 < speed < self.max_joint_speed[k] - _ROUNDING:
+                speeds[k] = speed
+        return replace(
+            self,
+            position_limits=tuple(ranges),
+            max_joint_speed=vector6(speeds),
+            reported_ranges=frozenset(k for k in range(6) if ranges[k] != self.position_limits[k]),
+            reported_speeds=frozenset(k for k in range(6) if speeds[k] != self.max_joint_speed[k]),
+        )
+
+    def range_text(self, joint: int) -> str:
+        """Return the range of a joint, with its source if that is the controller."""
+        low, high = self.position_limits[joint]
+        return f'{low:.4f} to {high:.4f} rad{REPORTED if joint in self.reported_ranges else ""}'
+
+    def speed_source(self, joint: int) -> str:
+        """Return the source of a joint's speed limit, as a clause; empty = the model."""
+        return REPORTED if joint in self.reported_speeds else ''
 
     @property
     def control_cycle(self) -> float:

@@ -21,12 +21,13 @@ from collections.abc import Callable, Coroutine
 import logging
 from typing import NoReturn
 
-from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
+from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.program import PROGRAM_NAME, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
@@ -69,6 +70,7 @@ class RobotLink:
         on_event: Callable[[Event], None],
         on_status: Callable[[ConnectionStatus], None],
         on_geometry: Callable[[DhTable], None],
+        on_limits: Callable[[JointLimits], None],
         on_log: Callable[[int, str], None],
         on_signals: Callable[[Signals], None] = lambda _: None,
         may_upload: bool = True,
@@ -81,13 +83,15 @@ class RobotLink:
         :param on_event: what happened to the robot, for the running goal.
         :param on_status: the status changed.
         :param on_geometry: the robot reported its calibrated geometry.
+        :param on_limits: the robot reported the limits of its joints, before it is accepted.
         :param on_log: a line for the log, with its level.
         :param on_signals: inputs, outputs or tool changed.
         :param may_upload: whether the first connection to the robot is the owner's first.
         """
         self._settings = settings
         self._state_callback, self._on_event, self._on_log = on_state, on_event, on_log
-        self._on_geometry, self._signals_callback = on_geometry, on_signals
+        self._on_geometry, self._on_limits = on_geometry, on_limits
+        self._signals_callback = on_signals
         self._status = LinkStatus(
             f'Connecting to the robot at {settings.robot_ip}.',
             self._required_action,
@@ -379,6 +383,12 @@ class RobotLink:
         expected = self._settings.ur_type
         found = ' or '.join(models)
         if expected in models:
+            self._on_limits(
+                JointLimits(
+                    position=configuration.position_limits,
+                    speed=vector6(speed for speed, _ in configuration.motion_limits),
+                )
+            )
             self._status.apply(
                 ConnectionEvent.ROBOT_ACCEPTED,
                 robot_model=expected,

@@ -9,7 +9,12 @@ from dataclasses import dataclass, field
 from math import isfinite, pi
 from typing import Literal
 
-from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
+from ur_cartesian_driver.kinematics.robot_models import (
+    DhTable,
+    JointLimits,
+    robot_model,
+    RobotModel,
+)
 from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
@@ -67,6 +72,9 @@ class SimulatorConfig:
     turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
+    #: Limits of the joints; None = those of the model. Where they are tighter, the arm keeps them,
+    #: and the configuration on the primary interface contains them.
+    joint_limits: JointLimits | None = None
     #: How far the arm fails to follow its targets, and the controller to keep up; None = not at
     #: all. `sim.motion.imperfect_arm.typical_imperfections` has those of a model.
     imperfections: Imperfections | None = None
@@ -139,8 +147,9 @@ class SimulatorConfig:
 
     @property
     def robot_model(self) -> RobotModel:
-        """Return the table row of the model."""
-        return robot_model(self.model)
+        """Return the table row of the model, with the limits of this robot."""
+        model = robot_model(self.model)
+        return model if self.joint_limits is None else model.limited_to(self.joint_limits)
 
     @property
     def version(self) -> tuple[int, int, int, int]:

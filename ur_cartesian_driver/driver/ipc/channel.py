@@ -22,7 +22,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
-from ur_cartesian_driver.kinematics.robot_models import DhTable
+from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, RobotModel
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProtocolError
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.io_signals import Signals
@@ -85,8 +85,8 @@ class LiveSetup:
     """What a live session needs beside its job."""
 
     settings: LiveSettings
-    #: The arm, with its calibration if known.
-    ur_type: str
+    #: The arm, with its calibration and its limits, as far as they are known.
+    model: RobotModel
     geometry: DhTable
     #: Where the arm stands [rad].
     start: Joints
@@ -173,6 +173,13 @@ class GeometryReceived:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LimitsReceived:
+    """The robot reported the limits of its joints."""
+
+    limits: JointLimits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionProgress:
     """Progress of a motion."""
 
@@ -250,6 +257,7 @@ Notification: TypeAlias = (
     | StatusChanged
     | SignalsChanged
     | GeometryReceived
+    | LimitsReceived
     | MotionProgress
     | ServoProgress
     | AppendAnswered

@@ -26,7 +26,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, Serv
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
+from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 
 #: What the registry of execution modes names as feeder.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
@@ -83,19 +83,19 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 def is_slow_to_make(request: StartMotion) -> bool:
     """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
     live = request.live
-    return live is not None and live.geometry != robot_model(live.ur_type).geometry
+    return live is not None and live.geometry != live.model.geometry
 
 
 def _live_targets(live: LiveSetup, job: MotionJob) -> LiveTargets:
     generator = OnlineTrajectoryGenerator(
-        _arm(live.ur_type, live.geometry), job.T_flange_active, live.start, live.settings.limits
+        _arm(live.model, live.geometry), job.T_flange_active, live.start, live.settings.limits
     )
     return LiveTargets(generator, live.settings)
 
 
 @lru_cache(maxsize=4)
-def _arm(ur_type: str, geometry: DhTable) -> Arm:
+def _arm(model: RobotModel, geometry: DhTable) -> Arm:
     """Return the arm of a robot; the slow computations of a calibrated one are done once."""
-    arm = Arm(robot_model(ur_type), geometry)
+    arm = Arm(model, geometry)
     ideal_arm_of(arm)
     return arm

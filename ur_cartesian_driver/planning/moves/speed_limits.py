@@ -66,13 +66,16 @@ def speed_limits(
                 and model.max_joint_speed[k] * length / travel_of_joint < speed
             ):
                 speed = model.max_joint_speed[k] * length / travel_of_joint
-                name = f'the speed limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
-        speed, name = _limit_in_blends(geometry, length, speed, name)
+                name = (
+                    f'the speed limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
+                    f'{model.speed_source(k)}'
+                )
+        speed, name = _limit_in_blends(geometry, length, speed, name, model)
         return SpeedLimits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
     if not is_optimized(geometry.kind):
         min_time = geometry.speed_bound.time
         if min_time > 0.0 and length / min_time < speed:
-            speed, name = length / min_time, _joint_limit(geometry.speed_bound)
+            speed, name = length / min_time, _joint_limit(geometry.speed_bound, model)
     bound = (
         options.max_linear_acceleration * length / geometry.curve.length
         if translates(geometry)
@@ -89,19 +92,20 @@ def speed_limits(
 
 
 def _limit_in_blends(
-    geometry: SegmentGeometry, length: float, speed: float, name: str
+    geometry: SegmentGeometry, length: float, speed: float, name: str, model: RobotModel
 ) -> tuple[float, str]:
     """Return the limit of a joint move, whose joints may turn faster in its blends."""
     min_time = geometry.speed_bound.time
     if is_blended(geometry) and min_time > 0.0 and length / min_time < speed * (1.0 - 1e-9):
-        return length / min_time, _joint_limit(geometry.speed_bound)
+        return length / min_time, _joint_limit(geometry.speed_bound, model)
     return speed, name
 
 
-def _joint_limit(speed_bound: JointSpeedBound) -> str:
+def _joint_limit(speed_bound: JointSpeedBound, model: RobotModel) -> str:
+    joint = speed_bound.joint
     return (
-        f'the joint speed limits ({JOINT_NAMES[speed_bound.joint]} at '
-        f'{100.0 * speed_bound.fraction:.0f} % of the segment)'
+        f'the joint speed limits ({JOINT_NAMES[joint]} at {100.0 * speed_bound.fraction:.0f} % of '
+        f'the segment{model.speed_source(joint)})'
     )
 
 

@@ -143,7 +143,7 @@ class TcpKinematics:
                 value, _ = format_distinct(far, high if side > 0.0 else low)
                 return JointLimitExceeded(
                     f'{where} moves {JOINT_NAMES[k]} to {value} rad, outside its range of '
-                    f'{low:.4f} to {high:.4f} rad; start with this joint turned back, or use a '
+                    f'{self.arm.model.range_text(k)}; start with this joint turned back, or use a '
                     'JOINT segment.'
                 )
         joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))

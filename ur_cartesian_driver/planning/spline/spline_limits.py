@@ -109,7 +109,8 @@ def _quantities(
     for k, (joint, limit) in enumerate(
         zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
-        yield LimitedQuantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
+        source = f'the joint speed limit{kinematics.arm.model.speed_source(k)}'
+        yield LimitedQuantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', source)
         yield LimitedQuantity(joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name)
 
 
