@@ -56,6 +56,8 @@ _NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
 #: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
+#: A time that is longer by less than this factor is not remarked.
+_NOTICEABLY = 1.001
 #: Iterations until speeds and the times in blends agree.
 _MAX_ITERATIONS = 12
 
@@ -324,11 +326,12 @@ class _SegmentTimer:
             line_time = min_duration(self.geometry.curve.length, velocity, acceleration, peak)
             turn = options.angular_velocity, options.angular_acceleration
             source = f'{source}, turn within angular_velocity'
-        turn_time = min_duration(
-            self._length, min(turn[0], limits.speed), min(turn[1], limits.acceleration), peak
+        turn_rate = min(turn[1], limits.acceleration)
+        time, wanted = (
+            max(line_time, min_duration(self._length, turn_speed, turn_rate, peak))
+            for turn_speed in (min(turn[0], limits.speed), turn[0])
         )
-        time, wanted = max(line_time, turn_time), max(line_time, peak * self._length / turn[0])
-        if limits.speed < turn[0] and time > wanted:
+        if time > wanted * _NOTICEABLY:
             slowed = (
                 f'point {self.geometry.index}: turns in {time:.3f} s instead of {wanted:.3f} s, '
                 f'because of {limits.name}'
