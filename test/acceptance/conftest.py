@@ -202,7 +202,9 @@ def pytest_generate_tests(metafunc):
         seed = fixed or '1'
         imperfections = typical_imperfections(robot_model(model), int(seed))
         imperfect = pytest.param(
-            seed, id='imperfect', marks=pytest.mark.ur_sim(imperfections=imperfections)
+            seed,
+            id='imperfect',
+            marks=[pytest.mark.ur_sim(imperfections=imperfections), pytest.mark.exhaustive],
         )
         metafunc.parametrize(
             'simulated_arm',

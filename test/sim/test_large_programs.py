@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.programs.script_upload import MAX_UPLOAD_SIZE
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.exhaustive]
 
 
 def program(size, first='sync()'):
