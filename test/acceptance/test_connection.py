@@ -28,7 +28,8 @@ def long_goal(home):
 def moving(driver, goal):
     """Start a goal and return its motion when the arm moves."""
     motion = driver.start(driver.plan(goal))
-    wait_for(lambda: max(map(abs, driver.state.actual_qd)) > 0.02)
+    # The state may be unknown for a moment on a busy machine.
+    wait_for(lambda: (state := driver.state) and max(map(abs, state.actual_qd)) > 0.02)
     return motion
 
 

@@ -28,7 +28,7 @@ from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.sim.calibration import random_calibration
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.exhaustive]
 
 #: Digits that the wire cannot carry, so that only who remembers can put it back.
 TCP = Pose((0.0123456789, -0.02, 0.1), quaternion_from_rotation_vector((0.1, 0.2123456789, -0.3)))

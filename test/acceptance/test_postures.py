@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL
 from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType
 from ur_cartesian_driver.protocol.program.trajectory_points import decode_point
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.exhaustive]
 
 
 def full(q, off=0.0):

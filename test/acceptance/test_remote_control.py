@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.services.service_calls import SendProgramCall
 
-pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
+pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.exhaustive]
 
 READY = 10.0
 #: How long nothing may happen by itself [s].

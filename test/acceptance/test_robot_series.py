@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.robot_state import RobotMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
-pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
+pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.exhaustive]
 
 READY = 10.0
 X_FROM_POWER_OFF = {'model': 'ur30', 'frequency': 125.0, 'power': 'off', 'unlock_delay': 0.0}

@@ -19,7 +19,12 @@ from ur_cartesian_driver.planning.append.append_planner import plan_append, plan
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
+pytestmark = [
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    pytest.mark.both_arms,
+    pytest.mark.exhaustive,
+]
 
 #: Times of the points, and how much later than that the last one may be reached [s]; the arm comes
 #: to rest 0.2 s after the last set-point of servoj, at its usual gain and lookahead, and a little

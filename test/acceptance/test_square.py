@@ -10,7 +10,12 @@ import pytest
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
+pytestmark = [
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    pytest.mark.both_arms,
+    pytest.mark.exhaustive,
+]
 
 
 @pytest.fixture

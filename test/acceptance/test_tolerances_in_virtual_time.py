@@ -39,7 +39,7 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     SpeedSliderFault,
 )
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.exhaustive]
 
 #: Quantity of a fault: what texts call its two halves, how far each is pushed, and its limit.
 PUSHES: dict[DeviationQuantity, Any] = {

