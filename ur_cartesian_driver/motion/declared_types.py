@@ -113,18 +113,22 @@ def _field_converters(kind: type) -> tuple[tuple[str, Convert], ...]:
 
 def _dataclass(kind: type) -> Convert:
     converters = _field_converters(kind)
+    names = [name for name, _ in converters]
+    defaults = [field.default for field in fields(kind)]
 
     def convert(value: Any) -> Any:
         if not isinstance(value, kind):
             raise _wrong(value, kind.__name__)
         changed = {}
-        for name, convert_field in converters:
+        for (name, convert_field), default in zip(converters, defaults, strict=True):
             old = getattr(value, name)
+            if old is default:  # most fields of a point are
+                continue
             new = _convert_part(convert_field, old, name)
             if new is not old:
                 changed[name] = new
         if type(value) is not kind:  # a class that another process may not have
-            return kind(**{name: getattr(value, name) for name, _ in converters} | changed)
+            return kind(**{name: getattr(value, name) for name in names} | changed)
         return replace(value, **changed) if changed else value  # type: ignore[type-var]
 
     return convert
