@@ -119,9 +119,13 @@ async def perform(cell: RobotCell, step: str):
         case 'resend':
             # What runs on the robot is known from the newest packet.
             await cell.sleep(cell.max_packet_gap)
+            connected = cell.count_connected_programs()
             cell.resend()
             if cell.is_ready():
-                await cell.until(lambda: not cell.is_ready())
+                # It may replace the one that is connected within a cycle.
+                await cell.until(
+                    lambda: not cell.is_ready() or cell.count_connected_programs() > connected
+                )
         case 'move the slider up':
             cell.robot.set_speed_slider(1.0)
         case 'start the controller':

@@ -306,6 +306,10 @@ class RobotCell:
         writer.close()
         return answers
 
+    def count_connected_programs(self):
+        """Return how many robot programs have said that they are connected."""
+        return self.robot.controller.messages.log.count('ur_cartesian_driver: connected')
+
     def resend(self):
         self.owner.send(ResendProgram())
 
