@@ -120,9 +120,14 @@ class LoopConnection:
             self.send(OwnerHeartbeat())
 
     def _read(self) -> None:
+        heard: host.LoopHost | None = None
         while (running := self.host) is not None:  # None: closed by a callback of ours
             notification = channel.receive(running.pipe)
             if notification is not None:
+                if heard is not running:
+                    heard = running
+                    with contextlib.suppress(OSError):  # closed meanwhile
+                        running.pipe.settimeout(host.SILENCE_TIMEOUT)
                 self._handle(notification)
             elif self._closed.is_set():
                 return

@@ -26,6 +26,8 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 MODULE = 'ur_cartesian_driver.driver'
 #: A robot loop without a message for that long hangs [s]; it sends a heartbeat every 0.5 s.
 SILENCE_TIMEOUT = 5.0
+#: How long it may take to the first message [s]: a process imports all it needs before.
+START_TIMEOUT = 20.0
 #: How long the robot loop may take to stop the arm and end, before it is killed [s].
 JOIN_TIMEOUT = 2.0
 
@@ -33,7 +35,8 @@ JOIN_TIMEOUT = 2.0
 class LoopHost(Protocol):
     """Something that runs a robot loop."""
 
-    #: The owner's end of the pipe, blocking; it times out after :data:`SILENCE_TIMEOUT`.
+    #: The owner's end of the pipe, blocking; it times out after :data:`START_TIMEOUT`, which the
+    #: owner shortens to :data:`SILENCE_TIMEOUT` with the first message.
     pipe: socket.socket
     #: The owner's view of the newest robot state.
     memory: state_memory.StateMemory
@@ -53,7 +56,7 @@ class ProcessHost:
     def __init__(self) -> None:
         """Start the process."""
         self.pipe, loop_end = socket.socketpair()
-        self.pipe.settimeout(SILENCE_TIMEOUT)
+        self.pipe.settimeout(START_TIMEOUT)
         descriptor = state_memory.create()
         try:
             self._process = subprocess.Popen(
@@ -91,7 +94,7 @@ class ThreadHost:
     def __init__(self) -> None:
         """Start the thread."""
         self.pipe, loop_end = socket.socketpair()
-        self.pipe.settimeout(SILENCE_TIMEOUT)
+        self.pipe.settimeout(START_TIMEOUT)
         descriptor = state_memory.create()
         self.memory = state_memory.StateMemory(descriptor)
         self._thread = threading.Thread(
