@@ -230,6 +230,34 @@ def test_splines_do_not_drift_within_minutes(robot):
     assert late[-int(10.0 / step) :].max() < 2 * step * max(fast)
 
 
+@pytest.mark.parametrize('quintic', [True, False], ids=['quintic', 'cubic'])
+@pytest.mark.parametrize('model', ['ur5', 'ur5e'])
+def test_a_spline_that_brakes_hard_ends_at_its_end(model, quintic):
+    """From a speed to rest at about the greatest acceleration, or at more than an arm may have."""
+    robot = RobotInMemory(model)
+    direction = SIZE / SIZE.max()
+    for speed, seconds in ((0.7, 0.029), (1.2, 0.049), (1.6, 0.047), (1.9, 0.052), (2.5, 0.069)):
+        begin = 0.25 * speed
+        splines = [
+            Spline(
+                target=tuple((START + direction * far).tolist()),
+                velocities=tuple((direction * v).tolist()),
+                accelerations=STILL if quintic else None,
+                duration=duration,
+            )
+            for far, v, duration in (
+                (begin, speed, 0.5),
+                (begin + 0.45 * speed * seconds, 0.0, seconds),
+            )
+        ]
+        robot.place(HOME, IDENTITY)
+        run = robot.run(splines)
+        assert not run.failure
+        assert np.abs(np.subtract(run.q, splines[-1].target)).max() < 1.1e-5
+        accelerations = np.diff(run.joints, 2, axis=0) / robot.controller.cycle**2
+        assert np.abs(accelerations).max() < 40.5
+
+
 # ---- the rules of the contract -----------------------------------------------------------------
 
 

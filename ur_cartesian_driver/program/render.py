@@ -91,6 +91,11 @@ SPLINE_CONSTANTS: dict[str, float] = {
     'MAX_SPEED': 20.0,
     #: Largest distance of a first point without time from the arm [rad].
     'START_TOLERANCE': 0.01,
+    #: A spline ends at most so far from its end [rad]: what is left is a movej, at an acceleration
+    #: [rad/s^2] and a speed [rad/s].
+    'END_TOLERANCE': 1e-05,
+    'END_ACCELERATION': 15.0,
+    'END_SPEED': 1.0,
     #: Below this speed the arm is at rest [rad/s].
     'REST_SPEED': 0.0001,
     #: The progress of a smaller step cannot be measured [rad].

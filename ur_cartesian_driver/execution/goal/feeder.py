@@ -107,6 +107,10 @@ class Feeder(ABC):
         """Tell whether the robot program reads what it gets: an arm that stands is not stalled."""
         return False
 
+    def has_arrived(self, packet: RobotState) -> bool:
+        """Tell whether an arm that stands after the last point will not move again by itself."""
+        return True
+
     # ---- what to report -----------------------------------------------------------------------
 
     @property

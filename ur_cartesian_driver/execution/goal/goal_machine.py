@@ -248,7 +248,11 @@ class GoalMachine:
             return fault or self.feeder.supply(self.state)
         if self.state is GoalState.ARMING and self._is_armed(packet):
             return GoalSignal.ARMED, ''
-        if self.state is GoalState.SETTLING and is_at_rest(packet):
+        if (
+            self.state is GoalState.SETTLING
+            and is_at_rest(packet)
+            and self.feeder.has_arrived(packet)
+        ):
             return self._arrival(packet, now)
         if self.state is GoalState.COMING_TO_REST and is_at_rest(packet):
             return GoalSignal.AT_REST, ''

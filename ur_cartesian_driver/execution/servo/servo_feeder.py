@@ -45,7 +45,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSt
 from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
-from ur_cartesian_driver.motion.vectors import subtract6, Vector6
+from ur_cartesian_driver.motion.vectors import subtract6, Vector6, vector6
 
 #: The connection to the inputs, as :class:`LinkLost` names it.
 SERVO_LINK = 'RTDE inputs'
@@ -55,6 +55,8 @@ ANSWER_TIMEOUT = 1.0
 #: The controller's target is behind the set-point that the arm is led to by about the lookahead
 #: time of ``servoj``, by more with a low gain: so many lookahead times at most.
 MAX_LAG_LOOKAHEADS = 4.0
+#: So near to its last set-point servoj has come to its end [rad].
+_END_TOLERANCE = 1e-4
 
 
 class ServoFeeder(Feeder):
@@ -201,6 +203,13 @@ class ServoFeeder(Feeder):
     def confirms(self, now: float) -> bool:
         """Tell whether the robot program has lately read a set-point."""
         return now - self._last_answer < ANSWER_TIMEOUT
+
+    def has_arrived(self, packet: RobotState) -> bool:
+        """Tell whether the target is at the last set-point: servoj may swing past it, and back."""
+        if self._spline is None:
+            return True
+        end, _, _ = self._spline.at(float(self._spline.times[-1]))
+        return max(map(abs, subtract6(packet.target_q, vector6(end.tolist())))) <= _END_TOLERANCE
 
     # ---- what to report -----------------------------------------------------------------------
 
