@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
+import time
+from unittest.mock import patch
 
 from figures import Figure, seconds_each
 
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.sim.controller_assembly import assemble
+from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
 from ur_cartesian_driver.urscript import core_builtins, parse, ScriptInterpreter
@@ -33,14 +37,18 @@ def work():
 end
 """
 IDLE = 'def idle():\n  while True:\n    sync()\n  end\nend\n'
-MOVING = """
-def moving():
+SQUARES = """
+def squares():
   while True:
-    movel(p[-0.40, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.02)
-    movel(p[-0.50, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.02)
+    movel(p[-0.40, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.1, r={radius})
+    movel(p[-0.50, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.1, r={radius})
+    movel(p[-0.50, -0.23, 0.45, 0, 3.14159, 0], a=0.5, v=0.1, r={radius})
+    movel(p[-0.40, -0.23, 0.45, 0, 3.14159, 0], a=0.5, v=0.1, r={radius})
   end
 end
 """
+#: Cycles of moves: some rounds of the squares.
+CYCLES = 10_000
 
 
 def run(quick: bool) -> Iterator[Figure]:
@@ -70,11 +78,7 @@ def run(quick: bool) -> Iterator[Figure]:
         than='the same in Python',
     )
     nothing = 1e6 * _cycle('', budget)
-    for name, program in (
-        ('nothing running', ''),
-        ('an empty loop', IDLE),
-        ('a straight line', MOVING),
-    ):
+    for name, program in (('nothing running', ''), ('an empty loop', IDLE)):
         yield Figure(
             benchmark='cycle of the simulated controller',
             name=name,
@@ -83,6 +87,17 @@ def run(quick: bool) -> Iterator[Figure]:
             baseline=nothing,
             than='nothing running',
             note='2,000 us are there',
+        )
+    for name, radius in (('lines', 0.0), ('lines with blends', 0.02)):
+        seconds = _moving(radius)
+        yield Figure(
+            benchmark='cycle of the simulated controller',
+            name=name,
+            unit='us',
+            value=1e6 * seconds,
+            baseline=1e6 * _moving(radius, ahead=False),
+            than='solved one by one',
+            note=f'{0.002 / seconds:.0f} times as fast as real time',
         )
 
 
@@ -94,6 +109,19 @@ def _cycle(program: str, budget: float) -> float:
         controller.step()
     assert bool(program) == controller.programs.running, controller.messages.log
     return seconds_each(controller.step, budget)
+
+
+def _moving(radius: float, ahead: bool = True) -> float:
+    """Return the time of a cycle of moves; ``ahead``: solved together, as they are."""
+    controller = assemble(SimulatorConfig()).controller
+    controller.programs.submit(SQUARES.format(radius=radius))
+    with nullcontext() if ahead else patch.object(CycleBatch, 'next', return_value=None):
+        begin = time.process_time()
+        for _ in range(CYCLES):
+            controller.step()
+        seconds = time.process_time() - begin
+    assert controller.programs.running, controller.messages.log
+    return seconds / CYCLES
 
 
 def _sync() -> Iterator[None]:

@@ -13,6 +13,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -25,6 +26,7 @@ class Recorder:
     generator: MotionGenerator
     poses: list = field(default_factory=list)
     joints: list = field(default_factory=list)
+    twists: list = field(default_factory=list)
 
     def __post_init__(self):
         self.keep()
@@ -32,6 +34,7 @@ class Recorder:
     def keep(self):
         self.poses.append(self.generator.T_base_tcp)
         self.joints.append(self.generator.q)
+        self.twists.append(self.generator.tcp_twist)
 
     def step(self, scale=1.0, times=1):
         for _ in range(times):
@@ -77,7 +80,12 @@ def arm():
 @pytest.fixture(scope='session')
 def recorder(arm):
     """A maker of recorders, usable from hypothesis tests too."""
-    return lambda q=HOME, cycle=0.002: Recorder(MotionGenerator(arm, cycle, q))
+    calibrated_arm = Arm(arm.model, random_calibration(arm.model, 1))
+
+    def make(q=HOME, cycle=0.002, calibrated=False):
+        return Recorder(MotionGenerator(calibrated_arm if calibrated else arm, cycle, q))
+
+    return make
 
 
 @pytest.fixture(scope='session')

@@ -3,14 +3,16 @@
 """Whatever a program calls, and whenever: the arm never jumps, and it comes to rest."""
 
 from math import pi
+from unittest import mock
 
-from hypothesis import given, settings
+from hypothesis import given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.sim.motion import MotionError
+from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch
 
 CYCLE = 0.002
 
@@ -60,11 +62,8 @@ calls = st.tuples(
 )
 
 
-@pytest.mark.slow
-@settings(max_examples=25, deadline=None)
-@given(st.lists(calls, min_size=2, max_size=8))
-def test_arm_never_jumps_and_comes_to_rest(recorder, program):
-    r = recorder()
+def run(r, program):
+    """Run the calls of a program one after the other, and stop."""
     for name, way, a, v, t, radius, patience, scale in program:
         # Without patience the program waits for the return, else it is interrupted.
         try:
@@ -83,5 +82,36 @@ def test_arm_never_jumps_and_comes_to_rest(recorder, program):
     if r.generator.moving:
         r.run(r.generator.stopj(2.0))
     r.step(times=2)
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None)
+@given(st.lists(calls, min_size=2, max_size=8))
+def test_arm_never_jumps_and_comes_to_rest(recorder, program):
+    r = recorder()
+    run(r, program)
     assert not r.generator.moving
     assert np.abs(r.speeds()).max() <= pi * (1.0 + 1e-5)
+
+
+# The joints of a calibrated arm are found by iteration, to 3e-11 m.
+@pytest.mark.slow
+@pytest.mark.parametrize(('calibrated', 'bound'), [(False, 1e-9), (True, 1e-7)])
+@settings(
+    max_examples=12,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    phases=[Phase.explicit, Phase.reuse, Phase.generate],
+)
+@given(program=st.lists(calls, min_size=1, max_size=4))
+def test_cycles_solved_ahead_are_those_solved_one_by_one(recorder, calibrated, bound, program):
+    ahead, single = recorder(calibrated=calibrated), recorder(calibrated=calibrated)
+    run(ahead, program)
+    with mock.patch.object(CycleBatch, 'next', return_value=None):
+        run(single, program)
+    assert len(ahead.q) == len(single.q)
+    assert np.allclose(ahead.q, single.q, rtol=0.0, atol=bound)
+    assert np.allclose(ahead.twists, single.twists, rtol=0.0, atol=1e3 * bound)
+    for a, b in zip(ahead.poses, single.poses, strict=True):
+        assert a.distance_to(b) < bound
+        assert a.angle_to(b) < bound

@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
@@ -38,7 +39,6 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
     ReplannablePoint,
 )
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
-from ur_cartesian_driver.planning.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal

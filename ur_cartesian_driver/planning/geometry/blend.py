@@ -21,6 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.pose import N, Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import (
+    angle_rows,
+    conjugate_rows,
+    Floats,
+    interpolate_rows,
+    multiply_rows,
+    normalized_rows,
+)
 from ur_cartesian_driver.planning.geometry.curves import (
     ARC_CHORD_ERROR,
     Curve,
@@ -31,14 +39,6 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SegmentCurve,
     tcp_rows,
     trim_end,
-)
-from ur_cartesian_driver.planning.geometry.pose_rows import (
-    angle_rows,
-    conjugate_rows,
-    Floats,
-    interpolate_rows,
-    multiply_rows,
-    normalized_rows,
 )
 
 # Chords that measure the length of a blend without a formula.

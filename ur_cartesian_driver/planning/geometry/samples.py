@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blend import Blend, crossfade, curve_rows
 from ur_cartesian_driver.planning.geometry.curves import Curve, JointLineCurve, SegmentCurve
-from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 
 Ints = NDArray[np.int32]
 

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.planning.geometry.pose_rows import (
+from ur_cartesian_driver.motion.pose_rows import (
     conjugate_rows,
     Floats,
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.planning.geometry.rotation_rows import (
+from ur_cartesian_driver.motion.rotation_rows import (
     angular_rates,
     exp_rows,
     log_rows,

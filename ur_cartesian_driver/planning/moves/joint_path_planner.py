@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
@@ -36,7 +37,6 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SAME_POSITION,
     trim_end,
 )
-from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece
 from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry

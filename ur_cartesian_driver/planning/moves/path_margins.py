@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
-from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece, Ints, PathSamples
 from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath

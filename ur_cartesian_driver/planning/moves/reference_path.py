@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.blend import Blend, curve_rows
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
-from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 

@@ -24,9 +24,9 @@ from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Lin
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.workspace import parse_planes, Plane
-from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_path
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
-from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePiece,
     Ints,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from math import inf
+from typing import NamedTuple
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -21,6 +22,14 @@ from ur_cartesian_driver.sim.motion.joint_kinematics import (
 
 #: Still this long [s]: steady.
 STEADY_AFTER = 0.5
+
+
+class TargetRates(NamedTuple):
+    """Joint speeds [rad/s] and accelerations [rad/s^2], and the twist in base axes."""
+
+    qd: Vector6
+    qdd: Vector6
+    twist: Vector6
 
 
 class ArmTarget:
@@ -78,12 +87,21 @@ class ArmTarget:
         """Return the IK branch on which the arm is."""
         return IkBranchTracker(self.kinematics, self.q, self.T_base_tcp, self.T_tcp_flange)
 
-    def move_to(self, q: Vector6, pose: Pose) -> None:
-        """Be at joint positions and their pose in this cycle."""
-        rate = 1.0 / self.cycle
-        self.tcp_twist = twist_between(self.T_base_tcp, pose, rate)
-        qd = difference_rate(q, self.q, rate)
-        self.qdd = difference_rate(qd, self.qd, rate)
+    def move_to(self, q: Vector6, pose: Pose, rates: TargetRates | None = None) -> None:
+        """
+        Be at joint positions and their pose in this cycle.
+
+        :param rates: where they are known already.
+        """
+        if rates is None:
+            rate = 1.0 / self.cycle
+            qd = difference_rate(q, self.q, rate)
+            rates = TargetRates(
+                qd,
+                difference_rate(qd, self.qd, rate),
+                twist_between(self.T_base_tcp, pose, rate),
+            )
+        qd, self.qdd, self.tcp_twist = rates
         self.q, self.qd, self.T_base_tcp = q, qd, pose
         self._still_for = (
             0.0 if max_joint_difference(qd, STILL) > NO_CHANGE else self._still_for + self.cycle

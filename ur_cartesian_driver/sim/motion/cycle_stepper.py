@@ -15,7 +15,8 @@ from typing import NamedTuple, TypeAlias
 
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
-from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
+from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch
 from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
@@ -47,6 +48,8 @@ class CycleStep(NamedTuple):
     q: Vector6
     pose: Pose
     duration: float
+    #: Its speeds, where they are known already.
+    rates: TargetRates | None = None
 
 
 class CycleStepper:
@@ -58,6 +61,7 @@ class CycleStepper:
         #: Whether the last set-point was a pose, solved by inverse kinematics.
         self._on_tool_path = False
         self._stalled_for = 0.0
+        self._batch = CycleBatch(target)
 
     def forget_stall(self) -> None:
         """Give a motion that had stalled its time again."""
@@ -72,6 +76,12 @@ class CycleStepper:
         :param max_tool_speed: [m/s]; stops in joint space need not keep it.
         :returns: a fault when the arm cannot follow at all.
         """
+        if isinstance(motion, PathMotion):
+            solved = self._batch.next(motion, duration, max_tool_speed)
+            if solved is not None:
+                motion.accept((motion.index, solved.time, 0.0))
+                self._on_tool_path, self._stalled_for = self._batch.on_tool_path, 0.0
+                return CycleStep(solved.q, solved.pose, duration, solved.rates)
         target = self._target
         setpoint: Setpoint = target.q
         h, before = duration, (duration, 0.0)

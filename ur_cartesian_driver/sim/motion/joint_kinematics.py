@@ -6,6 +6,9 @@ from __future__ import annotations
 
 from math import cos, inf, sin, sqrt
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.motion.pose import (
@@ -14,10 +17,13 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     rotation_vector_from_quaternion,
 )
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.vectors import scale, scale6, subtract, subtract6, Vector6, ZERO6
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
+
+Flags = NDArray[np.bool_]
 
 # Assumptions; the robot's numbers are not published:
 #: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.
@@ -108,6 +114,35 @@ class JointKinematics:
                 )
             worst = max(worst, travel / allowed)
         return worst
+
+    def kept_rows(self, q: Floats, on_branch: bool) -> Flags:
+        """
+        Return which steps between rows of joint positions the arm can make in a cycle each (n,).
+
+        The first row is where it stands. It is :meth:`overspeed_factor` of many.
+
+        :param on_branch: whether the branch must not change either.
+        """
+        travel, q_before = np.abs(np.diff(q, axis=0)), q[:-1]
+        low, high = np.array(self._limits).T
+        margin = np.where(q[1:] > q_before, high - q_before, q_before - low)
+        brakes = np.sqrt(2.0 * LIMIT_DECELERATION * np.maximum(margin, 0.0))
+        speed = np.minimum(np.array(self._speeds), brakes)
+        allowed = np.minimum(speed * self._cycle, margin)
+        kept: Flags = ((travel < NO_CHANGE) | (travel <= allowed)).all(axis=1)
+        if on_branch:
+            signs = self._branch_sign_rows(q)
+            kept &= (signs[1:] * signs[:-1] >= 0.0).all(axis=1)
+        return kept
+
+    def _branch_sign_rows(self, q: Floats) -> Floats:
+        """Return :meth:`_branch_signs` of many (n, 3)."""
+        upper_arm, forearm, wrist = self._lengths
+        angle = q[:, 1] + q[:, 2]
+        shoulder = (
+            upper_arm * np.cos(q[:, 1]) + forearm * np.cos(angle) + wrist * np.sin(angle + q[:, 3])
+        )
+        return np.stack((shoulder, np.sin(q[:, 2]), np.sin(q[:, 4])), axis=1)
 
     def motion_fault(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
         """Return why the step from ``q`` to ``q_next`` (None = no solution) is impossible."""

@@ -347,7 +347,7 @@ class MotionGenerator:
             active.hold()
             return
         active.rate = step.duration / cycle / start
-        self._target.move_to(step.q, step.pose)
+        self._target.move_to(step.q, step.pose, step.rates)
         if isinstance(motion, PathMotion):
             self._paths.after_step(motion)
         elif motion.is_over:

@@ -14,6 +14,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import sqrt
 
+import numpy as np
+
+from ur_cartesian_driver.motion.pose_rows import Floats
+
 _BISECTIONS = 80
 #: A timed move without speed and acceleration accelerates and brakes for this part of its time.
 TIMED_RAMP = 1.0 / 3.0
@@ -56,6 +60,20 @@ class MotionProfile:
             return self.length
         phase = self._phase_at(max(time, 0.0))
         return min(max(phase.position_after(max(time, 0.0) - phase.time), 0.0), self.length)
+
+    def rows(self, times: Floats) -> Floats:
+        """Return :meth:`at` of many times (n,)."""
+        phases = np.array(
+            [(p.time, p.position, p.speed, p.acceleration, p.jerk) for p in self.phases]
+        )
+        found = np.searchsorted(phases[:, 0], times, side='right') - 1
+        begin, position, speed, acceleration, jerk = phases[np.maximum(found, 0)].T
+        t = np.maximum(times, 0.0) - begin
+        progress = position + t * (speed + t * (acceleration / 2.0 + t * jerk / 6.0))
+        rows: Floats = np.where(
+            times >= self.duration, self.length, np.clip(progress, 0.0, self.length)
+        )
+        return rows
 
     def speed(self, time: float) -> float:
         """Return ds/dt within [0, duration]; never negative."""

@@ -6,7 +6,8 @@ The geometry of motion: the set-point at a path parameter, without time.
 A move path runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and
 arcs of the tool in metres (by their rotation where that takes longer). A blend path runs
 from 0 to 1 and replaces the end of one move path and the beginning of the next. A set-point is six
-joint positions or a pose of the TCP in the base.
+joint positions or a pose of the TCP in the base; rows of set-points are (n, 6) or (n, 7), x y z
+[m] and the unit quaternion x y z w.
 """
 
 from __future__ import annotations
@@ -15,13 +16,23 @@ from collections.abc import Callable
 from math import atan2, cos, pi, sin, sqrt, tan
 from typing import Protocol, TypeAlias
 
+import numpy as np
+
 from ur_cartesian_driver.motion.pose import (
     conjugate,
     distance,
     multiply,
     Pose,
+    pose_rows,
     quaternion_from_rotation_vector,
 )
+from ur_cartesian_driver.motion.pose_rows import (
+    Floats,
+    interpolate_rows,
+    multiply_rows,
+    normalized_rows,
+)
+from ur_cartesian_driver.motion.rotation_rows import exp_rows
 from ur_cartesian_driver.motion.vectors import (
     add,
     add6,
@@ -60,6 +71,10 @@ class MotionPath(Protocol):
         """Return the set-point at the path parameter."""
         ...
 
+    def rows(self, s: Floats) -> Floats:
+        """Return the set-points at many path parameters (n,) before the end."""
+        ...
+
 
 class MovePath(Protocol):
     """The path to one waypoint."""
@@ -75,6 +90,10 @@ class MovePath(Protocol):
 
     def pose(self, s: float) -> Pose:
         """Return T_base_tcp."""
+        ...
+
+    def rows(self, s: Floats) -> Floats:
+        """Return the set-points at many path parameters (n,) before the end."""
         ...
 
 
@@ -97,6 +116,11 @@ class JointMovePath:
         if s >= self.length:
             return self.end
         return add_scaled6(self.start, self._travel, s / self.length)
+
+    def rows(self, s: Floats) -> Floats:
+        """Return joint positions (n, 6) [rad]."""
+        rows: Floats = np.array(self.start) + np.outer(s / self.length, self._travel)
+        return rows
 
     def pose(self, s: float) -> Pose:
         """Return T_base_tcp."""
@@ -125,6 +149,11 @@ class LinearMovePath:
         return self.end if s >= self.length else self.start.interpolate(self.end, s / self.length)
 
     pose = at
+
+    def rows(self, s: Floats) -> Floats:
+        """Return poses (n, 7)."""
+        start, end = np.array([self.start.row()]), np.array([self.end.row()])
+        return interpolate_rows(start, end, s / self.length)
 
 
 class CircularMovePath:
@@ -164,6 +193,17 @@ class CircularMovePath:
 
     pose = at
 
+    def rows(self, s: Floats) -> Floats:
+        """Return poses (n, 7)."""
+        start, end = np.array([self.start.row()]), np.array([self.end.row()])
+        rows = interpolate_rows(start, end, s / self.length)
+        angle = self.angle * s / self.length
+        rows[:, :3] = _on_circle_rows(self.centre, self._x, self._y, self.radius, angle)
+        if self._fixed:
+            turn = exp_rows(np.outer(angle, self.normal))
+            rows[:, 3:] = normalized_rows(multiply_rows(turn, start[:, 3:]))
+        return rows
+
     def _angle_of(self, point: Vector3) -> float:
         # The normal is such that start, via, end come in this order with growing angle.
         r = subtract(point, self.centre)
@@ -201,6 +241,12 @@ class JointBlendPath:
         b = self._after.at(self._head * u * u)
         return subtract6(add6(a, b), self._before.end)
 
+    def rows(self, u: Floats) -> Floats:
+        """Return joint positions (n, 6) [rad]."""
+        a = self._before.rows(self._before.length - self._tail * (1.0 - u) ** 2)
+        rows: Floats = a + self._after.rows(self._head * u * u) - np.array(self._before.end)
+        return rows
+
 
 class ToolBlendPath:
     """
@@ -227,6 +273,18 @@ class ToolBlendPath:
             subtract(add(a.position, b.position), self._waypoint.position),
             multiply(a.quaternion, multiply(back, b.quaternion)),
         )
+
+    def rows(self, u: Floats) -> Floats:
+        """Return poses (n, 7)."""
+        if isinstance(self._before, JointMovePath) or isinstance(self._after, JointMovePath):
+            return pose_rows(self.at(x) for x in u.tolist())
+        a = self._before.rows(self._before.length - self._tail * (1.0 - u) ** 2)
+        b = self._after.rows(self._head * u * u)
+        back = np.array([conjugate(self._waypoint.quaternion)])
+        rows: Floats = a + b - np.array(self._waypoint.row())
+        turns = multiply_rows(a[:, 3:], normalized_rows(multiply_rows(back, b[:, 3:])))
+        rows[:, 3:] = normalized_rows(turns)
+        return rows
 
 
 class FilletBlendPath:
@@ -262,6 +320,12 @@ class FilletBlendPath:
             return turned
         position = _on_circle(self.centre, self._x, self._y, self.radius, self.angle * u)
         return Pose(position, turned.quaternion)
+
+    def rows(self, u: Floats) -> Floats:
+        """Return poses (n, 7)."""
+        rows = self._turn.rows(u)
+        rows[:, :3] = _on_circle_rows(self.centre, self._x, self._y, self.radius, self.angle * u)
+        return rows
 
 
 BlendPath: TypeAlias = JointBlendPath | ToolBlendPath | FilletBlendPath
@@ -344,6 +408,18 @@ def _on_circle(centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: fl
     """Return a point of a circle; the angle counts from x towards y."""
     offset = add(scale(x, radius * cos(angle)), scale(y, radius * sin(angle)))
     return add(centre, offset)
+
+
+def _on_circle_rows(
+    centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: Floats
+) -> Floats:
+    """Return points of a circle (n, 3)."""
+    rows: Floats = (
+        np.array(centre)
+        + np.outer(radius * np.cos(angle), x)
+        + np.outer(radius * np.sin(angle), y)
+    )
+    return rows
 
 
 def _check_circle(a: Vector3, b: Vector3, n: Vector3) -> None:

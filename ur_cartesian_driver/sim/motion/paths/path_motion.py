@@ -148,6 +148,15 @@ class PathMotion:
         """Whether the last waypoint is reached."""
         return self.index + 1 == len(self.sections) and self.time >= self.sections[-1].stop
 
+    @property
+    def next_change(self) -> float:
+        """The time in the present section up to which no other one can take its place [s]."""
+        entry = self.last_move.entry
+        in_last = self.index + 1 == len(self.sections)
+        if in_last and self.last_move.radius > 0.0 and self.time < entry:
+            return entry
+        return self.sections[self.index].stop
+
     def may_return(self, cycle: float) -> bool:
         """Return whether one more cycle enters the blend, or the waypoint is reached."""
         if self.index + 1 < len(self.sections):

@@ -1,0 +1,148 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Solve some hundred cycles of a path together, before they are due.
+
+While speed scaling does not change, the cycles up to the end of a section of the path are known.
+numpy solves them for a small part of the time that they take one by one
+(:mod:`~.cycle_stepper`), to the same positions within rounding. Whatever interferes (another
+scaling, a stop, a new motion, a teleported arm) discards the rest; where the arm cannot keep the
+time, the cycles are done one by one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.inverse_rows import solve_path
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import (
+    compose_rows,
+    conjugate_rows,
+    Floats,
+    multiply_rows,
+)
+from ur_cartesian_driver.motion.rotation_rows import log_rows
+from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
+from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
+
+#: Most cycles of a batch, and fewest: for less numpy takes longer.
+_MAX_CYCLES = 192
+_MIN_CYCLES = 12
+#: Cycles that are done one by one where the arm cannot keep the time.
+_BACK_OFF = 50
+
+
+class SolvedCycle(NamedTuple):
+    """Where a motion is after one more cycle."""
+
+    q: Vector6
+    pose: Pose
+    rates: TargetRates
+    #: The time in the section of its path [s].
+    time: float
+
+
+class CycleBatch:
+    """
+    The cycles that are solved, of the path that an arm follows.
+
+    :param target: of the arm.
+    """
+
+    def __init__(self, target: ArmTarget) -> None:
+        """Begin with none."""
+        self._target = target
+        self._cycles: list[SolvedCycle] = []
+        #: What they were solved for: motion and section, time of a cycle [s], max tool speed.
+        self._motion: PathMotion | None = None
+        self._solved_for = (0, 0.0, 0.0)
+        #: Whether they are solved by inverse kinematics.
+        self.on_tool_path = False
+        #: The joints of the last one that was taken.
+        self._q: Vector6 = target.q
+        self._back_off = 0
+
+    def next(
+        self, motion: PathMotion, duration: float, max_tool_speed: float
+    ) -> SolvedCycle | None:
+        """
+        Return the next cycle of a motion, None where it has to be found by itself.
+
+        :param duration: the time of the path in a cycle [s]; ``max_tool_speed`` [m/s].
+        """
+        target, asked = self._target, (motion.index, duration, max_tool_speed)
+        if self._motion is not motion or self._solved_for != asked:
+            # Solved once it is the same twice: while the scaling changes, it would be in vain.
+            self._motion, self._solved_for, self._cycles, self._back_off = motion, asked, [], 0
+            return None
+        if not self._cycles or self._q is not target.q or not target.tcp_is_active:
+            if self._back_off == 0:
+                self._cycles = self._solve(motion, duration, max_tool_speed)[::-1]
+                self._back_off = _BACK_OFF
+            if not self._cycles:
+                self._back_off -= 1
+                return None
+            self._back_off = 0
+        cycle = self._cycles.pop()
+        self._q = cycle.q
+        return cycle
+
+    def _solve(
+        self, motion: PathMotion, duration: float, max_tool_speed: float
+    ) -> list[SolvedCycle]:
+        """Return the cycles that follow within the section and that the arm can keep."""
+        target, section = self._target, motion.sections[motion.index]
+        if duration <= 0.0 or not target.tcp_is_active:
+            return []
+        count = min(int((motion.next_change - motion.time) / duration) - 1, _MAX_CYCLES)
+        if count < _MIN_CYCLES:
+            return []
+        # Added up as one by one, so that they are rounded alike.
+        times = np.add.accumulate([motion.time, *([duration] * count)])[1:]
+        setpoints = section.path.rows(section.offset + section.profile.rows(times))
+        self.on_tool_path = setpoints.shape[1] == 7
+        if self.on_tool_path:
+            poses, found = (
+                setpoints,
+                solve_path(
+                    target.arm,
+                    compose_rows(setpoints, target.T_tcp_flange),
+                    target.q,
+                    skip_gaps=False,
+                ),
+            )
+            q = np.concatenate([[target.q], found.q])
+        else:
+            q = np.concatenate([[target.q], setpoints])
+            poses = compose_rows(target.arm.forward_rows(setpoints), target.T_flange_tcp)
+        poses = np.concatenate([[target.T_base_tcp.row()], poses])
+        kept = target.kinematics.kept_rows(q, self.on_tool_path)
+        travel = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+        kept &= travel <= max_tool_speed * target.cycle
+        count = len(kept) if kept.all() else int(np.argmin(kept))
+        return self._as_cycles(q[: count + 1], poses[: count + 1], times[:count])
+
+    def _as_cycles(
+        self, q: Floats, poses: Floats, times: NDArray[np.float64]
+    ) -> list[SolvedCycle]:
+        """Return cycles with their rates; the first row is where the arm is."""
+        rate = 1.0 / self._target.cycle
+        qd = rate * np.diff(q, axis=0)
+        qdd = rate * np.diff(qd, axis=0, prepend=np.array([self._target.qd]))
+        turns = log_rows(multiply_rows(poses[1:, 3:], conjugate_rows(poses[:-1, 3:])))
+        twist = rate * np.concatenate([np.diff(poses[:, :3], axis=0), turns], axis=1)
+        columns = (rows.tolist() for rows in (q[1:], poses[1:], qd, qdd, twist, times))
+        return [
+            SolvedCycle(
+                tuple(joints),
+                Pose(tuple(pose[:3]), tuple(pose[3:])),
+                TargetRates(tuple(speeds), tuple(accelerations), tuple(twists)),
+                time,
+            )
+            for joints, pose, speeds, accelerations, twists, time in zip(*columns, strict=True)
+        ]
