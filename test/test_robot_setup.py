@@ -18,6 +18,7 @@ import socket
 import pytest
 
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state_age import explain_age
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.robot.connection_status import required_action
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -37,6 +38,7 @@ pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has 
 SOURCES = [
     *PACKAGE.glob('robot/**/*.py'),
     *PACKAGE.glob('driver/**/*.py'),
+    PACKAGE / 'motion' / 'state_age.py',
     PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
     *PACKAGE.glob('sim/**/*.py'),
@@ -113,15 +115,17 @@ def test_every_required_action_is_on_the_page():
             robot,
             program_connected=connected,
             headless_mode=headless,
+            stale=stale,
             tcp_restore_pending=owed,
             program_is_ending=ending,
             foreign_program=foreign,
         )
-        for state, robot, connected, headless, owed, ending, foreign in product(
+        for state, robot, connected, headless, stale, owed, ending, foreign in product(
             ConnectionState,
             [None, *ROBOTS],
             (False, True),
             (False, True),
+            ('', explain_age(0.3, 0.2)),
             (False, True),
             (False, True),
             (False, True),

@@ -132,6 +132,7 @@ class DriverFactory:
             'robot_loop': 'thread',
             # Robot, driver and test share one interpreter, and two cores with other tests.
             'robot_receive_timeout': 1.0,
+            'max_state_age': 1.0,
         }
         driver = Driver(
             DriverConfig(**config | settings),

@@ -35,7 +35,7 @@ MESSAGES = [
     channel.CallAnswered(
         number=2, answer=service_calls.ServiceAnswer(ok=True, text='The TCP is set.')
     ),
-    channel.LoopHeartbeat(gaps=LinkGaps(reports=0.002, keepalives=0.021)),
+    channel.LoopHeartbeat(gaps=LinkGaps(reports=0.002, keepalives=0.021, state_age=0.003)),
     channel.LogMessage(level=30, text='a line'),
 ]
 

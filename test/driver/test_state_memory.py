@@ -56,6 +56,7 @@ states = st.builds(
     speed_scaling=numbers,
     target_speed_fraction=numbers,
     effective_speed=numbers,
+    state_age=numbers,
     robot_mode=st.sampled_from(RobotMode),
     safety_mode=st.sampled_from(SafetyMode),
     runtime_state=st.sampled_from(RuntimeState),

@@ -22,6 +22,7 @@ from ur_cartesian_driver.execution.goal.goal_monitor import STALL_TIMEOUT
 from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalSignal,
     GoalState,
+    MONITORED_STATES,
     STOP_SIGNALS,
     TRANSITIONS,
 )
@@ -462,13 +463,39 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
         GoalSignal.DEVIATION,
         GoalSignal.STALLED,
         GoalSignal.STARVING,
+        GoalSignal.STALE,
         GoalSignal.APPENDED,
         GoalSignal.NO_MORE_POINTS,
     }
-    possible = state is not GoalState.ENDED and (
-        signal not in judged or signal in own.get(state, set())
-    )
+    if signal is GoalSignal.STALE:
+        possible = state in MONITORED_STATES
+    else:
+        possible = state is not GoalState.ENDED and (
+            signal not in judged or signal in own.get(state, set())
+        )
     assert (signal in TRANSITIONS[state]) == possible
+
+
+@pytest.mark.parametrize(
+    'late',
+    [
+        pytest.param((0.15, robot(0.1, timestamp=0.1, state_age=0.25)), id='an old packet'),
+        pytest.param((0.21, Tick()), id='no packet'),
+    ],
+)
+def test_a_motion_whose_newest_state_is_too_old_is_cancelled(late):
+    machine = point_machine(job(), max_plan_deviation=(0.0, 0.0), max_state_age=0.2)
+    machine.start(robot().state)
+    machine.step(robot(0.0, state_age=0.001), 0.0)
+    assert not [c for c in machine.step(Tick(), 0.19) if isinstance(c, SendControl)]
+    now, event = late
+    (cancel,) = [c for c in machine.step(event, now + 0.02) if isinstance(c, SendControl)]
+    assert cancel.action is TrajectoryAction.CANCEL
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 0.3)
+    at_rest = robot(0.1, timestamp=0.4, qd=REST, state_age=0.4)
+    (end,) = [c for c in machine.step(at_rest, 0.8) if isinstance(c, Finish)]
+    assert end.outcome.code is ErrorCode.CONNECTION_LOST
+    assert 'max_state_age is 0.2 s' in end.outcome.text
 
 
 #: Where the outcome is not decided yet.

@@ -6,11 +6,11 @@ from fault_cell import inject_cause, perform
 from fault_goals import BlendGoal, planned
 import pytest
 import robot_cell
-from robot_cell import run_cell
+from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.execution.goal.goal_monitor import STALL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Tolerance
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -130,5 +130,46 @@ def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment)
             cell.owner.cancel()
         await cell.until(lambda: goal.motion.outcome, 0.3)
         assert goal.motion.outcome.code is ErrorCode.PROTECTIVE_STOP
+
+    run_cell(scenario)
+
+
+#: Longest time from a push to standstill: the bound of the age, and braking [s].
+REACTION = 0.3
+#: What the states of the robot take [bytes/s].
+NEEDED = 692 / CYCLE
+
+
+@pytest.mark.parametrize('share', [0.9, 0.5, 0.1])
+def test_on_a_congested_link_a_push_is_noticed_in_time_or_the_arm_has_stopped(share):
+    """States queue up and come as regularly as ever, each older than the one before."""
+
+    async def scenario(cell):
+        begin = cell.memory.read()
+        slow = planned(
+            begin,
+            ((0.0, 0.2, 0.0),),
+            0.03,
+            1.0,
+            path_tolerance=Tolerance(position=(0.004,) * 3),
+        )
+        motion = cell.owner.start(slow)
+        await cell.until(lambda: not cell.at_rest(), 0.2)
+        await inject_cause(cell, f'throttle rtde {share * NEEDED:.0f}')
+        await cell.sleep(2.5)
+        await inject_cause(cell, 'offset pose z 0.01')
+        await cell.until(cell.at_rest, REACTION)
+        await cell.until(lambda: motion.outcome, 3.0)
+        assert motion.outcome.code is ErrorCode.CONNECTION_LOST, motion.outcome
+        refused = cell.owner.start(planned(begin, ((0.0, 0.01, 0.0),), 0.5, 1.0))
+        await cell.until(lambda: refused.outcome, 0.1)
+        assert refused.outcome.code is ErrorCode.ROBOT_NOT_READY
+        assert 'max_state_age' in refused.outcome.text
+        cell.robot.clear_faults()
+        await cell.until(cell.is_ready, 3.0)
+        assert cell.memory.read().state_age < 0.01
+        following = cell.owner.start(planned(cell.memory.read(), ((0.0, 0.01, 0.0),), 0.5, 1.0))
+        await cell.until(lambda: following.outcome)
+        assert following.outcome.succeeded, following.outcome
 
     run_cell(scenario)

@@ -54,7 +54,11 @@ class Cell:
                 namespace=name,
                 context=self.context,
                 parameter_overrides=parameters_for(
-                    sim, ur_type=sim.config.model, tf_prefix=f'{name}_', robot_receive_timeout=1.0
+                    sim,
+                    ur_type=sim.config.model,
+                    tf_prefix=f'{name}_',
+                    robot_receive_timeout=1.0,
+                    max_state_age=1.0,
                 ),
             )
             for name, sim in self.sims.items()

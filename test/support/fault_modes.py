@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fault_table import CONTINUED, HEADLESS, LOCAL, Row
+from fault_table import CONTINUED, HEADLESS, LOCAL, Row, unplugged
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -51,6 +51,7 @@ FAULTS = (
     'protective stop that the driver does not see',
     'RTDE is cut',
     'RTDE is 0.1 s late',
+    'RTDE carries less data than needed',
     "the program's sockets are cut",
     "the program's answers are lost",
     'the reverse socket is half-open',
@@ -255,6 +256,12 @@ _SILENT = {
     }
 }
 
+#: Set-points queue too: the robot program, which waits for them, brakes and ends first.
+_NO_SETPOINTS = {
+    'code': E.PROGRAM_STOPPED,
+    'steps': ('wait until the fault ends', 'resend'),
+}
+
 #: Whether the last point is reached before a timeout would be a matter of milliseconds.
 _NEVER_LATE = {'': {'phases': ('entering', 'between points', 'cancelling')}}
 
@@ -270,12 +277,16 @@ SERVO = _mode(
     1.8,
     {
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'resend')}},
+        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'resend')}}
+        | unplugged(('entering',), 'wait until the fault ends', 'resend'),
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
         'RTDE is half-open': _SILENT,
         'RTDE is silent for 1.5 s': _SILENT,
         'garbage on RTDE': _SILENT,
+        'RTDE carries less data than needed': dict.fromkeys(
+            ('between points', 'cancelling'), _NO_SETPOINTS
+        ),
         "the program's answers are lost": {
             '': {
                 'code': E.SUCCESSFUL,
@@ -295,7 +306,8 @@ SERVO = _mode(
     more=SETPOINTS,
     pendant_changes={
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'play')}},
+        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'play')}}
+        | unplugged(('entering',), 'wait until the fault ends', 'play'),
         'protective stop that the driver does not see': _NOT_ENTERED,
     },
 )
@@ -363,6 +375,7 @@ FREEDRIVE = replace(
             'the network cable is cut',
             'protective stop that the driver does not see',
             'RTDE is cut',
+            'RTDE carries less data than needed',
             "the program's sockets are cut",
             'the reverse socket is half-open',
             'the node is silent',

@@ -22,12 +22,14 @@ def point_machine(
     max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
     feedback_period: float = 0.04,
     resume_after_stop: bool = False,
+    max_state_age: float = 0.0,
 ) -> GoalMachine:
     """Return the machine of a goal whose points are all known."""
     return GoalMachine(
         PointFeeder(GoalMonitor(job, max_plan_deviation)),
         feedback_period=feedback_period,
         resume_after_stop=resume_after_stop,
+        max_state_age=max_state_age,
     )
 
 

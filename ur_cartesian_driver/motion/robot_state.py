@@ -162,6 +162,8 @@ class RobotState:
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and those before.
     effective_speed: Annotated[float, None] = 1.0
+    #: How old the state was when it was read [s]: the time that it took from the controller to us.
+    state_age: Annotated[float, None] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,10 +54,12 @@ class LinkGaps:
 
     :param reports: between two states of the robot.
     :param keepalives: between two keepalives for the robot program.
+    :param state_age: the age of the oldest state of the robot.
     """
 
     reports: float = nan
     keepalives: float = nan
+    state_age: float = nan
 
 
 def timestamped(text: str, before: str = '') -> str:
@@ -92,6 +94,7 @@ def required_action(
     *,
     program_connected: bool,
     headless_mode: bool,
+    stale: str = '',
     tcp_restore_pending: bool = False,
     program_is_ending: bool = False,
     foreign_program: bool = False,
@@ -100,6 +103,7 @@ def required_action(
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
+    :param stale: that the states of the robot are too old, as a sentence; empty = they are not.
     :param tcp_restore_pending: the TCP of the last goal has to be restored.
     :param program_is_ending: our program was told to end but is still connected.
     :param foreign_program: a program runs on the robot that has not connected to us.
@@ -119,6 +123,8 @@ def required_action(
             'brakes, then start the robot program.'
         )
     if program_connected and not has_ended(robot):
+        if stale:
+            return stale
         if is_paused(robot):
             return 'The robot program is paused; play it on the pendant.'
         if program_is_ending:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine
 import logging
+from math import inf
 from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
@@ -27,6 +28,7 @@ from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, Tr
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state_age import explain_age, StaleStates
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.program import PROGRAM_NAME, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
@@ -102,6 +104,9 @@ class RobotLink:
         self.version: ControllerVersion | None = None
         #: What the robot reported last; None = it is not connected.
         self.robot: RobotState | None = None
+        #: When that was true [s], and whether it is too old to go by.
+        self._state_time = inf
+        self._stale = StaleStates(settings.max_state_age)
         #: Its inputs, outputs and tool; None = not reported yet.
         self.signals: Signals | None = None
         #: Whether the TCP from before the last goal is still to be restored.
@@ -214,9 +219,7 @@ class RobotLink:
             self._status.apply(ConnectionEvent.GOAL_STARTED)
         else:
             self._status.apply(
-                ConnectionEvent.GOAL_ENDED
-                if self._tracker.reads(self.robot)
-                else ConnectionEvent.PROGRAM_LOST
+                ConnectionEvent.GOAL_ENDED if self._takes_goals() else ConnectionEvent.PROGRAM_LOST
             )
 
     def set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
@@ -315,7 +318,7 @@ class RobotLink:
         :raises DriverError: the robot program cannot be made from the settings.
         """
         settings = self._settings
-        stream = StateStream(settings.rtde_frequency, self._on_state)
+        stream = StateStream(settings.rtde_frequency, settings.max_state_age, self._on_state)
         try:
             self.version = await stream.open(settings.robot_ip, settings.rtde_port)
             self._status.apply(ConnectionEvent.ROBOT_ANSWERED)
@@ -366,9 +369,17 @@ class RobotLink:
         self._tracker.observe(robot)
         if self._tracker.is_own and not self.status.program_is_own:
             self._status.update(program_is_own=True)
+        self._state_time = asyncio.get_running_loop().time() - robot.state_age
+        self.check_age()
         if status_may_change:
             self._review_state()
             self._on_event(StateReceived(state=robot))
+
+    def check_age(self) -> None:
+        """Take goals again, or no more, as the newest state ages; called often."""
+        now = asyncio.get_running_loop().time()
+        if self._stale.update(now - self._state_time, now):
+            self._review_state()
 
     def _on_signals(self, signals: Signals) -> None:
         self.signals = signals
@@ -454,6 +465,7 @@ class RobotLink:
             else timestamped(f'The robot is gone. {"; ".join(self.event_log.event_chain())}.')
         )
         before, self.robot, self.signals = self.robot, None, None
+        self._state_time = inf
         self.program.is_paused = False  # unknown; too many keepalives are better than none
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
@@ -476,12 +488,16 @@ class RobotLink:
         )
         self._auto_start.review(robot, self.status, program_connected=self.program.connected)
         self.program.is_paused = is_paused(robot)
-        if not self._tracker.reads(robot):
+        if not self._takes_goals():
             self._status.apply(ConnectionEvent.PROGRAM_PAUSED)
         elif not self.tcp_restore_pending:
             self._status.apply(ConnectionEvent.PROGRAM_CONNECTED)
             if self.program.is_executing:  # a stop that did not end the goal is over
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
+
+    def _takes_goals(self) -> bool:
+        """Tell whether the robot program reads what is sent, and the states show what follows."""
+        return self._tracker.reads(self.robot) and not self._stale.age
 
     def _required_action(self, state: ConnectionState) -> str:
         return required_action(
@@ -489,6 +505,9 @@ class RobotLink:
             self.robot,
             program_connected=self.program.connected,
             headless_mode=self._settings.headless_mode,
+            stale=explain_age(self._stale.age, self._settings.max_state_age)
+            if self._stale.age
+            else '',
             tcp_restore_pending=self.tcp_restore_pending,
             program_is_ending=self._tracker.is_ending,
             foreign_program=self._tracker.foreign_program_runs(self.robot),

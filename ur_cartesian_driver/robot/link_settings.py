@@ -42,6 +42,9 @@ class LinkSettings:
     wire_dialect: str = NEWEST_DIALECT.name
     #: Without a keepalive for that long [s] the robot program stops the arm and ends.
     robot_receive_timeout: float = 0.2
+    #: Where the newest state of the robot is older than this [s], the driver stops the arm and
+    #: takes no goal; 0 = never.
+    max_state_age: float = 0.2
     #: Switch the arm on and release its brakes on the first connection (headless mode only).
     auto_power: bool = False
     #: A recovery unlocks protective stops without being asked to each time.
@@ -77,11 +80,16 @@ class LinkSettings:
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
-        self._require_not_negative('io_publish_rate')
+        self._require_not_negative('io_publish_rate', 'max_state_age')
         if self.rtde_frequency != 0.0 and not self.rtde_frequency >= MIN_RTDE_FREQUENCY:
             raise ValueError(
                 f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
                 f'robot can) or at least {MIN_RTDE_FREQUENCY:g} Hz.'
+            )
+        if 0.0 < self.max_state_age * self.rtde_frequency < 2.0:
+            raise ValueError(
+                f'max_state_age is {self.max_state_age:g} s, it has to be 0 (any age) or at least '
+                f'two periods of rtde_frequency = {self.rtde_frequency:g} Hz.'
             )
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(

@@ -39,6 +39,7 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
         make_feeder(request, config),
         feedback_period=1.0 / config.feedback_rate,
         resume_after_stop=config.on_robot_stop == 'continue',
+        max_state_age=config.max_state_age,
     )
 
 

@@ -31,7 +31,7 @@ class NewestState:
         self.latest: RobotState | None = None
         self._is_published = True
         self._last_report = inf
-        self._longest_gap = 0.0
+        self._longest_gap = self._oldest = 0.0
 
     def keep(self, state: RobotState) -> None:
         """Take a state; :meth:`publish` publishes it."""
@@ -47,6 +47,7 @@ class NewestState:
         now = asyncio.get_running_loop().time()
         self._longest_gap = max(self._longest_gap, now - self._last_report)
         self._last_report = now
+        self._oldest = max(self._oldest, self.latest.state_age)
 
     def clear(self) -> None:
         """Take note that the robot is lost."""
@@ -57,3 +58,8 @@ class NewestState:
         """Return the longest pause between two states since the last call [s]."""
         gap, self._longest_gap = self._longest_gap, 0.0
         return gap
+
+    def take_oldest(self) -> float:
+        """Return the age of the oldest state since the last call [s]."""
+        oldest, self._oldest = self._oldest, 0.0
+        return oldest

@@ -185,6 +185,7 @@ class RobotLoop:
         while True:
             await asyncio.sleep(TICK_PERIOD)
             self._motion.handle_event(Tick())
+            self._link.check_age()
             if self._now() - last_heartbeat >= HEARTBEAT_PERIOD:
                 last_heartbeat = self._now()
                 self._send_heartbeat()
@@ -195,7 +196,9 @@ class RobotLoop:
     def _send_heartbeat(self) -> None:
         self._pipe.resend_signals()
         gaps = LinkGaps(
-            reports=self._newest.take_gap(), keepalives=self._link.event_log.keepalive_gap()
+            reports=self._newest.take_gap(),
+            keepalives=self._link.event_log.keepalive_gap(),
+            state_age=self._newest.take_oldest(),
         )
         self._pipe.send(LoopHeartbeat(gaps=gaps))
 

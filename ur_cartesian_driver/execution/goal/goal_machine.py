@@ -36,6 +36,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     INTERRUPTIBLE_STATES,
     is_at_rest,
     Meaning,
+    MONITORED_STATES,
     NO_MEANING,
     NO_STOP,
     RESULT_SIGNALS,
@@ -71,6 +72,7 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryResult,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state_age import explain_age
 
 
 class MotionStatus(NamedTuple):
@@ -88,7 +90,12 @@ class GoalMachine:
     """Takes one goal through the table of states."""
 
     def __init__(
-        self, feeder: Feeder, *, feedback_period: float = 0.04, resume_after_stop: bool = False
+        self,
+        feeder: Feeder,
+        *,
+        feedback_period: float = 0.04,
+        resume_after_stop: bool = False,
+        max_state_age: float = 0.0,
     ) -> None:
         """
         Prepare; nothing happens before :meth:`start`.
@@ -97,6 +104,8 @@ class GoalMachine:
         :param feedback_period: time between two progress reports [s].
         :param resume_after_stop: a protective or safeguard stop pauses the goal, until somebody
             unlocks the robot and plays its program; otherwise it ends the goal.
+        :param max_state_age: the goal ends when the newest state of the robot is older [s]; 0 =
+            it may have any age.
         """
         self.state = INITIAL_STATE
         self.feeder = feeder
@@ -107,6 +116,9 @@ class GoalMachine:
         #: Its outputs that have to be safe, if any.
         self._guard: OutputGuard | None = None
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
+        self._max_state_age = max_state_age or inf
+        #: When the newest packet was true [s]; None = not known yet.
+        self._packet_time: float | None = None
         self._feedback_period = feedback_period
         self._next_report = -inf
         self._deadline = inf
@@ -153,10 +165,13 @@ class GoalMachine:
             return self._append(event, now)
         if self.state is GoalState.ENDED:
             return []
+        if self._packet_time is None:
+            self._packet_time = now - self._packet.state_age
         if self.state is GoalState.ARMING:
             self._deadline = min(self._deadline, now + ARMING_TIMEOUT)
         commands = self.feeder.take(event, now)
         if isinstance(event, StateReceived):
+            self._packet_time = now - event.state.state_age
             self._observe(event.state, now)
             if self._guard is not None:
                 goes_on = self.state in INTERRUPTIBLE_STATES
@@ -214,6 +229,7 @@ class GoalMachine:
             case StateReceived(state=packet):
                 return (
                     detect_stop(packet, self._ignored_stops)
+                    or self._check_age(now)
                     or self._check_outputs()
                     or self._check_packet(packet, now)
                 )
@@ -231,8 +247,16 @@ class GoalMachine:
             case LinkLost(link=link, reason=reason):
                 return GoalSignal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
             case Tick():
-                return self._check_deadline(now)
+                return self._check_age(now) or self._check_deadline(now)
         raise TypeError(f'unknown event {event!r}')
+
+    def _check_age(self, now: float) -> Meaning | None:
+        """Return that the arm has moved for too long since the newest packet was true."""
+        assert self._packet_time is not None
+        age = now - self._packet_time
+        if age <= self._max_state_age or self.state not in MONITORED_STATES:
+            return None
+        return GoalSignal.STALE, explain_age(age, self._max_state_age).rstrip('.')
 
     def _check_outputs(self) -> Meaning | None:
         """Return that a goal must not go on, because a pause has changed its outputs."""

@@ -44,7 +44,8 @@ failure (TIMEOUT). A TCP that is not set in time ends the goal before it begins;
 restored in time, or not at all because the robot stopped, is left to whoever carries out the
 commands (``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have no deadline, because a
 speed slider at zero is no error; but where the arm stands for ``STALL_TIMEOUT`` and nothing holds
-it, a command or a result was lost (STALLED). RTDE packets that stop are a lost connection.
+it, a command or a result was lost (STALLED). RTDE packets that are too old, or stop, show nothing
+of the motion any more: the goal is cancelled (STALE), and ends as one whose connection was lost.
 """
 
 from __future__ import annotations
@@ -90,6 +91,7 @@ class GoalSignal(Enum):
     VIOLATION = auto()
     DEVIATION = auto()
     STALLED = auto()
+    STALE = auto()
     PROTECTIVE_STOP = auto()
     EMERGENCY_STOP = auto()
     PROGRAM_STOPPED = auto()
@@ -116,6 +118,9 @@ RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
 #: In these a goal that must not go on after a pause ends.
 INTERRUPTIBLE_STATES = RUNNING_STATES | {GoalState.AWAITING_POINTS, GoalState.SETTLING}
+
+#: In these a goal ends when the states of the robot are too old to monitor it.
+MONITORED_STATES = INTERRUPTIBLE_STATES | {GoalState.ARMING}
 
 #: Signals that stop the arm in every state but ENDED, and the code with which the goal ends where
 #: none is decided yet.
@@ -182,6 +187,7 @@ _WHILE_RUNNING: Mapping[GoalSignal, Transition] = {
     GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
     GoalSignal.DEVIATION: Transition(GoalState.CANCELLING, ErrorCode.EXECUTION_FAILED),
     GoalSignal.STALLED: _end(ErrorCode.EXECUTION_FAILED),
+    GoalSignal.STALE: Transition(GoalState.CANCELLING, ErrorCode.CONNECTION_LOST),
 }
 
 #: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED,
@@ -193,6 +199,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_ignore(GoalState.ARMING, *_RESULTS),
         GoalSignal.ARMED: Transition(GoalState.MOVING),
         **_ON_USER_STOP,
+        GoalSignal.STALE: _decide(ErrorCode.CONNECTION_LOST),
         GoalSignal.TIMEOUT: _decide(ErrorCode.ROBOT_NOT_READY),
     },
     GoalState.MOVING: {
@@ -211,6 +218,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         GoalSignal.NO_MORE_POINTS: Transition(GoalState.SETTLING),
         **_ON_USER_STOP,
         GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.STALE: _decide(ErrorCode.CONNECTION_LOST),
         GoalSignal.TIMEOUT: _decide(ErrorCode.CANCELLED),
     },
     GoalState.SETTLING: {
@@ -218,6 +226,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
         **_ignore(GoalState.SETTLING, *_RESULTS),
         **_ON_USER_STOP,
         GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.STALE: _decide(ErrorCode.CONNECTION_LOST),
         GoalSignal.SETTLED: _decide(ErrorCode.SUCCESSFUL),
         GoalSignal.TIMEOUT: _decide(ErrorCode.GOAL_TOLERANCE_VIOLATED),
     },

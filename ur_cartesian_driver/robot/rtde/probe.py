@@ -23,7 +23,7 @@ async def read_state(host: str, port: int) -> RobotState:
         states.append(state)
         first.set()
 
-    stream = StateStream(10.0, take)
+    stream = StateStream(10.0, 0.0, take)
     waiting = asyncio.create_task(first.wait())
     try:
         await stream.open(host, port)

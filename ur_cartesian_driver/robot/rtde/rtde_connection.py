@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
@@ -47,7 +48,9 @@ class RtdeConnection:
         self._silence = silence
         self._names: tuple[str, ...] = ()
         self._inputs: tuple[Recipe, ...] = ()
-        self._last_packet = 0.0
+        self._last_packet = self._last_request = 0.0
+        #: The time that the quickest answer of the handshake took [s].
+        self.round_trip = inf
         self._version: ControllerVersion | None = None
         self._answered = asyncio.Event()  # by a version or by hanging up
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -70,7 +73,7 @@ class RtdeConnection:
         :raises OSError: nobody answers, or not as a robot; the text names host and port.
         """
         await dial(self._connection, host, port)
-        self._connection.send(self._client.start())
+        self._send_request(self._client.start())
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._answered.wait()
@@ -100,18 +103,31 @@ class RtdeConnection:
         """Close the connection."""
         self._connection.close()
 
+    def abort(self, reason: str) -> None:
+        """Close the connection at once; :meth:`ended` returns the reason."""
+        self._connection.abort(reason)
+
     def _on_data(self, data: bytes) -> None:
         try:
             values = self._client.values_in(data)
             if values is not None:
                 self._take_values(values)
                 return
+            if self._version is None:
+                now = asyncio.get_running_loop().time()
+                self.round_trip = min(self.round_trip, now - self._last_request)
             for event in self._client.feed(data):
                 self._take(event)
         except ProtocolError as error:
-            self._connection.abort(str(error))
+            self.abort(str(error))
             return
-        self._connection.send(self._client.data_to_send())
+        self._send_request(self._client.data_to_send())
+
+    def _send_request(self, data: bytes) -> None:
+        """Send what the handshake asks next, if anything."""
+        if data:
+            self._last_request = asyncio.get_running_loop().time()
+            self._connection.send(data)
 
     def _take(self, event: RtdeEvent) -> None:
         if isinstance(event, DataReceived):

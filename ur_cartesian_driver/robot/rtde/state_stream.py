@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
+from math import inf
 
 from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state_age import STALE_TIMEOUT, StateAge
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
@@ -22,11 +25,14 @@ from ur_cartesian_driver.robot.rtde.state_recipe import (
 class StateStream(RtdeConnection):
     """Used once, from one event loop: open it, wait for its end, close it."""
 
-    def __init__(self, frequency: float, on_state: Callable[[RobotState], None]) -> None:
+    def __init__(
+        self, frequency: float, max_age: float, on_state: Callable[[RobotState], None]
+    ) -> None:
         """
         Prepare a stream.
 
         :param frequency: packets per second; 0 = as many as the robot can.
+        :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
         :param on_state: a packet came in; also before :meth:`open` returns.
         """
         super().__init__(
@@ -37,10 +43,24 @@ class StateStream(RtdeConnection):
         )
         self._on_state = on_state
         self._effective_speed = EffectiveSpeed()
+        self._max_age = max_age or inf
+        self._age: StateAge | None = None
+        self._last_fresh = 0.0
 
     def _on_row(self, names: Sequence[str], values: RtdeValues) -> None:
         state = robot_state_from_rtde(in_recipe_order(names, values))
         state.effective_speed = self._effective_speed.update(
             state.timestamp, state.speed_scaling, state.target_speed_fraction, state.runtime_state
         )
+        now = asyncio.get_running_loop().time()
+        if self._age is None:
+            self._age, self._last_fresh = StateAge(0.5 * self.round_trip), now
+        state.state_age = self._age.update(now, state.timestamp)
         self._on_state(state)
+        if state.state_age <= self._max_age:
+            self._last_fresh = now
+        elif now - self._last_fresh > STALE_TIMEOUT:
+            self.abort(
+                f'its states were older than max_state_age = {self._max_age:g} s for '
+                f'{STALE_TIMEOUT:g} s'
+            )

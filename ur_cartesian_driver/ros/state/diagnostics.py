@@ -41,6 +41,7 @@ def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> Diagnost
         'timeout sent to the robot program [s]': f'{driver.config.robot_receive_timeout:g}',
         'longest gap between keepalives sent [s]': f'{gaps.keepalives:.4f}',
         'longest gap between robot reports [s]': f'{gaps.reports:.4f}',
+        'largest age of a robot report [s]': f'{gaps.state_age:.4f}',
     }
     message = DiagnosticArray(
         status=[

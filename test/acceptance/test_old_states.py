@@ -1,0 +1,71 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""States that come late, over real sockets and with a robot loop in a process of its own."""
+
+import os
+import signal
+from time import monotonic, sleep
+
+import pytest
+from waiting import wait_for
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+#: Longest time from a push to standstill: the bound of the age, and braking [s].
+REACTION = 0.3
+
+
+@pytest.fixture
+def driver(make_driver):
+    """A driver whose loop shares no interpreter with the robot, with the usual bound."""
+    made = make_driver(robot_loop='process', max_state_age=0.2)
+    made.wait_ready(10.0)
+    return made
+
+
+@pytest.fixture
+def motion(ur_sim, driver, home):
+    """A slow motion that has begun."""
+    tolerance = Tolerance(position=(0.002,) * 3)
+    goal = Goal(waypoints=(Waypoint(pose=home(y=0.2), time=8.0),), path_tolerance=tolerance)
+    started = driver.start(driver.plan(goal))
+    wait_for(lambda: not at_rest(ur_sim))
+    return started
+
+
+def at_rest(ur_sim):
+    return max(map(abs, ur_sim.state().qd)) < 1e-3
+
+
+def check_end(motion, driver, ur_sim):
+    """Check how a motion ended for old states, and that the next one is taken."""
+    outcome = motion.result(5.0)
+    assert outcome.code is ErrorCode.CONNECTION_LOST, outcome.text
+    assert 'max_state_age' in outcome.text
+    ur_sim.clear_faults()
+    driver.wait_ready(10.0)
+    assert driver.state.state_age < 0.2
+
+
+def test_a_congested_link_makes_no_reaction_late(ur_sim, driver, motion):
+    """200 kB/s are about half of what the states take: each comes later than the one before."""
+    ur_sim.inject('throttle rtde 200000')
+    sleep(1.5)
+    ur_sim.inject('offset pose x 0.004')
+    begin = monotonic()
+    wait_for(lambda: at_rest(ur_sim))
+    assert monotonic() - begin < REACTION
+    check_end(motion, driver, ur_sim)
+
+
+def test_a_loop_that_was_given_no_time_stops_the_arm(ur_sim, driver, motion):
+    """The robot program waits for longer here; what the loop then reads is too old."""
+    loop = driver._loop.host.pid
+    os.kill(loop, signal.SIGSTOP)
+    sleep(0.5)
+    os.kill(loop, signal.SIGCONT)
+    wait_for(lambda: at_rest(ur_sim))
+    check_end(motion, driver, ur_sim)
