@@ -194,7 +194,7 @@ class ProgramStopped(ExecutionEnded):
 
 
 class ConnectionLost(ExecutionEnded):
-    """A connection to the robot broke, or the robot's states come too late."""
+    """A connection to the robot broke, or its states come too late."""
 
     code = ErrorCode.CONNECTION_LOST
 
