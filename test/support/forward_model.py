@@ -41,3 +41,29 @@ def pose_matrix(pose):
     ]
     T[:3, 3] = pose.position
     return T
+
+
+def dh_frames(geometry, q):
+    """
+    Return the frames of the base and behind each joint, (n, 7, 4, 4), of configurations (n, 6).
+
+    The last one is the flange.
+    """
+    q = np.atleast_2d(q)
+    frames = np.tile(np.eye(4), (len(q), 7, 1, 1))
+    for i in range(6):
+        ct, st = np.cos(geometry.theta[i] + q[:, i]), np.sin(geometry.theta[i] + q[:, i])
+        ca, sa = cos(geometry.alpha[i]), sin(geometry.alpha[i])
+        link = np.zeros((len(q), 4, 4))
+        link[:, 0] = np.stack([ct, -st * ca, st * sa, geometry.a[i] * ct], axis=1)
+        link[:, 1] = np.stack([st, ct * ca, -ct * sa, geometry.a[i] * st], axis=1)
+        link[:, 2, 1:] = sa, ca, geometry.d[i]
+        link[:, 3, 3] = 1.0
+        frames[:, i + 1] = frames[:, i] @ link
+    return frames
+
+
+def turn_between(a, b):
+    """Return the angle between rotations (..., 3, 3) [rad]; exact near 0."""
+    chord = np.linalg.norm(a - b, axis=(-2, -1)) / (2.0 * np.sqrt(2.0))
+    return 2.0 * np.arcsin(np.minimum(1.0, chord))

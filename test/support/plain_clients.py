@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import socket
 import struct
+import threading
 import time
 from typing import Any, Self
 
@@ -155,3 +156,79 @@ class PlainRealtime:
         while any(any(sample.qd) for sample in samples[-25:]):
             samples.append(self.next())
         return samples[:-24]
+
+
+@dataclass(frozen=True, slots=True)
+class RtdeRow:
+    """A packet of RTDE: joints by their targets and as measured [s, rad, rad/s], outputs."""
+
+    time: float
+    target_q: tuple[float, ...]
+    target_qd: tuple[float, ...]
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    digital_outputs: int
+
+
+class RtdeBytes:
+    """The real-time data exchange (30004) without its socket: what to send, and rows of data."""
+
+    _OUTPUTS = 'timestamp,target_q,target_qd,actual_q,actual_qd,actual_digital_output_bits'
+    _LAYOUT = struct.Struct('>B25dQ')
+    _VERSION, _SETUP, _START, _DATA = b'VOSU'
+
+    def __init__(self) -> None:
+        self._received = bytearray()
+
+    def requests(self, frequency: float) -> bytes:
+        """Ask for version 2 of the protocol, the outputs so many times a second, and the start."""
+
+        def frame(kind: int, body: bytes = b'') -> bytes:
+            return struct.pack('>HB', 3 + len(body), kind) + body
+
+        setup = struct.pack('>d', frequency) + self._OUTPUTS.encode()
+        version = struct.pack('>H', 2)
+        return frame(self._VERSION, version) + frame(self._SETUP, setup) + frame(self._START)
+
+    def feed(self, data: bytes) -> list[RtdeRow]:
+        """Return the rows that are complete now."""
+        self._received += data
+        rows, start = [], 0
+        while len(self._received) >= start + 3:
+            size, kind = struct.unpack_from('>HB', self._received, start)
+            if len(self._received) < start + size:
+                break
+            body = self._received[start + 3 : start + size]
+            if kind == self._DATA:
+                _, time_, *values, outputs = self._LAYOUT.unpack(body)
+                joints = (tuple(values[i : i + 6]) for i in range(0, 24, 6))
+                rows.append(RtdeRow(time_, *joints, outputs))
+            elif kind == self._SETUP:
+                assert b'NOT_FOUND' not in body, body
+            start += size
+        del self._received[:start]
+        return rows
+
+
+class PlainRtde:
+    """RTDE through a socket: the rows of a thread that reads until the end."""
+
+    def __init__(self, host: str, port: int, frequency: float) -> None:
+        self.rows: list[RtdeRow] = []
+        self._codec = RtdeBytes()
+        self._socket = socket.create_connection((host, port), timeout=TIMEOUT)
+        self._socket.sendall(self._codec.requests(frequency))
+        self._thread = threading.Thread(target=self._read)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.shutdown(socket.SHUT_RDWR)
+        self._thread.join()
+        self._socket.close()
+
+    def _read(self) -> None:
+        while data := self._socket.recv(1 << 16):
+            self.rows += self._codec.feed(data)

@@ -49,14 +49,14 @@ class Case:
 def random_case(arm: Arm, number: int) -> Case:
     """Return the goal of a number; the families take turns."""
     family = FAMILIES[number % len(FAMILIES)]
-    draw = _Draw(arm, np.random.default_rng([number, *arm.model.name.encode()]))
+    draw = GoalDraw(arm, np.random.default_rng([number, *arm.model.name.encode()]))
     family(draw)
     return Case(
         family=family.__name__.strip('_'), q=draw.q, T_flange_tcp=draw.tool, goal=draw.goal()
     )
 
 
-class _Draw:
+class GoalDraw:
     """A goal under construction: points are added to the end."""
 
     def __init__(self, arm: Arm, rng: np.random.Generator) -> None:
@@ -134,7 +134,7 @@ class _Draw:
     def shifted(self, size: float, turn: float = 0.3) -> Pose:
         """Return the last point moved that far [m] in any direction, and turned up to [rad]."""
         return Pose(
-            tuple(np.array(self.pose.position) + size * self.direction()),
+            tuple((np.array(self.pose.position) + size * self.direction()).tolist()),
             self.turn(turn, self.pose.quaternion),
         )
 
@@ -146,7 +146,7 @@ class _Draw:
         vector = self.direction() * self.rng.uniform(0.0, max_angle)
         return (
             Pose((0.0,) * 3, before)
-            @ Pose((0.0,) * 3, quaternion_from_rotation_vector(tuple(vector)))
+            @ Pose((0.0,) * 3, quaternion_from_rotation_vector(tuple(vector.tolist())))
         ).quaternion
 
     def sign(self) -> float:
@@ -206,7 +206,7 @@ class _Draw:
 # -- the families ---------------------------------------------------------------------------------
 
 
-def _free(draw: _Draw) -> None:
+def _free(draw: GoalDraw) -> None:
     """Some moves of all kinds in the middle of the workspace."""
     kinds = (*STRAIGHT, JOINT, SegmentType.OPTIMIZED_JOINT)
     for _ in range(draw.rng.integers(1, 5)):
@@ -216,7 +216,7 @@ def _free(draw: _Draw) -> None:
         draw.add_at(q, kind, some if draw.rng.random() < 0.3 else ANY)
 
 
-def _arcs(draw: _Draw) -> None:
+def _arcs(draw: GoalDraw) -> None:
     """Arcs, some of them large."""
     for _ in range(draw.rng.integers(1, 3)):
         size = draw.rng.uniform(0.03, 0.3) * draw.size
@@ -224,7 +224,7 @@ def _arcs(draw: _Draw) -> None:
         draw.add(draw.shifted(size), CIRCULAR, via=via)
 
 
-def _reach(draw: _Draw) -> None:
+def _reach(draw: GoalDraw) -> None:
     """From a nearly stretched arm outwards, beyond the reach or not."""
     q = draw.anywhere()
     q[2] = draw.sign() * draw.rng.uniform(0.1, 0.8)
@@ -243,7 +243,7 @@ def _reach(draw: _Draw) -> None:
         draw.add(draw.shifted(0.1 * draw.size), LINEAR)
 
 
-def _range(draw: _Draw) -> None:
+def _range(draw: GoalDraw) -> None:
     """Towards the end of a joint's range, beyond it or not, on a straight line or an arc."""
     limited = [i for i, (_, high) in enumerate(draw.arm.model.position_limits) if high < 100.0]
     joint = draw.rng.choice(limited)
@@ -261,7 +261,7 @@ def _range(draw: _Draw) -> None:
         draw.add(draw.shifted(0.05 * draw.size))
 
 
-def _wrist(draw: _Draw) -> None:
+def _wrist(draw: GoalDraw) -> None:
     """Past a straight wrist, with and without the posture of the other side."""
     q = draw.anywhere()
     side = draw.sign()
@@ -274,7 +274,7 @@ def _wrist(draw: _Draw) -> None:
     draw.add_at(target, None, some if draw.rng.random() < 0.4 else ANY)
 
 
-def _through_the_wrist(draw: _Draw) -> None:
+def _through_the_wrist(draw: GoalDraw) -> None:
     """
     So near to a straight wrist that the forearm swings round: 10 urad to 0.1 rad beside it.
 
@@ -292,7 +292,7 @@ def _through_the_wrist(draw: _Draw) -> None:
     draw.add(Pose(tuple(np.array(middle.position) + step), tilted))
 
 
-def _column(draw: _Draw) -> None:
+def _column(draw: GoalDraw) -> None:
     """Past the column over the base, into which the centre of the wrist cannot go."""
     q = draw.anywhere()
     arm = draw.arm
@@ -316,7 +316,7 @@ def _column(draw: _Draw) -> None:
     draw.add(ends[1])
 
 
-def _column_arc(draw: _Draw) -> None:
+def _column_arc(draw: GoalDraw) -> None:
     """The same in a bend."""
     _column(draw)
     end = draw.waypoints.pop().pose
@@ -331,7 +331,7 @@ def _column_arc(draw: _Draw) -> None:
     draw.add(end, CIRCULAR, via=via)
 
 
-def _joint(draw: _Draw) -> None:
+def _joint(draw: GoalDraw) -> None:
     """Joint moves with all postures, turns included, also to where nothing is."""
     for _ in range(draw.rng.integers(1, 4)):
         q = draw.moved(1.2)
@@ -347,7 +347,7 @@ def _joint(draw: _Draw) -> None:
         draw.add(Pose(tuple(out), draw.pose.quaternion), JOINT)
 
 
-def _other_branch(draw: _Draw) -> None:
+def _other_branch(draw: GoalDraw) -> None:
     """A straight move with the posture of another solution of the same pose."""
     q = draw.moved(0.3)
     found = solutions(draw.arm, draw.arm.forward(tuple(q)))
@@ -357,13 +357,13 @@ def _other_branch(draw: _Draw) -> None:
     )
 
 
-def _mixed(draw: _Draw) -> None:
+def _mixed(draw: GoalDraw) -> None:
     """Joint moves and straight ones in turn, with blends between them."""
     for i in range(draw.rng.integers(2, 5)):
         draw.add_at(draw.moved(0.5), (LINEAR, JOINT)[i % 2])
 
 
-def _corners(draw: _Draw) -> None:
+def _corners(draw: GoalDraw) -> None:
     """Blends where corners are near to something: a stretched arm, a straight wrist."""
     q = draw.anywhere()
     q[draw.rng.choice((2, 4))] = draw.sign() * draw.rng.uniform(0.05, 0.5)
@@ -372,7 +372,7 @@ def _corners(draw: _Draw) -> None:
         draw.add_at(draw.moved(0.4), (LINEAR, JOINT, PROCESS)[draw.rng.integers(3)])
 
 
-def _long(draw: _Draw) -> None:
+def _long(draw: GoalDraw) -> None:
     """Straight through the workspace from one random place to another."""
     draw.add_at(draw.anywhere(), (LINEAR, LINEAR, JOINT)[draw.rng.integers(3)])
 

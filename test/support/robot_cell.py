@@ -5,7 +5,7 @@ A cell in virtual time: simulated controller, robot loop, and its owner, in one 
 
 The robot loop is the one of the driver with all its sockets, the controller the one behind
 ``ur-cartesian sim``; only time and network are those of :mod:`virtual_network`. Cycles take 8 ms,
-as those of a CB3 robot, because each costs computing time.
+as those of a CB3 robot, because each costs computing time, unless a test chooses its robot.
 
 With the environment variable ``THREADS='delay N'`` new threads of the robot program begin N cycles
 later, and with ``THREADS='seed N'`` its threads take turns at random. With ``IMPERFECT=N`` the arm
@@ -148,14 +148,15 @@ class Owner:
 class RobotCell:
     """Simulated controller, robot loop and owner; used inside :func:`run_cell`."""
 
-    def __init__(self, loop, *, headless, settings, threads='', imperfect=''):
+    def __init__(self, loop, *, headless, settings, threads='', imperfect='', robot=None):
         self.loop, self.headless = loop, headless
         self._settings = settings
-        self._simulator = thread_schedule(threads)
+        self._simulator = {'frequency': 1.0 / CYCLE} | thread_schedule(threads) | (robot or {})
         #: Longest time between two RTDE packets of a robot without faults [s].
         self.max_packet_gap = CYCLE
         if imperfect:
-            imperfections = typical_imperfections(UR5E, int(imperfect))
+            model = robot_model(self._simulator.get('model', UR5E.name))
+            imperfections = typical_imperfections(model, int(imperfect))
             self._simulator['imperfections'] = imperfections
             self.max_packet_gap *= 1 + imperfections.max_skipped
         self.owner = Owner()
@@ -170,7 +171,6 @@ class RobotCell:
         """Start the robot, then the robot loop; return when a goal can run."""
         await self.start_robot(
             SimulatorConfig(
-                frequency=1.0 / CYCLE,
                 remote_control=self.headless,
                 unlock_delay=0.05,
                 power_on_time=0.05,
@@ -184,6 +184,7 @@ class RobotCell:
         self.config = DriverConfig(
             **{
                 'headless_mode': self.headless,
+                'ur_type': self.robot.config.model,
                 'node_timeout': NODE_TIMEOUT,
                 'io_publish_rate': 5.0,
             }
@@ -208,7 +209,7 @@ class RobotCell:
     async def start_robot(self, config):
         """Start the controller, or another one in the place of one that has crashed."""
         self.robot = SimulatedRobot(
-            config, sockets=ProgramNetwork(self.loop), clock=LoopClock(self.loop, CYCLE)
+            config, sockets=ProgramNetwork(self.loop), clock=LoopClock(self.loop, config.cycle)
         )
         self.robot_task = asyncio.create_task(self.robot.run())
         await asyncio.sleep(0)
@@ -332,6 +333,7 @@ def run_cell(
     headless: bool = True,
     threads: str = os.environ.get('THREADS', ''),
     imperfect: str | None = None,
+    robot: dict[str, Any] | None = None,
     **settings: Any,
 ) -> T:
     """
@@ -340,13 +342,22 @@ def run_cell(
     :param threads: how the controller schedules threads, see :func:`thread_schedule`.
     :param imperfect: seed of the imperfections of the arm, empty = it has none; by default that of
         the environment.
+    :param robot: fields of the simulator's configuration: model, frequency, geometry, ...
     """
     if imperfect is None:
         imperfect = os.environ.get('IMPERFECT', '')
     loop = VirtualLoop()
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
         return runner.run(
-            _run(loop, scenario, headless, settings, threads=threads, imperfect=imperfect)
+            _run(
+                loop,
+                scenario,
+                headless,
+                settings,
+                threads=threads,
+                imperfect=imperfect,
+                robot=robot,
+            )
         )
 
 

@@ -1,0 +1,463 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Judge from outside what an arm did with a goal: RTDE's joints against the tests' own geometry.
+
+Every bound is a promise of the documents, or the resolution of wire and cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
+
+from goal_geometry import ARM, Arc, JointLine, Kinematics, poses_apart, straight_curve, targets
+import numpy as np
+from plain_clients import RtdeRow
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType
+
+#: Speeds may be exceeded by this share.
+OVER = 0.02
+#: A point is reached within this [m], a turn at ARM: micrometres on the wire, three axes.
+REACH = 5e-6
+#: So near is a line or an arc followed [m], [rad].
+PATH, PATH_TURN = 2e-5, 3e-4
+#: An arc with FIXED orientation may arrive this far off [rad].
+FIXED_TURN = 0.006
+#: Spline: the tolerance of its joints [m], beside what a cycle adds [s].
+SPLINE, SPLINE_TIME = 5e-5, 0.002
+#: SERVO: what the lag of servoj adds [s], and how far it leaves the path [m], [rad].
+SERVO_LAG, SERVO_PATH, SERVO_END = 0.15, 2.5e-3, 3e-4
+#: Times are kept within so many cycles and this share ...
+CYCLES, SHARE = 3.0, 0.002
+#: ... and the first motion of a program loses 80 ms, recorded on real arms [s].
+START_RAMP = 0.09
+#: In a blend nobody knows where the robot is when: the time for so many radii.
+BLEND_SHARE = 1.0
+#: The arm rests no farther from its target [rad]: static errors, noise and resolution.
+STATIC = 1e-3
+#: The outputs switch within so many cycles of the way of the tool, and this [m].
+OUTPUT_CYCLES, OUTPUT_PLACE = 4, 1e-3
+_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+_JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Promise:
+    """What the driver said of an accepted goal, in numbers."""
+
+    #: How it is executed.
+    execution: ExecutionMode
+    #: Time of the whole motion [s], and when the tool is at each point [s].
+    duration: float
+    point_times: dict[int, float]
+    #: Joint positions at the end [rad].
+    joints: tuple[float, ...]
+    #: Whether the goal's own times were given up (on_too_fast: slow).
+    slowed: bool
+    #: By point: lines that became joint motions.
+    joint_moves: frozenset[int]
+    radii: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A goal, what was promised, and the record of what happened."""
+
+    goal: Goal
+    promise: Promise
+    arm: Kinematics
+    joint_speeds: tuple[float, ...]
+    max_tool_speed: float
+    cycle: float
+    #: The arm before: joints [rad]; when the goal was sent, on the controller's clock [s].
+    q: tuple[float, ...]
+    sent: float
+    rows: list[RtdeRow]
+    #: Whether it is the first path of its program.
+    is_first: bool
+    succeeded: bool
+    outcome: str
+
+
+@dataclass
+class _Passage:
+    """When the tool is at a point: rows of arrival and departure."""
+
+    arrive: int
+    depart: int
+    q: np.ndarray
+
+
+@dataclass
+class Judge:
+    """The rows of a run as arrays, and what is wrong with them."""
+
+    run: Run
+    wrong: list[tuple[str, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        rows = self.run.rows
+        self.t = np.array([row.time for row in rows])
+        self.q = np.array([row.target_q for row in rows])
+        self.actual = np.array([row.q for row in rows])
+        self.tool = self.run.arm.tool(self.q)
+        self.p = self.tool[:, :3, 3]
+        moved = np.abs(np.diff(self.q, axis=0)).max(axis=1) > 1e-10
+        self.begin = int(np.argmax(moved)) if moved.any() else 0
+        self.end = len(moved) - int(np.argmax(moved[::-1])) if moved.any() else 0
+        self.moves = bool(moved.any())
+        goal = self.run.goal
+        self.targets = targets(goal)
+        self.is_timed = any(point.time for point in goal.waypoints)
+        # A first point where the arm stands is no sign of the start.
+        start = self.run.arm.tool(np.array(self.run.q))[0]
+        distance, turn = poses_apart(start, self.targets[0])
+        self.start = start
+        self.waits = bool(distance + ARM * turn < 2e-5)
+        self.zero = self.run.sent if self.waits else self.t[self.begin]
+
+    def say(self, kind: str, text: str) -> None:
+        self.wrong.append((kind, text))
+
+    def judge(self) -> list[tuple[str, str]]:
+        """Return what is wrong: its kind and a sentence."""
+        run = self.run
+        self._speeds()
+        if not run.succeeded:
+            self.say('not successful', run.outcome)
+            return self.wrong
+        if not self.moves:
+            distance, turn = poses_apart(self.tool[-1], self.targets[-1])
+            if distance + ARM * turn > 2 * REACH:
+                self.say('end', f'nothing moves, and the end is {1e3 * distance:.4f} mm away')
+            return self.wrong
+        self._end()
+        if run.promise.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
+            self._spline()
+            if run.promise.execution == ExecutionMode.SPLINE:
+                self._duration(0.0)
+        else:
+            passages = self._passages()
+            self._paths(passages)
+            self._times(passages)
+            self._outputs(passages)
+        return self.wrong
+
+    # -- limits ----------------------------------------------------------------------------------
+
+    def _speeds(self) -> None:
+        run, dt = self.run, np.diff(self.t)
+        speed = np.linalg.norm(np.diff(self.p, axis=0), axis=1) / dt
+        self.speed = np.concatenate([speed, [0.0]])
+        bound = run.max_tool_speed
+        if bound > 0.0 and speed.max() > bound * (1.0 + OVER):
+            at = int(np.argmax(speed))
+            self.say(
+                'tool speed',
+                f'{speed[at]:.4f} m/s at {self.t[at] - self.zero:.3f} s, {bound:g} allowed',
+            )
+        # As measured: over 0.1 s, in which noise counts little.
+        n = max(1, round(0.1 / run.cycle))
+        if bound > 0.0 and len(self.t) > n:
+            p = run.arm.tool(self.actual)[:, :3, 3]
+            measured = np.linalg.norm(p[n:] - p[:-n], axis=1) / (self.t[n:] - self.t[:-n])
+            if measured.max() > bound * (1.0 + OVER) + 0.005:
+                self.say('measured speed', f'{measured.max():.4f} m/s, {bound:g} allowed')
+        joints = np.abs(np.diff(self.q, axis=0)) / dt[:, None]
+        share = joints / np.array(run.joint_speeds)
+        if share.max() > 1.0 + OVER:
+            row, k = np.unravel_index(np.argmax(share), share.shape)
+            self.say(
+                'joint speed',
+                f'{JOINT_NAMES[k]} {joints[row, k]:.3f} rad/s at '
+                f'{self.t[row] - self.zero:.3f} s, {run.joint_speeds[k]:.3f} allowed',
+            )
+        outside = ~run.arm.within(self.q, 1e-5)
+        if outside.any():
+            self.say('joint range', f'{self.q[int(np.argmax(outside))].round(4).tolist()}')
+
+    def _end(self) -> None:
+        goal, last = self.run.goal, len(self.targets) - 1
+        servo = self.run.promise.execution == ExecutionMode.SERVO
+        spline = self.run.promise.execution == ExecutionMode.SPLINE
+        bound = SERVO_END if servo else SPLINE if spline else 2.0 * REACH
+        distance, turn = poses_apart(self.tool[-1], self.targets[-1])
+        turn_bound = bound / ARM
+        if goal.segments and goal.segments[last].arc_mode == ArcMode.FIXED:
+            turn, turn_bound = 0.0, FIXED_TURN  # judged with its path
+        if distance > bound or turn > turn_bound:
+            self.say('end', f'{1e3 * distance:.4f} mm and {turn:.5f} rad off')
+        off = float(np.abs(self.actual[-1] - self.q[-1]).max())
+        if off > STATIC:
+            self.say('rest', f'a joint rests {off:.5f} rad beside its target')
+        off = float(np.abs(self.q[-1] - np.array(self.run.promise.joints)).max())
+        if off > 1e-3 + (SERVO_END if servo else 0.0):
+            self.say('promised joints', f'{off:.5f} rad off')
+        posture = goal.waypoints[last].posture
+        for name, value in zip(posture.names, posture.values, strict=True):
+            if abs(self.q[-1][JOINT_NAMES.index(name)] - value) > 0.01:
+                self.say('posture', f'{name} {self.q[-1][JOINT_NAMES.index(name)]:.3f}')
+
+    # -- times -----------------------------------------------------------------------------------
+
+    def _slack(self, time: float) -> float:
+        run = self.run
+        slack = CYCLES * run.cycle + SHARE * time + (START_RAMP if run.is_first else 0.0)
+        if self.waits:
+            slack += 3.0 * run.cycle
+        return slack
+
+    def _has_optimized(self, before: int | None = None) -> bool:
+        return any(segment.type in _OPTIMIZED for segment in self.run.goal.segments[:before])
+
+    def _duration(self, in_blends: float) -> None:
+        run = self.run
+        took = float(self.t[self.end] - self.zero)
+        if self._has_optimized():
+            return
+        wanted = {'promised': run.promise.duration}
+        if self.is_timed and not run.promise.slowed:
+            wanted['asked for'] = run.goal.waypoints[-1].time
+        for name, time in wanted.items():
+            if abs(took - time) > self._slack(time) + BLEND_SHARE * in_blends:
+                self.say(
+                    f'duration {name}',
+                    f'{took:.3f} s, {time:.3f} s {name}, {in_blends:.3f} s in blends',
+                )
+
+    def _times_in_blends(self, passages: list[_Passage]) -> list[float]:
+        """Return how long the tool is nearer to the points than their blends are wide [s]."""
+        times = []
+        for passage, target, radius in zip(
+            passages, self.targets, self.run.promise.radii, strict=False
+        ):
+            far = np.linalg.norm(self.p - target[:3, 3], axis=1) > radius
+            before = np.flatnonzero(far[: passage.arrive])
+            after = np.flatnonzero(far[passage.arrive :])
+            if radius > 0.0 and len(before) and len(after):
+                times.append(float(self.t[passage.arrive + after[0]] - self.t[before[-1]]))
+            else:
+                times.append(0.0)
+        return times
+
+    def _passages(self) -> list[_Passage]:
+        found: list[_Passage] = []
+        row = self.begin if not self.waits else 0
+        last = len(self.targets) - 1
+        for i, target in enumerate(self.targets):
+            radius = self.run.promise.radii[i]
+            fixed = bool(
+                self.run.goal.segments and self.run.goal.segments[i].arc_mode == ArcMode.FIXED
+            )
+            distance, turn = poses_apart(self.tool[row:], target)
+            d = distance if radius > 0.0 or fixed else distance + ARM * turn
+            reach = 2.0 * REACH + radius
+            least = np.minimum.accumulate(d)
+            passed = np.flatnonzero((least <= reach) & (d > least + 1.5e-6))
+            if i == last or not len(passed):
+                if least[-1] > reach:
+                    self.say(
+                        'missed point', f'{i}: {1e3 * least[-1]:.4f} mm, {1e3 * radius:.3f} blend'
+                    )
+                    return found
+                passed = np.array([len(d) - 1])
+            best = least[passed[0]]
+            near = np.flatnonzero(d[: passed[0] + 1] <= best + 1e-6)
+            arrive, depart = row + int(near[0]), row + int(near[-1])
+            q, _ = self.run.arm.solve(target, self.q[arrive])
+            found.append(_Passage(arrive, depart, self.q[arrive] if fixed else q[0]))
+            row = arrive if radius > 0.0 else depart
+        return found
+
+    def _times(self, passages: list[_Passage]) -> None:
+        run, in_blends = self.run, self._times_in_blends(passages)
+        self._duration(sum(in_blends))
+        for i, passage in enumerate(passages[:-1]):
+            if self._has_optimized(i + 1):
+                return
+            arrive = float(self.t[passage.arrive] - self.zero)
+            depart = float(self.t[passage.depart] - self.zero)
+            wanted = {'promised': run.promise.point_times.get(i)}
+            if self.is_timed and not run.promise.slowed:
+                wanted['asked for'] = run.goal.waypoints[i].time
+            for name, time in wanted.items():
+                if time is None:
+                    continue
+                slack = self._slack(time) + BLEND_SHARE * sum(in_blends[: i + 1])
+                if arrive > time + slack or depart < time - slack:
+                    self.say(
+                        f'time {name}',
+                        f'point {i}: {arrive:.3f} to {depart:.3f} s, {time:.3f} s {name}'
+                        f', {sum(in_blends[: i + 1]):.3f} s in blends',
+                    )
+
+    # -- paths -----------------------------------------------------------------------------------
+
+    def _paths(self, passages: list[_Passage]) -> None:
+        goal, start, q = self.run.goal, self.start, np.array(self.run.q)
+        row, radius_before = self.begin, 0.0
+        for i, passage in enumerate(passages):
+            kind = goal.segments[i].type if goal.segments else SegmentType.LINEAR
+            radius = self.run.promise.radii[i]
+            is_joint = kind in _JOINT or i in self.run.promise.joint_moves
+            curve: Any = (
+                JointLine(self.run.arm, q, passage.q)
+                if is_joint
+                else straight_curve(goal, i, start)
+            )
+            poses = self.tool[row : passage.depart + 1]
+            outside = np.ones(len(poses), dtype=bool)
+            for point, size in ((start, radius_before), (self.targets[i], radius)):
+                if size > 0.0:
+                    apart = np.linalg.norm(poses[:, :3, 3] - point[:3, 3], axis=1)
+                    outside &= apart > size + PATH
+            if outside.any():
+                self._path(i, curve, row + np.flatnonzero(outside))
+            start = curve.end if isinstance(curve, Arc) else self.targets[i]
+            row, radius_before, q = passage.arrive, radius, passage.q
+
+    def _path(self, i: int, curve: Any, rows: np.ndarray) -> None:
+        poses = self.tool[rows]
+        bound, turn_bound = PATH, PATH_TURN
+        if isinstance(curve, JointLine):
+            way = curve.q_end - curve.q_start
+            u = np.clip((self.q[rows] - curve.q_start) @ way / max(way @ way, 1e-18), 0.0, 1.0)
+            bound, turn_bound = 2e-4, 1e-3
+        else:
+            u = curve.fractions(poses)
+            if isinstance(curve, Arc):
+                near = min(
+                    np.linalg.norm(curve.via[:3, 3] - T[:3, 3])
+                    for T in (curve.start, curve.target)
+                )
+                bound += 5e-6 * curve.length / near
+                turn_bound = FIXED_TURN if curve.fixed else turn_bound
+            turn_bound += curve.angle * 3e-6 / max(curve.length, 3e-6)
+        distance, turn = poses_apart(poses, curve.at(u))
+        if distance.max() > bound or turn.max() > turn_bound:
+            self.say(
+                'path',
+                f'to point {i} ({type(curve).__name__}, {1e3 * curve.length:.2f} mm, '
+                f'{curve.angle:.4f} rad): {1e3 * distance.max():.4f} mm and {turn.max():.5f} rad '
+                'off',
+            )
+
+    def _spline(self) -> None:
+        run, goal = self.run, self.run.goal
+        if run.promise.slowed:
+            return
+        servo = run.promise.execution == ExecutionMode.SERVO
+        # When it begins is known to a cycle: the time that fits all points best counts.
+        times = np.array([point.time for point in goal.waypoints])
+        shifts = np.arange(-2.0, 2.01, 0.25) * run.cycle
+        if servo or run.is_first or self.waits:
+            shifts = np.arange(-0.02, SERVO_LAG, 0.25 * run.cycle)
+        worst = None
+        for shift in shifts:
+            at = np.minimum(self.zero + shift + times, self.t[-1])
+            q = np.stack([_interpolate(at, self.t, self.q[:, k]) for k in range(6)], axis=1)
+            distance, turn = poses_apart(run.arm.tool(q), np.array(self.targets))
+            size = distance + ARM * turn
+            if worst is None or size.max() < worst[0] - 1e-6:
+                worst = size.max(), int(np.argmax(size)), distance, turn, shift
+        assert worst is not None
+        _, i, distance, turn, shift = worst
+        speed = max(float(np.linalg.norm(np.nan_to_num(p.twist[:3]))) for p in goal.waypoints)
+        rate = max(float(np.linalg.norm(np.nan_to_num(p.twist[3:]))) for p in goal.waypoints)
+        bound = (SERVO_PATH if servo else SPLINE + 1e-5) + 0.25 * run.cycle * speed
+        turn_bound = (SERVO_PATH if servo else SPLINE + 1e-5) / ARM + 0.25 * run.cycle * rate
+        if distance[i] > bound or turn[i] > turn_bound:
+            self.say(
+                'spline point',
+                f'{i}: {1e3 * distance[i]:.4f} mm and {turn[i]:.5f} rad off at its time'
+                f' (+ {1e3 * shift:.1f} ms)',
+            )
+        has_accelerations = any(any(point.acceleration) for point in goal.waypoints)
+        if has_accelerations or not all(
+            isfinite(value) for point in goal.waypoints for value in point.twist
+        ):
+            return
+        # The positions are a cubic from point to point.
+        R = np.array(_rotation_of(goal))
+        places = np.array([self.start[:3, 3], *(T[:3, 3] for T in self.targets)])
+        twists = np.array([[0.0] * 3, *(R @ np.array(p.twist[:3]) for p in goal.waypoints)])
+        knots = np.array([0.0, *times])
+        if times[0] == 0.0:
+            places, twists, knots = places[1:], twists[1:], knots[1:]
+        # What the doubt about the start makes of the way along the path.
+        along = 0.25 * run.cycle * self.speed
+        off = min(
+            float(
+                (
+                    np.linalg.norm(
+                        self.p - _hermite(self.t - self.zero - shift, knots, places, twists), axis=1
+                    )
+                    - along
+                ).max()
+            )
+            for shift in shifts
+        )
+        if off > (SERVO_PATH if servo else SPLINE + 1e-5):
+            self.say('spline path', f'{1e3 * off:.4f} mm off')
+
+    def _outputs(self, passages: list[_Passage]) -> None:
+        goal, outputs = self.run.goal, np.array([row.digital_outputs for row in self.run.rows])
+        for command in goal.io_commands:
+            if sum(other.pin == command.pin for other in goal.io_commands) > 1:
+                continue
+            if command.waypoint >= len(passages):
+                continue
+            on = (outputs >> command.pin) & 1
+            if on[-1] != command.value:
+                self.say('output', f'{command.pin} is not {command.value:g} at the end')
+            changed = np.flatnonzero(np.diff(on))
+            if not len(changed):
+                continue
+            row, radius = int(changed[0]), self.run.promise.radii[command.waypoint]
+            distance, _ = poses_apart(self.tool[row], self.targets[command.waypoint])
+            way = OUTPUT_CYCLES * self.run.cycle * float(self.speed[max(row - 3, 0) : row + 1].max())
+            if distance > radius + way + OUTPUT_PLACE:
+                self.say('output', f'{command.pin} switches {1e3 * distance:.3f} mm off its point')
+
+
+def _interpolate(at, t, x):
+    """Return values of a cubic through the four samples around times."""
+    i = np.clip(np.searchsorted(t, at) - 2, 0, max(len(t) - 4, 0))
+    result = np.zeros(len(at))
+    for a in range(min(4, len(t))):
+        weight = np.ones(len(at))
+        for b in range(min(4, len(t))):
+            if a != b:
+                weight *= (at - t[i + b]) / (t[i + a] - t[i + b])
+        result += weight * x[i + a]
+    return result
+
+
+def _rotation_of(goal: Goal):
+    from forward_model import pose_matrix
+
+    return pose_matrix(goal.T_base_frame)[:3, :3]
+
+
+def _hermite(at, knots, places, twists):
+    at = np.clip(at, knots[0], knots[-1])
+    k = np.clip(np.searchsorted(knots, at, side='right') - 1, 0, len(knots) - 2)
+    h = (knots[k + 1] - knots[k])[:, None]
+    s = ((at - knots[k])[:, None]) / h
+    return (
+        (2 * s**3 - 3 * s**2 + 1) * places[k]
+        + (s**3 - 2 * s**2 + s) * h * twists[k]
+        + (-2 * s**3 + 3 * s**2) * places[k + 1]
+        + (s**3 - s**2) * h * twists[k + 1]
+    )
+
+
+def judge(run: Run) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with a run: its kind, and a sentence."""
+    yield from Judge(run).judge()
