@@ -35,6 +35,8 @@ SPLINE, SPLINE_TIME = 5e-5, 0.002
 SERVO_LAG, SERVO_PATH, SERVO_END = 0.15, 2.5e-3, 3e-4
 #: Times are kept within so many cycles and this share ...
 CYCLES, SHARE = 3.0, 0.002
+#: ... a spline that brakes hard at its end needs some more to come to rest ...
+SPLINE_CYCLES = 8.0
 #: ... and the first motion of a program loses 80 ms, recorded on real arms [s].
 START_RAMP = 0.09
 #: In a blend nobody knows where the robot is when: the time for so many radii.
@@ -208,7 +210,9 @@ class Judge:
 
     def _slack(self, time: float) -> float:
         run = self.run
-        slack = CYCLES * run.cycle + SHARE * time + (START_RAMP if run.is_first else 0.0)
+        is_spline = run.promise.execution == ExecutionMode.SPLINE
+        cycles = SPLINE_CYCLES if is_spline else CYCLES
+        slack = cycles * run.cycle + SHARE * time + (START_RAMP if run.is_first else 0.0)
         if self.waits:
             slack += 3.0 * run.cycle
         return slack
@@ -279,7 +283,8 @@ class Judge:
         run, in_blends = self.run, self._times_in_blends(passages)
         self._duration(sum(in_blends))
         for i, passage in enumerate(passages[:-1]):
-            if self._has_optimized(i + 1):
+            blended = run.promise.radii[i] > 0.0
+            if self._has_optimized(i + 1 + blended):
                 return
             arrive = float(self.t[passage.arrive] - self.zero)
             depart = float(self.t[passage.depart] - self.zero)

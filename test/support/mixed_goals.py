@@ -182,6 +182,14 @@ class MixedDraw(GoalDraw):
                 kind = self.segments[i].type
                 if kind in _OPTIMIZED:
                     kind = TYPE.LINEAR if kind == TYPE.OPTIMIZED_LINEAR else TYPE.JOINT
+                # Such a time is refused, whatever it is.
+                may_lead = kind not in (TYPE.PROCESS, TYPE.CIRCULAR) or self.chance(0.1)
+                if before.angle_to(point.pose) > before.distance_to(point.pose) and not may_lead:
+                    kind = TYPE.LINEAR
+                if kind != TYPE.CIRCULAR:
+                    self.segments[i] = replace(
+                        self.segments[i], via=None, arc_mode=ArcMode.UNCONSTRAINED
+                    )
                 self.segments[i] = replace(
                     self.segments[i],
                     type=kind,
