@@ -15,8 +15,17 @@ from math import inf, sqrt
 import re
 from typing import Any
 
-from forward_model import turn_between
-from goal_geometry import Arc, JointLine, Kinematics, Line, straight_curve, targets
+from forward_model import pose_matrix, turn_between
+from goal_geometry import (
+    Arc,
+    axis_angle,
+    JointLine,
+    Kinematics,
+    Line,
+    rotation,
+    straight_curve,
+    targets,
+)
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -218,15 +227,13 @@ def _blend_in_a_cycle(refused: Refused) -> str:
 
 def _arc(refused: Refused) -> str:
     i = refused.index
-    start = (
-        refused.arm.tool(np.array(refused.q))[0] if i == 0 else targets(refused.goal)[i - 1]
-    )
+    start = refused.arm.tool(np.array(refused.q))[0] if i == 0 else targets(refused.goal)[i - 1]
     if i:
         before = _curve(refused, i - 1)
         start = before.end
     arc = straight_curve(refused.goal, i, start)
     a, b, c = (T[:3, 3] for T in (arc.start, arc.via, arc.target))
-    chord = np.linalg.norm(c - a)
+    chord = float(np.linalg.norm(c - a))
     height = np.linalg.norm(np.cross(b - a, c - a)) / max(chord, 1e-12)
     if height < 1.1e-5 or chord < 2e-6:
         return ''
@@ -235,12 +242,9 @@ def _arc(refused: Refused) -> str:
     # Round the three points to micrometres and see where the tool arrives.
     rng, worst = np.random.default_rng(0), 0.0
     for _ in range(300):
-        moved = []
-        for T in (arc.start, arc.via, arc.target):
-            shaken = T.copy()
-            shaken[:3, 3] += rng.choice((-0.5e-6, 0.5e-6), 3)
-            moved.append(shaken)
-        other = Arc(*moved, True)
+        shaken = np.array([arc.start, arc.via, arc.target])
+        shaken[:, :3, 3] += rng.choice((-0.5e-6, 0.5e-6), (3, 3))
+        other = Arc(shaken[0], shaken[1], shaken[2], True)
         worst = max(worst, float(turn_between(other.end[:3, :3], arc.end[:3, :3])))
     return '' if worst > 0.3 * 0.005 else f'rounding turns the tool by {worst} rad'
 
@@ -297,8 +301,6 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
     goal, arm = refused.goal, refused.arm
     base = targets(goal)
     start = arm.tool(np.array(refused.q))[0]
-    from forward_model import pose_matrix
-
     R = pose_matrix(goal.T_base_frame)[:3, :3]
     twists = np.array([[0.0] * 6, *(p.twist for p in goal.waypoints)])
     accelerations = np.array([[0.0] * 6, *(p.acceleration for p in goal.waypoints)])
@@ -320,7 +322,7 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
         h = times[k + 1] - times[k]
         a, b = poses[k], poses[k + 1]
         relative = a[:3, :3].T @ b[:3, :3]
-        axis, angle = _log(relative)
+        axis, angle = axis_angle(relative)
         phi = axis * angle
         rates = [
             (R @ twists[k + n, :3], R @ accelerations[k + n, :3], R @ twists[k + n, 3:])
@@ -332,7 +334,14 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
         n = max(40, int(3.0 * np.linalg.norm(b[:3, 3] - a[:3, 3]) / STEP))
         s = np.linspace(0.0, 1.0, n)
         p = _polynomial(
-            s * h, h, a[:3, 3], rates[0][0], rates[0][1], b[:3, 3], rates[1][0], rates[1][1],
+            s * h,
+            h,
+            a[:3, 3],
+            rates[0][0],
+            rates[0][1],
+            b[:3, 3],
+            rates[1][0],
+            rates[1][1],
             quintic,
         )
         turn = _polynomial(s * h, h, zero, w0, zero, phi, w1, zero, quintic)
@@ -358,15 +367,7 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
     return SplineMotion(np.array(ts), np.array(qs), np.array(places), '')
 
 
-def _log(R):
-    from goal_geometry import axis_angle
-
-    return axis_angle(R)
-
-
 def _exp(v):
-    from goal_geometry import rotation
-
     angle = float(np.linalg.norm(v))
     return rotation(v / angle, angle)[0] if angle > 1e-12 else np.eye(3)
 
@@ -390,9 +391,7 @@ def _polynomial(t, h, p0, v0, a0, p1, v1, a1, quintic):
         for d in range(order):
             M.append(
                 [
-                    0.0
-                    if n < d
-                    else float(np.prod(range(n - d + 1, n + 1))) * end ** (n - d)
+                    0.0 if n < d else float(np.prod(range(n - d + 1, n + 1))) * end ** (n - d)
                     for n in range(2 * order)
                 ]
             )
@@ -465,10 +464,6 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
     if kind in (SegmentType.PROCESS, SegmentType.CIRCULAR):
         by_profile = least
     return by_profile, least
-
-
-#: How many refusals of times were for the profile only: with steeper ramps they could be met.
-STEEPER = ' (steeper ramps could)'
 
 
 def _time(refused: Refused) -> str:

@@ -33,7 +33,7 @@ def axis_angle(R):
     """Return the axis and the angle, at most pi, of a rotation."""
     angle = float(turn_between(R, np.eye(3)))
     if angle > 3.0:
-        values, vectors = np.linalg.eigh(0.5 * (R + R.T))
+        _, vectors = np.linalg.eigh(0.5 * (R + R.T))
         axis = vectors[:, -1]
         twice = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
         return (axis if twice @ axis >= 0.0 else -axis), angle

@@ -47,6 +47,8 @@ class RandomRobot:
     arm: Arm
     #: Seed of its imperfections; empty = it is ideal.
     imperfect: str
+    #: Cycles per second; those of an e-Series cost four times as much as those of a CB3.
+    frequency: float
     options: dict[str, Any]
 
     def __str__(self) -> str:
@@ -54,7 +56,8 @@ class RandomRobot:
         chosen = ', '.join(f'{name} {value}' for name, value in self.options.items())
         return (
             f'{self.arm.model.name}{", calibrated" if calibrated else ""}'
-            f'{", imperfect" if self.imperfect else ""}, {chosen}'
+            f'{", imperfect" if self.imperfect else ""}, '
+            f'{self.frequency:g} Hz, {chosen}'
         )
 
 
@@ -66,6 +69,7 @@ def random_robot(seed: int, number: int) -> RandomRobot:
     return RandomRobot(
         arm=Arm(model, geometry),
         imperfect=str(int(rng.integers(1, 1000))) if rng.random() < 0.3 else '',
+        frequency=500.0 if model.series != 'CB3' and rng.random() < 0.4 else 125.0,
         options={
             'max_tool_speed': float(rng.choice((0.25, 0.25, 0.25, 0.08, 0.6, 1.5))),
             'on_too_fast': str(rng.choice(('refuse', 'slow'))),
@@ -222,9 +226,7 @@ class MixedDraw(GoalDraw):
             if quintic:
                 value = self.rng.normal(size=6) * 0.1
                 acceleration = (nan,) * 6 if self.chance(0.5) else tuple(value.tolist())
-            self.waypoints[i] = replace(
-                self.waypoints[i], twist=twist, acceleration=acceleration
-            )
+            self.waypoints[i] = replace(self.waypoints[i], twist=twist, acceleration=acceleration)
 
     def _outputs(self) -> tuple[IOCommand, ...]:
         return tuple(
@@ -314,9 +316,10 @@ def _huge(draw: MixedDraw) -> None:
 def _patient(draw: MixedDraw) -> None:
     """A small motion in a long time."""
     draw.timed = True
-    draw.add(draw.shifted(draw.between(3e-4, 4e-3), 0.01), (TYPE.LINEAR, TYPE.JOINT)[
-        draw.rng.integers(2)
-    ])
+    draw.add(
+        draw.shifted(draw.between(3e-4, 4e-3), 0.01),
+        (TYPE.LINEAR, TYPE.JOINT)[draw.rng.integers(2)],
+    )
     draw.max_speed = 0.002
 
 

@@ -200,9 +200,8 @@ class RtdeBytes:
                 break
             body = self._received[start + 3 : start + size]
             if kind == self._DATA:
-                _, time_, *values, outputs = self._LAYOUT.unpack(body)
-                joints = (tuple(values[i : i + 6]) for i in range(0, 24, 6))
-                rows.append(RtdeRow(time_, *joints, outputs))
+                v = self._LAYOUT.unpack(body)
+                rows.append(RtdeRow(v[1], v[2:8], v[8:14], v[14:20], v[20:26], v[26]))
             elif kind == self._SETUP:
                 assert b'NOT_FOUND' not in body, body
             start += size
