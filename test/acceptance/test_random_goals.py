@@ -7,25 +7,32 @@ The goals run in virtual time through the robot loop of the driver and its robot
 records the joints, and a judge with kinematics and geometry of its own says what is wrong.
 
 ``RANDOM_GOALS`` is the number of goals, ``RANDOM_GOALS_SEED`` repeats a draw, and
-``RANDOM_GOALS_ONLY=ROBOT.GOAL`` runs one of its goals.
+``RANDOM_GOALS_ONLY=ROBOT.GOAL`` runs one of its goals. ``RANDOM_TCP_GOALS`` run through processes
+and TCP.
 """
 
 import asyncio
 from collections import Counter
+from contextlib import contextmanager
 from functools import partial
 import os
+import re
+import subprocess
 import time
 
 from goal_feasibility import is_right, Refused
 from goal_geometry import Kinematics
 from goal_judge import judge, Promise, Run, UNLIKE_BLENDS
 from mixed_goals import mixed_case, random_robot
-from plain_clients import RtdeBytes
+import numpy as np
+from plain_clients import PlainRtde, RtdeBytes
 import pytest
 from random_goals import Case
 from robot_cell import RTDE, run_cell
 from virtual_network import HOST
 
+from ur_cartesian_driver.cli.demo import process
+from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
@@ -42,6 +49,9 @@ ONLY = os.environ.get('RANDOM_GOALS_ONLY', '')
 GOALS_OF_A_ROBOT = 20
 #: Plans of longer motions are not run [s].
 MAX_DURATION = 8.0
+TCP_GOALS, GOALS_OF_A_DRIVER = int(os.environ.get('RANDOM_TCP_GOALS', '5')), 5
+#: Their robots are others; time is real there [s].
+FIRST_OF_TCP, MAX_TCP_DURATION = 1000, 2.5
 
 
 class Recorder(asyncio.Protocol):
@@ -99,21 +109,15 @@ class Session:
         motion = cell.owner.start(made)
         await cell.until(lambda: motion.outcome is not None, 3.0 * made.duration + 60.0)
         await cell.sleep(0.5 if self.robot.imperfect else 0.05)  # it may ring
-        model = self.arm.model
-        T_flange_tool = case.goal.T_flange_controlled or case.T_flange_tcp
-        return Run(
-            goal=case.goal,
-            promise=promise_of(made),
-            arm=Kinematics(self.arm.geometry, model.position_limits, T_flange_tool),
-            joint_speeds=model.max_joint_speed,
-            max_tool_speed=self.options.max_tool_speed,
+        return run_of(
+            self.robot,
+            case,
+            made,
+            list(self.recorder.rows),
+            motion.outcome,
             cycle=cell.robot.config.cycle,
-            q=case.q,
             sent=sent,
-            rows=list(self.recorder.rows),
             is_first=is_first,
-            succeeded=motion.outcome.succeeded,
-            outcome=f'{motion.outcome.code.name}: {motion.outcome.text}',
         )
 
 
@@ -152,6 +156,23 @@ def refused_goal(cell, robot, case, options, text):
         cycle=cell.robot.config.cycle,
         options=options,
         text=text,
+    )
+
+
+def run_of(robot, case, made, rows, outcome, **more):
+    model = robot.arm.model
+    T_flange_tool = case.goal.T_flange_controlled or case.T_flange_tcp
+    return Run(
+        goal=case.goal,
+        promise=promise_of(made),
+        arm=Kinematics(robot.arm.geometry, model.position_limits, T_flange_tool),
+        joint_speeds=model.max_joint_speed,
+        max_tool_speed=robot.options['max_tool_speed'],
+        q=case.q,
+        rows=rows,
+        succeeded=outcome.succeeded,
+        outcome=f'{outcome.code.name}: {outcome.text}',
+        **more,
     )
 
 
@@ -197,7 +218,6 @@ async def run_goals(cell, robot, number, left, counts, wrong):
             continue
         run = await session.run(case, made)
         counts['run'] += 1
-        counts[f'run: {made.execution.name}'] += 1
         if ONLY and os.environ.get('RANDOM_GOALS_SHOW'):
             print(
                 case.goal,
@@ -207,16 +227,21 @@ async def run_goals(cell, robot, number, left, counts, wrong):
                 cell.owner.log,
                 sep='\n',
             )
-        for kind, text in judge(run):
-            line = f'{name} ({case.family}; {robot}) {kind}: {text}'
-            counts[f'wrong: {kind}'] += 1
-            if kind != UNLIKE_BLENDS:
-                wrong.append(line)
-            elif os.environ.get('RANDOM_GOALS_SHOW'):
-                print('KNOWN', line)
+        count(run, f'{name} ({case.family}; {robot})', counts, wrong)
         if not run.succeeded:
             return left[left.index(k) + 1 :]
     return []
+
+
+def count(run, name, counts, wrong):
+    """Judge a run, and count what is wrong with it."""
+    counts[f'run: {run.promise.execution.name}'] += 1
+    for kind, text in judge(run):
+        counts[f'wrong: {kind}'] += 1
+        if kind != UNLIKE_BLENDS:
+            wrong.append(f'{name} {kind}: {text}')
+        elif os.environ.get('RANDOM_GOALS_SHOW'):
+            print('KNOWN', name, text)
 
 
 def drawn():
@@ -244,9 +269,109 @@ def test_promises_hold_for_random_goals(record_property):
                 run_goals, robot=robot, number=number, left=left, counts=counts, wrong=wrong
             )
             left = run_cell(scenario, imperfect=robot.imperfect, robot=fields)
+    report('random_goals', f'RANDOM_GOALS={GOALS}', counts, wrong, record_property)
+
+
+def report(name, variable, counts, wrong, record_property):
+    """Print the counts and the command that repeats them; fail where something is wrong."""
     line = ', '.join(f'{count} {kind}' for kind, count in sorted(counts.items()))
-    print(f'RANDOM_GOALS={GOALS} RANDOM_GOALS_SEED={SEED}: {line}')
-    record_property('random_goals', line)
-    assert not wrong, '\n'.join(
-        [f'RANDOM_GOALS={GOALS} RANDOM_GOALS_SEED={SEED} make test', line, *wrong]
+    command = (
+        f'{variable} RANDOM_GOALS_SEED={SEED} make test '
+        "PYTEST_ARGS='test/acceptance/test_random_goals.py -rP'"
     )
+    print(f'{command}: {line}')
+    record_property(name, line)
+    assert not wrong, '\n'.join([command, line, *wrong])
+
+
+# -- through processes and TCP --------------------------------------------------------------------
+
+
+@contextmanager
+def robot_and_driver(robot, number):
+    """Start a simulated robot and the process of a driver; yield driver, RTDE and its cycle."""
+    rng, model = np.random.default_rng([SEED, number]), robot.arm.model
+    q = [*rng.uniform(-2.0, -0.8, 2), rng.uniform(0.8, 2.0), *rng.uniform(-2.0, -0.8, 3)]
+    arguments = [f'--{name}-port=0' for name in ('rtde', 'primary', 'dashboard')]
+    if robot.calibration_seed is not None:
+        arguments.append(f'--calibration-seed={robot.calibration_seed}')
+    if robot.imperfect:
+        arguments.append(f'--imperfect={robot.imperfect}')
+    joints = ','.join(map(str, q))
+    with process(
+        *('sim', f'--model={model.name}', f'--joints={joints}', *arguments),
+        environment={**os.environ, 'PYTHONUNBUFFERED': '1'},
+        stdout=subprocess.PIPE,
+    ) as simulator:
+        line = simulator.stdout.readline()
+        ports = {name: int(port) for name, port in re.findall(r'(\w+) (\d+)', line)}
+        config = DriverConfig(
+            robot_ip=HOST,
+            ur_type=model.name,
+            headless_mode=True,
+            rtde_port=ports['RTDE'],
+            primary_port=ports['primary'],
+            dashboard_port=ports['dashboard'],
+            reverse_port=0,
+            script_sender_port=0,
+            trajectory_port=0,
+            script_command_port=0,
+            robot_receive_timeout=1.0,  # two cores are shared with other tests
+        )
+        cycle = model.control_cycle
+        with (
+            Driver(config, PlanningOptions(**robot.options)) as driver,
+            PlainRtde(HOST, ports['RTDE'], 1.0 / cycle) as rtde,
+        ):
+            driver.wait_ready(30.0)
+            yield driver, rtde, cycle
+
+
+def run_over_tcp(driver, rtde, cycle, robot, number, counts, wrong):
+    """Run goals one after the other, each from where the last one has ended."""
+    is_first, done = True, 0
+    for k in range(10 * GOALS_OF_A_DRIVER):
+        state = driver.state
+        start = state.target_q, state.T_flange_tcp
+        case = mixed_case(robot, SEED, number, k, start)
+        try:
+            made = driver.plan(case.goal)
+        except GoalRefused:
+            counts['refused'] += 1
+            continue
+        if made.duration > MAX_TCP_DURATION:
+            counts['long'] += 1
+            continue
+        first_row = max(len(rtde.rows) - 1, 0)
+        outcome = driver.start(made).result(60.0)
+        rtde.wait(0.5 if robot.imperfect else 0.05)
+        is_path = made.execution is ExecutionMode.PRIMITIVES
+        run = run_of(
+            robot,
+            case,
+            made,
+            rtde.rows[first_row:],
+            outcome,
+            cycle=cycle,
+            sent=rtde.rows[first_row].time,
+            is_first=is_first and is_path,
+        )
+        is_first = is_first and not is_path
+        counts['run'] += 1
+        count(run, f'{number}.{k} ({case.family}; {robot})', counts, wrong)
+        done += 1
+        if done == GOALS_OF_A_DRIVER or not run.succeeded:
+            return done
+    return done
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(7200)
+def test_promises_hold_through_processes_and_tcp(record_property):
+    counts, wrong, number = Counter(), [], FIRST_OF_TCP
+    while counts['run'] < TCP_GOALS:
+        robot = random_robot(SEED, number)
+        with robot_and_driver(robot, number) as (driver, rtde, cycle):
+            run_over_tcp(driver, rtde, cycle, robot, number, counts, wrong)
+        number += 1
+    report('random_tcp_goals', f'RANDOM_TCP_GOALS={TCP_GOALS}', counts, wrong, record_property)

@@ -235,7 +235,7 @@ def _arc(refused: Refused) -> str:
     a, b, c = (T[:3, 3] for T in (arc.start, arc.via, arc.target))
     chord = float(np.linalg.norm(c - a))
     height = np.linalg.norm(np.cross(b - a, c - a)) / max(chord, 1e-12)
-    if height < 1.1e-5 or chord < 2e-6:
+    if height < 1.1e-5 or chord < 2e-6 or chord > 1000.0:
         return ''
     if not arc.fixed:
         return f'the via is {height} m above its chord'
@@ -457,10 +457,8 @@ def shortest_times(refused: Refused, i: int, piece: Piece) -> tuple[float, float
     peak = PEAK_OF_TURN if leads else PEAK
     by_profile = max(peak * slowest, sqrt(4.5 / bound))
     speed = 1.0 / max(slowest, 1e-9)
-    if speed**2 / bound > 1.0:  # it never reaches its speed
-        least = 2.0 / sqrt(bound)
-    else:
-        least = slowest + speed / bound
+    # A short one never reaches its speed.
+    least = 2.0 / sqrt(bound) if speed**2 > bound else slowest + speed / bound
     if kind in (SegmentType.PROCESS, SegmentType.CIRCULAR):
         by_profile = least
     return by_profile, least

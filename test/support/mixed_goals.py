@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose, rotate
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 TYPE = SegmentType
@@ -45,6 +46,8 @@ class RandomRobot:
     """An arm, and the options of its driver that are not the defaults."""
 
     arm: Arm
+    #: Seed of its calibration; None = it is nominal.
+    calibration_seed: int | None
     #: Seed of its imperfections; empty = it is ideal.
     imperfect: str
     #: Cycles per second; those of an e-Series cost four times as much as those of a CB3.
@@ -52,7 +55,7 @@ class RandomRobot:
     options: dict[str, Any]
 
     def __str__(self) -> str:
-        calibrated = self.arm.geometry != self.arm.model.geometry
+        calibrated = self.calibration_seed is not None
         chosen = ', '.join(f'{name} {value}' for name, value in self.options.items())
         return (
             f'{self.arm.model.name}{", calibrated" if calibrated else ""}'
@@ -65,8 +68,10 @@ def random_robot(seed: int, number: int) -> RandomRobot:
     """Return the robot of a seed and a number; the models take turns."""
     rng = np.random.default_rng([seed, number])
     model = tuple(MODELS.values())[(seed + number) % len(MODELS)]
-    geometry = random_calibration(model, seed + number) if rng.random() < 0.5 else None
+    calibration = seed + number if rng.random() < 0.5 else None
+    geometry = None if calibration is None else random_calibration(model, calibration)
     return RandomRobot(
+        calibration_seed=calibration,
         arm=Arm(model, geometry),
         imperfect=str(int(rng.integers(1, 1000))) if rng.random() < 0.3 else '',
         frequency=500.0 if model.series != 'CB3' and rng.random() < 0.4 else 125.0,
@@ -80,14 +85,29 @@ def random_robot(seed: int, number: int) -> RandomRobot:
     )
 
 
-def mixed_case(robot: RandomRobot, seed: int, robot_number: int, number: int) -> Case:
-    """Return a goal of a robot."""
+def mixed_case(
+    robot: RandomRobot,
+    seed: int,
+    robot_number: int,
+    number: int,
+    start: tuple[Vector6, Pose] | None = None,
+) -> Case:
+    """
+    Return a goal of a robot.
+
+    :param start: joints and TCP of an arm that cannot be put elsewhere.
+    """
     rng = np.random.default_rng([seed, robot_number, number])
-    if rng.random() < 0.2:
+    if start is None and rng.random() < 0.2:
         return random_case(robot.arm, int(rng.integers(1 << 30)))
     family = FAMILIES[rng.integers(len(FAMILIES))]
     draw = MixedDraw(robot.arm, rng)
+    if start is not None:
+        draw.place_arm(start[0])
+        draw.tool = draw.T_flange_tcp = start[1]
     draw.max_speed = robot.options['max_tool_speed']
+    if start is not None and draw.chance(0.2):  # another frame than the TCP
+        draw.tool = Pose(tuple(rng.uniform(-0.1, 0.1, 3).tolist()), draw.turn(1.0))
     family(draw)
     return draw.case(family.__name__.strip('_'))
 
@@ -95,6 +115,8 @@ def mixed_case(robot: RandomRobot, seed: int, robot_number: int, number: int) ->
 class MixedDraw(GoalDraw):
     """A goal under construction, with everything that a goal can say."""
 
+    #: The TCP that the robot has; None = any.
+    T_flange_tcp: Pose | None = None
     max_speed = 0.25
     execution = ExecutionMode.AUTO
     #: Whether it has times; None = by chance.
@@ -160,8 +182,9 @@ class MixedDraw(GoalDraw):
         if self.chance(0.15) and self.execution != ExecutionMode.SERVO:
             goal = replace(goal, io_commands=self._outputs())
         T_flange_tcp = self.tool
-        if self.chance(0.2):  # the goal moves another frame than the TCP
-            T_flange_tcp = Pose(tuple(self.rng.uniform(-0.1, 0.1, 3).tolist()), self.turn(1.0))
+        if self.T_flange_tcp not in (None, self.tool) or self.chance(0.2):
+            other = Pose(tuple(self.rng.uniform(-0.1, 0.1, 3).tolist()), self.turn(1.0))
+            T_flange_tcp = self.T_flange_tcp or other
             goal = replace(goal, T_flange_controlled=self.tool, controlled_frame='nozzle')
         if self.chance(0.3):
             goal = self._in_frame(goal)

@@ -228,6 +228,13 @@ class PlainRtde:
         self._thread.join()
         self._socket.close()
 
+    def wait(self, seconds: float) -> None:
+        """Wait until so much time has passed on the controller's clock [s]."""
+        end, deadline = self.rows[-1].time + seconds, time.monotonic() + TIMEOUT
+        while self.rows[-1].time < end:
+            assert time.monotonic() < deadline, 'RTDE is silent'
+            time.sleep(0.005)
+
     def _read(self) -> None:
         while data := self._socket.recv(1 << 16):
             self.rows += self._codec.feed(data)
