@@ -10,7 +10,7 @@ singularities and speeds. Refusals for rules are judged by that rule, written an
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 import re
 from typing import Any
@@ -30,6 +30,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.vectors import vector6
 
 #: Samples are at most this far apart [m], [rad]; near a singularity they are halved so often.
 STEP, STEP_TURN, HALVINGS = 2e-3, 0.02, 8
@@ -38,6 +39,8 @@ MAX_JUMP = 0.4
 #: Both sides of a bound may be right this near to it.
 NEAR = 0.02
 _JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+#: In blends the speeds on both sides decide how long a segment takes at least: by this share.
+BLENDED = 0.3
 #: The peak of a timed move over its mean speed: thirds; and of a line that mostly turns.
 PEAK, PEAK_OF_TURN = 1.5, 2.0
 
@@ -170,6 +173,35 @@ def is_right(refused: Refused) -> tuple[str, str]:
         if re.search(pattern, refused.text):
             return name, check(refused)
     return 'unknown', 'no rule for this sentence'
+
+
+def remedied(goal: Goal, index: int, text: str) -> Goal | None:
+    """Return a goal that was too fast with the time that its refusal asks for."""
+    if found := re.search(r'give it at least ([\d.]+) s', text):
+        before = goal.waypoints[index - 1].time if index else 0.0
+        more = float(found[1]) - (goal.waypoints[index].time - before)
+        return replace(
+            goal,
+            waypoints=tuple(
+                replace(point, time=point.time + more) if i >= index else point
+                for i, point in enumerate(goal.waypoints)
+            ),
+        )
+    if found := re.search(r'multiply all times by ([\d.]+)', text):
+        factor = float(found[1])
+        return replace(
+            goal,
+            waypoints=tuple(
+                replace(
+                    point,
+                    time=factor * point.time,
+                    twist=vector6(value / factor for value in point.twist),
+                    acceleration=vector6(value / factor**2 for value in point.acceleration),
+                )
+                for point in goal.waypoints
+            ),
+        )
+    return None
 
 
 # -- rules: each returns why the refusal is wrong -------------------------------------------------
@@ -472,7 +504,9 @@ def _time(refused: Refused) -> str:
     times = [0.0, *(point.time for point in refused.goal.waypoints)]
     time = times[i + 1] - times[i]
     by_profile, least = shortest_times(refused, i, pieces[i])
-    if time < by_profile * (1.0 + NEAR):
+    last = len(refused.goal.waypoints) - 1
+    blended = any(refused.segment(k).blend_radius for k in (i - 1, i) if 0 <= k < last)
+    if time < by_profile * (1.0 + (BLENDED if blended else NEAR)):
         return ''
     return f'{time:.3f} s are more than {by_profile:.3f} s ({least:.3f} s at least)'
 
