@@ -43,7 +43,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-GOALS = int(os.environ.get('RANDOM_GOALS', '40'))
+GOALS = int(os.environ.get('RANDOM_GOALS', '30'))
 SEED = int(os.environ.get('RANDOM_GOALS_SEED', str(int(time.time()) % 1_000_000)))
 ONLY = os.environ.get('RANDOM_GOALS_ONLY', '')
 #: So many goals run one after the other on the same robot.

@@ -8,6 +8,7 @@ What they see is what any other client of a robot sees.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 import socket
 import struct
@@ -224,7 +225,8 @@ class PlainRtde:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._socket.shutdown(socket.SHUT_RDWR)
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
         self._thread.join()
         self._socket.close()
 
@@ -236,5 +238,6 @@ class PlainRtde:
             time.sleep(0.005)
 
     def _read(self) -> None:
-        while data := self._socket.recv(1 << 16):
-            self.rows += self._codec.feed(data)
+        with contextlib.suppress(ConnectionResetError):  # the robot may end first
+            while data := self._socket.recv(1 << 16):
+                self.rows += self._codec.feed(data)
