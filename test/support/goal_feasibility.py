@@ -104,6 +104,9 @@ def follow(refused: Refused, last: int) -> list[Piece]:
             piece = Piece(curve, u, curve.joints(u), '')
         else:
             piece = _follow_straight(refused, curve, q)
+            blended = i > 0 and refused.segment(i - 1).blend_radius > 0.0
+            if blended and _is_singular(refused, q):
+                piece = replace(piece, stopped='singular')
         pieces.append(piece)
         if piece.stopped:
             return pieces
@@ -134,15 +137,8 @@ def _joint_target(refused: Refused, i: int, q: np.ndarray) -> np.ndarray | None:
 
 
 def _follow_straight(refused: Refused, curve: Any, q: np.ndarray) -> Piece:
-    arm, options = refused.arm, refused.options
+    arm = refused.arm
     steps = max(8, int(curve.length / STEP) + 1, int(curve.angle / STEP_TURN) + 1)
-    margins = np.array(
-        [
-            options.singularity_margin_wrist,
-            options.singularity_margin_elbow,
-            options.singularity_margin_shoulder,
-        ]
-    )
     done, qs, step = 0.0, [q], 1.0 / steps
     us, halvings = [0.0], 0
     stopped = ''
@@ -161,10 +157,27 @@ def _follow_straight(refused: Refused, curve: Any, q: np.ndarray) -> Piece:
         if not arm.within(found[0]):
             stopped = 'out of range'
             break
-        if (arm.measures(found)[0] < margins * (1.0 + NEAR) + 1e-4).any():
+        if _is_singular(refused, found[0]):
             stopped = 'singular'
             break
     return Piece(curve, np.array(us), np.array(qs), stopped)
+
+
+def _is_singular(refused: Refused, q: np.ndarray) -> bool:
+    """
+    Tell whether a configuration is nearer to a singularity than allowed.
+
+    Of calibrated arms, whose axes do not meet, some milliradians are a matter of definition.
+    """
+    options = refused.options
+    margins = np.array(
+        [
+            options.singularity_margin_wrist,
+            options.singularity_margin_elbow,
+            options.singularity_margin_shoulder,
+        ]
+    )
+    return bool((refused.arm.measures(q[None])[0] < margins * (1.0 + NEAR) + 2e-3).any())
 
 
 def is_right(refused: Refused) -> tuple[str, str]:
@@ -343,13 +356,6 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
     if times[1] == 0.0:
         poses, times, twists, accelerations = poses[1:], times[1:], twists[1:], accelerations[1:]
     q, ts, qs, places = np.array(refused.q), [], [], []
-    margins = np.array(
-        [
-            refused.options.singularity_margin_wrist,
-            refused.options.singularity_margin_elbow,
-            refused.options.singularity_margin_shoulder,
-        ]
-    )
     for k in range(len(times) - 1):
         h = times[k + 1] - times[k]
         a, b = poses[k], poses[k + 1]
@@ -388,7 +394,7 @@ def spline_motion(refused: Refused) -> SplineMotion | None:
                 stopped = 'the arm cannot follow'
             elif not arm.within(found[0]):
                 stopped = 'out of range'
-            elif (arm.measures(found)[0] < margins * (1.0 + NEAR) + 1e-4).any():
+            elif _is_singular(refused, found[0]):
                 stopped = 'singular'
             if stopped:
                 return SplineMotion(np.array(ts), np.array(qs), np.array(places), stopped)
@@ -508,6 +514,8 @@ def _time(refused: Refused) -> str:
     blended = any(refused.segment(k).blend_radius for k in (i - 1, i) if 0 <= k < last)
     if time < by_profile * (1.0 + (BLENDED if blended else NEAR)):
         return ''
+    if blended and 'joint speed limits' in refused.text:
+        return ''  # in the blend, whose shape is not published
     return f'{time:.3f} s are more than {by_profile:.3f} s ({least:.3f} s at least)'
 
 

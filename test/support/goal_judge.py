@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import isfinite
+import re
 from typing import Any
 
 from forward_model import pose_matrix
@@ -42,9 +43,14 @@ SPLINE_CYCLES = 8.0
 START_RAMP = 0.09
 #: In a blend nobody knows where the robot is when: times may be off by this share of it.
 BLEND_SHARE = 1.0
-#: Times behind blends between unlike motions, where planner and controller have different corners
-#: and profiles, are counted by this name; nothing is asked of them yet.
+#: Times behind blends between unlike motions (also where length leads one and turn the other), in
+#: which planner and controller have different corners and profiles: counted, but nothing is asked.
 UNLIKE_BLENDS = 'known, times behind blends between unlike motions'
+#: A SERVO goal ends where its acceleration takes servoj more than max_plan_deviation off its path,
+#: by lookahead^2 / 2 - 1 / gain times its acceleration (doc/servo.md). Counted by this name.
+SERVO_DEVIATES = 'known, SERVO ends where it accelerates too much for servoj'
+SERVO_DEVIATION = 0.0008
+KNOWN = (UNLIKE_BLENDS, SERVO_DEVIATES)
 #: The arm rests no farther from its target [rad]: static errors, noise and resolution.
 STATIC = 1e-3
 #: The outputs switch within so many cycles of the way of the tool, and this [m].
@@ -85,7 +91,7 @@ class Run:
     q: tuple[float, ...]
     sent: float
     rows: list[RtdeRow]
-    #: Whether it is the first path of its program.
+    #: Whether it is on the first path of its program, which sets out slowly.
     is_first: bool
     succeeded: bool
     outcome: str
@@ -131,11 +137,25 @@ class Judge:
     def _is_behind_unlike_blend(self, point: int) -> bool:
         """Tell whether a point is behind a blend between unlike motions, or in it."""
         segments, radii = self.run.goal.segments, self.run.promise.radii
-        kinds = [segment.type or SegmentType.LINEAR for segment in segments]
+        corners = [self.start, *self.targets]
+        kinds = []
+        for segment, start, end in zip(segments, corners, self.targets, strict=False):
+            distance, turn = poses_apart(start, end)
+            kinds.append((segment.type or SegmentType.LINEAR, bool(turn > distance)))
         return any(
             radii[i] > 0.0 and (kinds[i] != kinds[i + 1] or i in self.run.promise.joint_moves)
             for i in range(min(point + 1, len(kinds) - 1))
         )
+
+    def _servo_deviates(self) -> bool:
+        """Tell whether the acceleration, over 50 ms, explains that a SERVO goal has ended."""
+        run, n = self.run, max(1, round(0.05 / self.run.cycle))
+        found = re.search(r'left the plan by ([\d.]+) m', run.outcome)
+        if run.promise.execution != ExecutionMode.SERVO or not found or len(self.p) <= 2 * n:
+            return False
+        bend = self.p[2 * n :] - 2.0 * self.p[n:-n] + self.p[: -2 * n]
+        acceleration = float(np.linalg.norm(bend, axis=1).max()) / (n * run.cycle) ** 2
+        return SERVO_DEVIATION * acceleration > 0.5 * float(found[1])
 
     def say(self, kind: str, text: str) -> None:
         self.wrong.append((kind, text))
@@ -146,8 +166,12 @@ class Judge:
         self._speeds()
         if not run.succeeded:
             late = run.outcome.startswith('GOAL_TOLERANCE_VIOLATED: The last point was reached')
-            known = late and self._is_behind_unlike_blend(len(self.targets) - 1)
-            self.say(UNLIKE_BLENDS if known else 'not successful', run.outcome)
+            kind = 'not successful'
+            if late and self._is_behind_unlike_blend(len(self.targets) - 1):
+                kind = UNLIKE_BLENDS
+            if self._servo_deviates():
+                kind = SERVO_DEVIATES
+            self.say(kind, run.outcome)
             return self.wrong
         if not self.moves:
             distance, turn = poses_apart(self.tool[-1], self.targets[-1])
@@ -406,23 +430,20 @@ class Judge:
         found = self._cubic()
         if found is None:
             return
-        knots, places, twists = found
-        # What the doubt about the start makes of the way along the path.
-        along = 0.25 * run.cycle * self.speed
-        off = min(
-            float(
-                (
-                    np.linalg.norm(
-                        self.p - _hermite(self.t - self.zero - shift, knots, places, twists),
-                        axis=1,
-                    )
-                    - along
-                ).max()
-            )
-            for shift in shifts
-        )
+        off = self._beside(found)
         if off > SPLINE + 1e-5:
             self.say('spline path', f'{1e3 * off:.4f} mm off')
+
+    def _beside(self, cubic: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+        """Return how far the tool is beside a cubic at most [m]: from chords of its samples."""
+        places = _hermite(np.linspace(0.0, cubic[0][-1], 3000), *cubic)
+        a, way = places[:-1], np.diff(places, axis=0)
+        size = np.maximum((way**2).sum(axis=1), 1e-30)
+        off = 0.0
+        for p in self.p[self.begin : self.end + 1]:
+            u = np.clip(((p - a) * way).sum(axis=1) / size, 0.0, 1.0)
+            off = max(off, float(np.linalg.norm(a + u[:, None] * way - p, axis=1).min()))
+        return off
 
     def _cubic(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return times, positions and velocities of a spline that is a cubic, and known."""
@@ -453,8 +474,7 @@ class Judge:
                 )
         found = self._cubic()
         if found is not None:
-            wanted = _hermite(np.linspace(0.0, found[0][-1], 2000), *found)
-            off = max(float(np.linalg.norm(wanted - p, axis=1).min()) for p in self.p[::4])
+            off = self._beside(found)
             if off > SERVO_PATH:
                 self.say('servo path', f'{1e3 * off:.4f} mm off')
 
