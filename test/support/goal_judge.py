@@ -147,15 +147,20 @@ class Judge:
             for i in range(min(point + 1, len(kinds) - 1))
         )
 
-    def _servo_deviates(self) -> bool:
-        """Tell whether the acceleration, over 50 ms, explains that a SERVO goal has ended."""
-        run, n = self.run, max(1, round(0.05 / self.run.cycle))
-        found = re.search(r'left the plan by ([\d.]+) m', run.outcome)
-        if run.promise.execution != ExecutionMode.SERVO or not found or len(self.p) <= 2 * n:
-            return False
+    def _servo_deviation(self) -> float:
+        """Return how far its acceleration, over 50 ms, may take servoj off its path [m]."""
+        n = max(1, round(0.05 / self.run.cycle))
+        if len(self.p) <= 2 * n:
+            return 0.0
         bend = self.p[2 * n :] - 2.0 * self.p[n:-n] + self.p[: -2 * n]
-        acceleration = float(np.linalg.norm(bend, axis=1).max()) / (n * run.cycle) ** 2
-        return SERVO_DEVIATION * acceleration > 0.5 * float(found[1])
+        peak = float(np.linalg.norm(bend, axis=1).max()) / (n * self.run.cycle) ** 2
+        return 2.0 * SERVO_DEVIATION * peak  # jumps of the acceleration are smoothed here
+
+    def _servo_deviates(self) -> bool:
+        """Tell whether an acceleration explains that a SERVO goal has ended."""
+        found = re.search(r'left the plan by ([\d.]+) m', self.run.outcome)
+        is_servo = self.run.promise.execution == ExecutionMode.SERVO
+        return bool(is_servo and found and self._servo_deviation() > float(found[1]))
 
     def say(self, kind: str, text: str) -> None:
         self.wrong.append((kind, text))
@@ -468,7 +473,9 @@ class Judge:
             if not len(rows):
                 continue
             distance, turn = poses_apart(self.tool[rows], target)
-            if distance.min() > SERVO_PATH or turn.min() > SERVO_PATH / ARM:
+            # Where the arm turns back, servoj does so before the point.
+            bound = max(SERVO_PATH, self._servo_deviation())
+            if distance.min() > bound or turn.min() > bound / ARM:
                 self.say(
                     'servo point', f'{i}: {1e3 * distance.min():.4f} mm, {turn.min():.5f} rad'
                 )
