@@ -7,8 +7,10 @@ The goals run through the bytes of the wire: whether a blend fits may depend on 
 micrometres.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 from math import cos, sin
+import re
 
 import numpy as np
 import pytest
@@ -150,3 +152,79 @@ def test_the_robot_waits_where_it_stands_until_the_time_of_the_first_point(robot
     assert ran.duration == pytest.approx(4.05, abs=0.06)
     moved = np.array([pose.distance_to(home) for pose in ran.poses])
     assert moved[: int(2.0 / robot.controller.cycle)].max() < 10e-6
+
+
+def mixed(robot, rng, timed):
+    """Return a goal of unlike segments with blends, as fast as its times or its speeds say."""
+    count = int(rng.integers(2, 5))
+    kinds = rng.choice([TYPE.LINEAR, TYPE.JOINT, TYPE.CIRCULAR, TYPE.PROCESS], count)
+    lengths = rng.uniform(0.04, 0.16, count)
+    radii = [*(rng.uniform(0.1, 0.49) * np.minimum(lengths[:-1], lengths[1:])).tolist(), 0.0]
+    goal = corners(robot, rng, TYPE.CIRCULAR, lengths, radii)
+    speeds = rng.uniform(0.05, 0.15, count)
+    times = np.cumsum(1.3 * lengths / speeds + 0.3).tolist()
+    return replace(
+        goal,
+        waypoints=tuple(
+            replace(point, time=time if timed else 0.0)
+            for point, time in zip(goal.waypoints, times, strict=True)
+        ),
+        segments=tuple(
+            replace(
+                segment,
+                type=TYPE(kind),
+                velocity=0.0 if timed else speed,
+                via=segment.via if kind == TYPE.CIRCULAR else None,
+            )
+            for segment, kind, speed in zip(goal.segments, kinds, speeds.tolist(), strict=True)
+        ),
+    )
+
+
+@pytest.mark.parametrize('timed', [True, False], ids=['timed', 'by speed'])
+def test_goals_with_blends_end_within_the_bound_that_their_report_gives(robot, timed):
+    rng, bounds = np.random.default_rng(11), []
+    for _ in range(25):
+        try:
+            made, ran = run(robot, mixed(robot, rng, timed))
+        except GoalRefused:
+            continue
+        assert ran.failure == ''
+        blended = any(getattr(s.primitive, 'blend_radius', 0.0) for s in made.segments)
+        said = [remark for remark in made.remarks if remark.startswith('blends: ')]
+        assert len(said) == blended
+        bounds += (bound := [float(re.search(r'up to ([0-9.]+) s off', x)[1]) for x in said])
+        # A program sets out a little later than it is told, and cycles are rounded.
+        assert abs(ran.duration - made.reference.time[-1] - 0.02) < sum(bound) + 0.02
+    assert len(bounds) >= 12
+    assert np.median(bounds) < 1.5
+
+
+def test_a_report_says_where_blends_leave_an_end_less_certain_than_the_tolerance(robot):
+    rng = np.random.default_rng(12)
+    goal = corners(robot, rng, TYPE.LINEAR, (0.06, 0.06), (0.02, 0.0), velocity=0.0)
+    goal = replace(
+        goal,
+        waypoints=tuple(
+            replace(point, time=2.0 * (k + 1)) for k, point in enumerate(goal.waypoints)
+        ),
+    )
+    for tolerance, clause in (
+        (0.3, ', more than goal_time_tolerance (0.3 s)'),
+        (0.0, ''),
+        (-1.0, ''),
+    ):
+        asked = replace(goal, goal_time_tolerance=tolerance)
+        (said,) = [
+            remark
+            for remark in plan(
+                asked, robot.place(HOME, TOOL), robot.controller.arm, PlanningOptions()
+            ).remarks
+            if remark.startswith('blends: ')
+        ]
+        assert re.fullmatch(
+            r'blends: the end may be up to 0\.\d{3} s off'
+            + re.escape(clause)
+            + ', because how the robot passes them is not published',
+            said,
+        )

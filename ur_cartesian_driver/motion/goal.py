@@ -46,6 +46,11 @@ class OutputKind(IntEnum):
     STANDARD_ANALOG = 3
 
 
+#: How much later than planned the end may come where the goal does not say it [s], also how long
+#: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
+DEFAULT_GOAL_TIME_TOLERANCE = 1.0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posture:
     """The joint positions [rad] to be near to, by joint name; empty = no preference."""

@@ -51,7 +51,11 @@ from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
-from ur_cartesian_driver.planning.moves.plan_report import segment_line, tightest_remark
+from ur_cartesian_driver.planning.moves.plan_report import (
+    blend_remarks,
+    segment_line,
+    tightest_remark,
+)
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_draft import JOINT_SPACE_TYPES
@@ -162,6 +166,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     remarks = [
         *ignored_remarks(goal),
         *(timing.remark for timing in timings if timing.remark),
+        *blend_remarks(goal, geometries, timings),
         *lines,
         tightest_remark(geometries),
     ]

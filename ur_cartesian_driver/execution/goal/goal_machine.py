@@ -53,7 +53,6 @@ from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import (
     ARMING_TIMEOUT,
     CAUSE_TIMEOUT,
-    DEFAULT_GOAL_TIME_TOLERANCE,
     EARLY_CANCELED_TIMEOUT,
     SAFE_OUTPUTS_TIMEOUT,
     STOP_TIMEOUT,
@@ -71,6 +70,7 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
+from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.state_age import explain_age
 

@@ -16,9 +16,6 @@ ARMING_TIMEOUT = 1.2
 SAFE_OUTPUTS_TIMEOUT = 0.2
 #: How long a program that answered CANCELED before its first point may take to begin anyway [s].
 EARLY_CANCELED_TIMEOUT = 1.0
-#: Longest time from the program's SUCCESS to rest inside the goal tolerance, where the goal does
-#: not set one [s].
-DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 #: How long to wait for a deeper reason after the robot program has ended [s]: what dies together
 #: is reported by different connections, some cycles apart.
 CAUSE_TIMEOUT = 0.1

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE, Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
@@ -39,6 +39,29 @@ def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
     """Return the remark about the tightest margin of the goal."""
     geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.normalized)
     return f'tightest margin: {geometry.tightest_margin} of the segment to point {geometry.index}'
+
+
+def blend_remarks(
+    goal: Goal, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
+) -> list[str]:
+    """Return by how much the end may be off its planned time, if the goal has blends."""
+    if all(geometry.blend_after is None for geometry in geometries) or any(
+        is_optimized(geometry.kind) for geometry in geometries
+    ):
+        return []
+    planned = sum(timing.duration for timing in timings)
+    off = max(
+        planned - sum(timing.least_time for timing in timings),
+        sum(timing.greatest_time for timing in timings) - planned,
+    )
+    clause = ''
+    tolerance = goal.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
+    if 0.0 <= tolerance < off and geometries[-1].time is not None:
+        clause = f', more than goal_time_tolerance ({tolerance:g} s)'
+    return [
+        f'blends: the end may be up to {off:.3f} s off{clause}, because how the robot passes them '
+        'is not published'
+    ]
 
 
 def _name(primitive: Primitive) -> str:

@@ -75,3 +75,6 @@ class SegmentTiming:
     duration: float = 0.0
     #: Time in the blend after it [s], 0 without one.
     blend_time: float = 0.0
+    #: Bounds of the time, whatever the law by which the robot passes its blends [s].
+    least_time: float = 0.0
+    greatest_time: float = 0.0

@@ -86,6 +86,13 @@ def schedule(
     for timer, timing in zip(timers, timings, strict=True):
         timer.add_time_in_blends(timing, 0.5 * (before + timing.blend_time))
         before = timing.blend_time
+    for timer, timing in zip(timers, timings, strict=True):
+        timer.bound_time(timing)
+    for k, geometry in enumerate(geometries):
+        if (blend := geometry.blend_after) is not None:
+            speed = max(timers[n].tool_speed(timings[n]) for n in (k, k + 1))
+            # Legs of the radius r with a chord c between them: no blend is longer than r + c / 2.
+            timings[k].least_time += max(2.0 * (blend.length - blend.radius), 0.0) / speed
     return timings
 
 
@@ -246,6 +253,29 @@ class _SegmentTimer:
                 profile.length, left, *self._rests, self._ramp_share
             )
         timing.duration = profile.duration + time_in_blends
+
+    def bound_time(self, timing: SegmentTiming) -> None:
+        """
+        Set the least time without its blends, and the greatest time: with rest at each point.
+
+        Both hold for whatever law by which the robot passes blends.
+        """
+        if not is_blended(self.geometry):
+            timing.least_time = timing.greatest_time = timing.duration
+            return
+        speed, acceleration = timing.velocity, timing.acceleration
+        if timing.wire_time <= 0.0:
+            speed, acceleration = speed / self._counted, timing.profile.acceleration
+        between = self._length * self.geometry.unblended_fraction
+        timing.least_time = shortest_duration(between, speed, acceleration, sum(self._rests))
+        timing.greatest_time = (
+            timing.wire_time or trapezoid(self._length, speed, acceleration).duration
+        )
+
+    def tool_speed(self, timing: SegmentTiming) -> float:
+        """Return the speed of the tool when it cruises [m/s]."""
+        speed = timing.velocity if timing.wire_time > 0.0 else timing.velocity / self._counted
+        return speed * max(self.geometry.curve.length, 1e-9) / self._length
 
     # -- speeds ----------------------------------------------------------------------------------
 
