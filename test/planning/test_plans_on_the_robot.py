@@ -211,7 +211,8 @@ def test_a_report_says_where_blends_leave_an_end_less_certain_than_the_tolerance
     )
     for tolerance, clause in (
         (0.3, ', more than goal_time_tolerance (0.3 s)'),
-        (0.0, ''),
+        (0.0, ', more than goal_time_tolerance (1 s)'),
+        (1.5, ''),
         (-1.0, ''),
     ):
         asked = replace(goal, goal_time_tolerance=tolerance)
@@ -223,7 +224,7 @@ def test_a_report_says_where_blends_leave_an_end_less_certain_than_the_tolerance
             if remark.startswith('blends: ')
         ]
         assert re.fullmatch(
-            r'blends: the end may be up to 0\.\d{3} s off'
+            r'blends: the end may be up to 1\.\d{3} s off'
             + re.escape(clause)
             + ', because how the robot passes them is not published',
             said,
