@@ -153,7 +153,7 @@ def test_the_installed_node_carries_out_a_goal_in_each_execution_mode(
         'trajectory_port': 0,
         'script_command_port': 0,
         'robot_receive_timeout': 1.0,
-        'max_state_age': 1.0,
+        'max_state_age': 0.0,
     }
     arguments = [word for item in parameters.items() for word in ('-p', '{}:={}'.format(*item))]
     output = tmp_path / 'output'

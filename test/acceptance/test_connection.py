@@ -252,7 +252,7 @@ def test_the_arm_stops_when_the_owner_falls_silent(ur_sim, make_driver, home, lo
             rtde_port=ur_sim.ports.rtde,
             primary_port=ur_sim.ports.primary,
             robot_receive_timeout=1.0,
-            max_state_age=1.0,
+            max_state_age=0.0,
         ),
         auto_heartbeat=False,
     )

@@ -64,7 +64,7 @@ class Senders:
 def senders(no_thread_left, sim, make_cell, tmp_path):
     """Start senders for a node that runs in a thread."""
     # Robot, driver and test share one interpreter, and the cores with a process that starts.
-    cell = make_cell(sim, robot_receive_timeout=1.0, max_state_age=1.0)
+    cell = make_cell(sim, robot_receive_timeout=1.0, max_state_age=0.0)
     cell.wait_ready()
     ended = threading.Event()
 

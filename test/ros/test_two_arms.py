@@ -58,7 +58,7 @@ class Cell:
                     ur_type=sim.config.model,
                     tf_prefix=f'{name}_',
                     robot_receive_timeout=1.0,
-                    max_state_age=1.0,
+                    max_state_age=0.0,
                 ),
             )
             for name, sim in self.sims.items()
