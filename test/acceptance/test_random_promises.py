@@ -344,7 +344,9 @@ def robot_and_driver(robot, number):
             script_sender_port=0,
             trajectory_port=0,
             script_command_port=0,
-            robot_receive_timeout=1.0,  # two cores are shared with other tests
+            # Two cores are shared with other tests.
+            robot_receive_timeout=1.0,
+            max_state_age=1.0,
         )
         cycle = model.control_cycle
         with (
@@ -383,6 +385,7 @@ def run_over_tcp(driver, rtde, cycle, robot, number, counts, wrong):
             cycle=cycle,
             sent=rtde.rows[first_row].time,
             is_first=is_path and path_time < START_TIME,
+            late=0.1,
         )
         path_time += made.duration if is_path else 0.0
         counts['run'] += 1

@@ -93,6 +93,8 @@ class Run:
     rows: list[RtdeRow]
     #: Whether it is on the first path of its program, which sets out slowly.
     is_first: bool
+    #: How much later things may come where time is real and the computer busy [s].
+    late: float = 0.0
     succeeded: bool
     outcome: str
 
@@ -259,6 +261,7 @@ class Judge:
         is_spline = run.promise.execution == ExecutionMode.SPLINE
         cycles = SPLINE_CYCLES if is_spline else CYCLES
         slack = cycles * run.cycle + SHARE * time + (START_RAMP if run.is_first else 0.0)
+        slack += run.late
         if self.waits:  # an arm may stand beside its target
             slack += 3.0 * run.cycle + 0.02
         return slack
@@ -469,7 +472,9 @@ class Judge:
         goal = self.run.goal
         for i, (point, target) in enumerate(zip(goal.waypoints, self.targets, strict=True)):
             at = self.t - self.zero - point.time
-            rows = np.flatnonzero((at >= -2.0 * self.run.cycle) & (at <= SERVO_LAG))
+            rows = np.flatnonzero(
+                (at >= -2.0 * self.run.cycle) & (at <= SERVO_LAG + 10.0 * self.run.late)
+            )
             if not len(rows):
                 continue
             distance, turn = poses_apart(self.tool[rows], target)
