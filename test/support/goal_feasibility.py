@@ -188,6 +188,8 @@ def is_right(refused: Refused) -> tuple[str, str]:
 
 def remedied(goal: Goal, index: int, text: str) -> Goal | None:
     """Return a goal that was too fast with the time that its refusal asks for."""
+    if any(segment.blend_radius for segment in goal.segments):
+        return None  # its neighbours change with it
     if found := re.search(r'give it at least ([\d.]+) s', text):
         before = goal.waypoints[index - 1].time if index else 0.0
         more = float(found[1]) - (goal.waypoints[index].time - before)
