@@ -13,6 +13,7 @@ import pytest
 from ur_cartesian_driver.motion.robot_state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim.clock import RealClock
 from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
+from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
 from ur_cartesian_driver.sim.programs.script_upload import (
     UploadDecoder,
@@ -196,3 +197,22 @@ def test_the_real_clock_does_not_drift():
     assert taken >= 50 * 0.002 - 1e-4
     if not clock.slips:  # late, but never by more than the last cycle's own lateness
         assert taken <= 50 * 0.002 + clock.lateness().worst + 0.01
+
+
+def test_a_simulator_that_stood_still_says_so_in_its_time_stamps(bench):
+    """A client that compares them with its own clock must not take the next states for old."""
+
+    async def cycles(clock):
+        await clock.next_cycle()
+        time.sleep(0.15)  # noqa: ASYNC251  the computer is busy
+        for _ in range(3):
+            await clock.next_cycle()
+
+    clock, start = RealClock(0.002, rate=2.0), time.monotonic()
+    asyncio.run(cycles(clock))
+    assert clock.slips >= 1
+    assert 0.28 <= clock.skipped <= 2.0 * (time.monotonic() - start)
+    before = bench.controller.time
+    bench.controller.skipped_time = clock.skipped
+    assert bench.controller.time == before
+    assert output_getter('timestamp', 0.0)(bench.controller) == before + clock.skipped

@@ -279,6 +279,8 @@ class ProgramNetwork:
 class LoopClock:
     """The simulator's cycles on the loop's clock."""
 
+    skipped = 0.0
+
     def __init__(self, loop, cycle):
         self._loop, self._cycle = loop, cycle
         self._due = loop.time()

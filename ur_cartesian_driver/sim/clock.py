@@ -38,12 +38,17 @@ class Lateness:
 class Clock(Protocol):
     """Waits until the next cycle is due, while the event loop runs."""
 
+    #: Simulated time that it has skipped [s].
+    skipped: float
+
     async def next_cycle(self) -> None:
         """Return when the next cycle is due."""
 
 
 class VirtualClock:
     """Time that passes as fast as cycles can be computed; the servers run in between."""
+
+    skipped = 0.0
 
     async def next_cycle(self) -> None:
         """Let the servers run once, without waiting."""
@@ -60,12 +65,12 @@ class RealClock:
         :param cycle: [s] of simulated time.
         :param rate: seconds of simulated time per second.
         """
-        self._period = cycle / rate
+        self._period, self._rate = cycle / rate, rate
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
-        #: How often the clock has started anew.
-        self.slips = 0
+        #: How often the clock has started anew, and the simulated time that it has skipped [s].
+        self.slips, self.skipped = 0, 0.0
 
     async def next_cycle(self) -> None:
         """Wait for the next deadline; let the servers run at least once."""
@@ -82,6 +87,7 @@ class RealClock:
         self._late.append(late)
         if late > _MAX_LAG:
             self._start, self._count, self.slips = time.monotonic(), 0, self.slips + 1
+            self.skipped += late * self._rate
 
     def lateness(self) -> Lateness:
         """Return the figures of the last 20,000 cycles."""

@@ -95,6 +95,8 @@ class Controller:
         #: Duration of a cycle [s], and how many have passed.
         self.cycle = config.cycle
         self.cycles = 0
+        #: Time in which the simulator, not the controller, stood still [s].
+        self.skipped_time = 0.0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         self.motion.turn_ratio = config.turn_ratio
@@ -154,6 +156,16 @@ class Controller:
     def time(self) -> float:
         """The controller's clock [s]: whole cycles, none skipped."""
         return START_TIME + self.cycles * self.cycle
+
+    @property
+    def timestamp(self) -> float:
+        """
+        What clients read of the clock [s].
+
+        It contains the time in which this computer was too busy: clients that compare it with
+        their own clock would take states for old ones.
+        """
+        return self.time + self.skipped_time
 
     @property
     def at_rest(self) -> bool:

@@ -258,6 +258,7 @@ class SimulatedRobot:
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
                 # How long the computer compiles must not decide when a program starts.
                 await self._compiler.wait_until_idle()
+            self.controller.skipped_time = self._clock.skipped
             self.controller.step()
             if took_scripts and not self.controller.takes_scripts:
                 for server in (self._primary, self._secondary, self._realtime):

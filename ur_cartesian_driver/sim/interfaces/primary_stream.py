@@ -49,7 +49,7 @@ def version_frame(controller: Controller) -> bytes:
             bugfix=bugfix,
             build=build,
             date='2026-01-01, 00:00:00',
-            timestamp=round(controller.time * 1e6),
+            timestamp=round(controller.timestamp * 1e6),
         )
     )
 
@@ -103,7 +103,7 @@ def _mode(controller: Controller) -> RobotModeData:
     state, safety = controller.programs.state, controller.safety.mode
     paused = state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
     return RobotModeData(
-        timestamp=round(controller.time * 1e6),
+        timestamp=round(controller.timestamp * 1e6),
         power_on=bool(controller.robot_status & RobotStatus.POWER_ON),
         emergency_stopped=safety in _EMERGENCY,
         protective_stopped=safety is SafetyMode.PROTECTIVE_STOP,

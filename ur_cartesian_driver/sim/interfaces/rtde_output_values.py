@@ -129,7 +129,7 @@ def _scaled_momentum(controller: Controller) -> float:
 #: Outputs that are computed.
 COMPUTED: Mapping[str, Getter] = MappingProxyType(
     {
-        'timestamp': lambda c: c.time,
+        'timestamp': lambda c: c.timestamp,
         'control_step': lambda c: c.cycles,
         'target_q': lambda c: c.motion.q,
         'actual_q': lambda c: c.actual.q,
