@@ -116,6 +116,7 @@ def cartesian_driver(
         'script_command_port': 0,
         # Robot, driver and test share one interpreter, which can be busy for longer than 0.2 s.
         'robot_receive_timeout': 1.0,
+        'max_state_age': 0.0,
     } | _marker_values(request, 'cartesian_driver')
     started_here = not get_default_context().ok()
     if started_here:

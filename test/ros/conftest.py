@@ -57,6 +57,8 @@ def sim_parameters(sim, **more):
         **dict.fromkeys(own, 0),
         'headless_mode': True,
         'robot_loop': 'thread',
+        # Robot, driver and client share this interpreter, which may be busy for longer.
+        'max_state_age': 0.0,
         **more,
     }
 

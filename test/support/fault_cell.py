@@ -132,7 +132,14 @@ async def perform(cell: RobotCell, step: str):
             await cell.reboot_robot()
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait for the robot':
-            await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
+            # States that are old leave the driver CONNECTED, until it gives their connection up.
+            await cell.until(
+                lambda: (
+                    cell.status.state is ConnectionState.CONNECTED
+                    and controller.time - cell.memory.read().timestamp < 2.0 * cell.max_packet_gap
+                ),
+                5.0,
+            )
         case 'wait until the fault ends':
             await end_faults(cell)
             await cell.until(lambda: cell.loop.open_ends(robot_cell.PRIMARY))

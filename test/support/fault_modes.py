@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fault_table import CONTINUED, HEADLESS, LOCAL, Row, unplugged
+from fault_table import CONTINUED, HEADLESS, LOCAL, Row
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -262,6 +262,9 @@ _NO_SETPOINTS = {
     'steps': ('wait until the fault ends', 'resend'),
 }
 
+#: States from before the cut may come first, which are old.
+_PLUGGED_IN = ('wait until the fault ends', 'wait for the robot')
+
 #: Whether the last point is reached before a timeout would be a matter of milliseconds.
 _NEVER_LATE = {'': {'phases': ('entering', 'between points', 'cancelling')}}
 
@@ -277,8 +280,7 @@ SERVO = _mode(
     1.8,
     {
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'resend')}}
-        | unplugged(('entering',), 'wait until the fault ends', 'resend'),
+        'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
         'RTDE is half-open': _SILENT,
@@ -306,8 +308,7 @@ SERVO = _mode(
     more=SETPOINTS,
     pendant_changes={
         'an operator pauses the program': _STAYS_PAUSED,
-        'the network cable is cut': {'': {'steps': ('wait until the fault ends', 'play')}}
-        | unplugged(('entering',), 'wait until the fault ends', 'play'),
+        'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'play')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
     },
 )

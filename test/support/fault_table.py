@@ -76,16 +76,6 @@ REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
 CANCELLED = _in(('cancelling',), code=E.CANCELLED)
 
 
-def unplugged(phases: tuple[str, ...], *steps: str) -> dict[str, dict[str, Any]]:
-    """Return what differs where a goal ends before the driver knows that the robot is gone."""
-    return _in(
-        phases,
-        state_after=S.DISCONNECTED,
-        state_within=1.3,
-        steps=('wait for the robot', *steps),
-    )
-
-
 #: Times of a goal that the fault does not disturb.
 UNDISTURBED: dict[str, Any] = {'result_within': 1.2, 'rest_within': 1.2}
 POWER_UP = ('power on', 'release the brakes')
@@ -242,8 +232,8 @@ HEADLESS = (
         result_within=1.3,
         rest_within=0.7,
         state_after=S.CONNECTED,
-        steps=('resend',),
-        differs=unplugged((*BEFORE, 'settling'), 'resend'),
+        state_within=1.3,
+        steps=('wait for the robot', 'resend'),
     ),
     *(
         Row(
@@ -533,8 +523,8 @@ LOCAL = (
         result_within=1.3,
         rest_within=0.7,
         state_after=S.CONNECTED,
-        steps=('play',),
-        differs=unplugged((*BEFORE, 'settling'), 'play'),
+        state_within=1.3,
+        steps=('wait for the robot', 'play'),
     ),
     Row(
         fault="the program's sockets are cut",

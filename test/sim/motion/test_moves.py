@@ -309,3 +309,11 @@ def test_steady_after_half_a_second_at_rest(recorder):
     assert not r.generator.steady
     r.step(times=2)
     assert r.generator.steady
+
+
+@pytest.mark.parametrize('call', ['movel', 'movej'])
+def test_a_timed_move_to_where_the_arm_is_takes_its_time(recorder, call):
+    r = recorder()
+    where = r.generator.T_base_tcp if call == 'movel' else r.generator.q
+    assert r.run(getattr(r.generator, call)(where, t=0.5)) == 250
+    assert np.abs(r.speeds()).max() < 1e-9

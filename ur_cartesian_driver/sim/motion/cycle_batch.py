@@ -97,7 +97,8 @@ class CycleBatch:
     ) -> list[SolvedCycle]:
         """Return the cycles that follow within the section and that the arm can keep."""
         target, section = self._target, motion.sections[motion.index]
-        if duration <= 0.0 or not target.tcp_is_active:
+        stands = section.profile.length <= 0.0
+        if stands or duration <= 0.0 or not target.tcp_is_active:
             return []
         count = min(int((motion.next_change - motion.time) / duration) - 1, _MAX_CYCLES)
         if count < _MIN_CYCLES:
