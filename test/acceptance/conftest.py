@@ -19,7 +19,8 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClie
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.motion.imperfect_arm import typical_imperfections
 
-READY = 10.0
+#: A driver may have to start a process, which imports for seconds on a busy computer [s].
+READY = 30.0
 
 
 class Recording:

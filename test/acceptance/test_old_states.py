@@ -22,7 +22,7 @@ REACTION = 0.3
 def driver(make_driver):
     """A driver whose loop shares no interpreter with the robot, with the usual bound."""
     made = make_driver(robot_loop='process', max_state_age=0.2)
-    made.wait_ready(10.0)
+    made.wait_ready(30.0)
     return made
 
 
@@ -46,7 +46,7 @@ def check_end(motion, driver, ur_sim):
     assert outcome.code is ErrorCode.CONNECTION_LOST, outcome.text
     assert 'max_state_age' in outcome.text
     ur_sim.clear_faults()
-    driver.wait_ready(10.0)
+    driver.wait_ready(30.0)
     assert driver.state.state_age < 0.2
 
 

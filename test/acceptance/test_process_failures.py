@@ -160,7 +160,7 @@ class Cell:
         """Send the goal; return its future result when the arm moves."""
         deadline = monotonic() + 15.0
         while True:
-            client.wait_ready(10.0)
+            client.wait_ready(30.0)
             ended = self.pool.submit(self._send, client)
             self.witness.until(
                 lambda ended=ended: self.witness.speed > MOVING or ended.done(), 5.0
