@@ -9,6 +9,7 @@ from time import monotonic, sleep
 import pytest
 from waiting import wait_for
 
+from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 
@@ -40,12 +41,19 @@ def at_rest(ur_sim):
     return max(map(abs, ur_sim.state().qd)) < 1e-3
 
 
+def is_ready(driver):
+    return driver.status.state is ConnectionState.READY
+
+
 def check_end(motion, driver, ur_sim):
     """Check how a motion ended for old states, and that the next one is taken."""
     outcome = motion.result(5.0)
     assert outcome.code is ErrorCode.CONNECTION_LOST, outcome.text
     assert 'max_state_age' in outcome.text
     ur_sim.clear_faults()
+    wait_for(lambda: 'resend' in driver.status.message or is_ready(driver), 30.0)
+    if not is_ready(driver):  # the connection was given up first, and the program has ended
+        driver.resend_robot_program()
     driver.wait_ready(30.0)
     assert driver.state.state_age < 0.2
 

@@ -437,7 +437,7 @@ def _is_running_in(loop: asyncio.AbstractEventLoop) -> bool:
 def _snapshot(controller: Controller) -> RobotSnapshot:
     motion, programs = controller.motion, controller.programs
     return RobotSnapshot(
-        timestamp=controller.time,
+        timestamp=controller.timestamp,
         q=motion.q,
         qd=motion.qd,
         T_base_tcp=motion.T_base_tcp,
