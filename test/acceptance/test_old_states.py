@@ -21,7 +21,7 @@ REACTION = 0.6
 
 @pytest.fixture
 def driver(make_driver):
-    """A driver whose loop shares no interpreter with the robot, with a bound for busy computers."""
+    """A driver whose loop shares no interpreter with the robot, with a long bound."""
     made = make_driver(robot_loop='process', max_state_age=0.5)
     made.wait_ready(30.0)
     return made
