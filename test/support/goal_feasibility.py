@@ -15,6 +15,7 @@ from math import inf, sqrt
 import re
 from typing import Any
 
+from example_goals import stretch_times
 from forward_model import pose_matrix, turn_between
 from goal_geometry import (
     Arc,
@@ -30,7 +31,6 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
-from ur_cartesian_driver.motion.vectors import vector6
 
 #: Samples are at most this far apart [m], [rad]; near a singularity they are halved so often.
 STEP, STEP_TURN, HALVINGS = 2e-3, 0.02, 8
@@ -201,19 +201,7 @@ def remedied(goal: Goal, index: int, text: str) -> Goal | None:
             ),
         )
     if found := re.search(r'multiply all times by ([\d.]+)', text):
-        factor = float(found[1])
-        return replace(
-            goal,
-            waypoints=tuple(
-                replace(
-                    point,
-                    time=factor * point.time,
-                    twist=vector6(value / factor for value in point.twist),
-                    acceleration=vector6(value / factor**2 for value in point.acceleration),
-                )
-                for point in goal.waypoints
-            ),
-        )
+        return stretch_times(goal, float(found[1]))
     return None
 
 

@@ -110,7 +110,7 @@ class Controller:
             config.power_on_time,
             config.brake_release_time,
         )
-        self.messages = ControllerMessages(lambda: self.time)
+        self.messages = ControllerMessages(lambda: self.timestamp)
         self.ownership = MotionOwnership(self.motion)
         self.watchdogs = Watchdogs()
         self.popups: list[Popup] = []
