@@ -209,9 +209,12 @@ def signals(client: Client) -> None:
     q = receive.getActualQ()
     began = receive.getTimestamp()
     control.moveJ([q[0] + 0.5, *q[1:]], 0.5, 2.0)
+    took = receive.getTimestamp() - began
+    # The answer to moveJ may overtake the state of the cycle in which the arm came to rest.
+    client.until(lambda: receive.getSpeedScaling() == 0.0)
     client.note(
         'slow',
-        took=receive.getTimestamp() - began,
+        took=took,
         fraction=receive.getTargetSpeedFraction(),
         scaling=receive.getSpeedScaling(),
     )
