@@ -126,6 +126,8 @@ class Cell:
             'ur_type': 'ur5',
             'headless_mode': 'true',
             'node_timeout': NODE_TIMEOUT,
+            # Processes that start keep a small computer busy, which must not be what ends a goal.
+            'max_state_age': 0.0,
             'rtde_port': self.ports['RTDE'],
             'primary_port': self.ports['primary'],
             'dashboard_port': self.ports['dashboard'],
