@@ -24,6 +24,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
@@ -53,7 +54,9 @@ class Run:
 
     def curve(self):
         goal, begin = self.made.goal, SplineState(q=self.made.start)
-        return ToolSpline.through(tool_points(goal, begin.tool(ARM, self.made.T_flange_active)))
+        return ToolSpline.through(
+            tool_points(goal_table(goal), begin.tool(ARM, self.made.T_flange_active))
+        )
 
     def passing(self, time):
         """Return when the tool is nearest to a position of the curve, and its twist then."""

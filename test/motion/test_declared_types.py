@@ -10,6 +10,7 @@ import pytest
 
 from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.pose import Pose
 
 GOAL = Goal(
@@ -39,8 +40,8 @@ def test_a_goal_of_numpy_numbers_and_arrays_equals_one_of_floats():
         segments=of_user(np.array([Segment(type=of_user(np.int8(1)))])),
         keep_open=of_user(np.bool_(False)),
     )
-    plain = with_declared_types(given, Goal, 'goal')
-    assert plain == GOAL
+    plain = goal_table(given)
+    assert plain == goal_table(GOAL)
     assert {type(value) for value in plain.waypoints[0].pose.row()} == {float}
     assert type(plain.waypoints[0].time) is float
     assert type(plain.segments[0].type) is SegmentType
@@ -62,7 +63,7 @@ def test_a_class_of_the_user_becomes_the_one_that_the_robot_process_has():
 @pytest.mark.parametrize(
     ('field', 'value', 'sentence'),
     [
-        ('time', 'soon', r"goal\.waypoints\[0\]\.time is 'soon', which is no number\."),
+        ('time', 'soon', r"Goal\.waypoints\[0\]\.time is 'soon', which is no number\."),
         ('time', True, r'time is True, which is no number'),
         ('time', None, r'time is None, which is no number'),
         ('time', 1 << 2000, r'time is too large a number'),
@@ -76,4 +77,4 @@ def test_a_class_of_the_user_becomes_the_one_that_the_robot_process_has():
 def test_a_wrong_value_is_refused_by_name(field, value, sentence):
     goal = replace(GOAL, waypoints=(replace(GOAL.waypoints[0], **{field: value}),))
     with pytest.raises(WrongType, match=sentence):
-        with_declared_types(goal, Goal, 'goal')
+        goal_table(goal)

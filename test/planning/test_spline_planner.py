@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.pose_rows import angle_rows
@@ -83,7 +84,7 @@ def joints_of(made):
 
 def curve_of(cell, goal, arm=None):
     start = SplineState(q=cell.state.actual_q).tool(arm or cell.arm, cell.T_flange_tcp)
-    return ToolSpline.through(tool_points(goal, start))
+    return ToolSpline.through(tool_points(goal_table(goal), start))
 
 
 def off(arm, T_flange_tcp, joints, curve, times):
@@ -613,11 +614,13 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
     whole = plan(goal, cell.state, cell.arm, OPTIONS)
     first, second = parts_of(goal, 3)
     begun = plan_spline(
-        SplineState(q=cell.state.actual_q), first, cell.arm, cell.T_flange_tcp, OPTIONS
+        SplineState(q=cell.state.actual_q), goal_table(first), cell.arm, cell.T_flange_tcp, OPTIONS
     )
     assert begun.end.is_moving
     assert begun.end.time == pytest.approx(goal.waypoints[2].time)
-    rest = plan_spline(begun.end, second, cell.arm, cell.T_flange_tcp, OPTIONS, first=3)
+    rest = plan_spline(
+        begun.end, goal_table(second), cell.arm, cell.T_flange_tcp, OPTIONS, first=3
+    )
     assert not rest.end.is_moving
     assert [s.waypoint for s in rest.segments][0 :: len(rest.segments) - 1] == [3, 5]
     assert rest.reference.time[0] == begun.end.time
@@ -632,7 +635,7 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
 def test_an_open_goal_may_be_planned_to_end_moving(cell):
     goal = goal_of(cell, 15, keep_open=True)
     part = plan_spline(
-        SplineState(q=cell.state.actual_q), goal, cell.arm, cell.T_flange_tcp, OPTIONS
+        SplineState(q=cell.state.actual_q), goal_table(goal), cell.arm, cell.T_flange_tcp, OPTIONS
     )
     q, qd, qdd = part.end.rows()
     assert tool_rates(cell.arm, cell.T_flange_tcp, q, qd, qdd)[0][0] == pytest.approx(
@@ -648,7 +651,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
     fast = replace(goal, waypoints=(replace(goal.waypoints[0], time=0.1),))
     text = r'multiply all times by \d+\.\d+ \(and adapt twists and accelerations\)\.$'
     with pytest.raises(TooFast, match=text):
-        plan_spline(start, fast, cell.arm, cell.T_flange_tcp, slow)
+        plan_spline(start, goal_table(fast), cell.arm, cell.T_flange_tcp, slow)
     with pytest.raises(TooFast, match=text):
         plan(replace(fast, keep_open=True, execution=SPLINE), cell.state, cell.arm, slow)
 
@@ -703,10 +706,10 @@ def test_the_way_to_rest_behind_an_open_end_is_checked_too(cell):
     options = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))
     start = SplineState(q=cell.state.actual_q)
     with pytest.raises(CollisionPredicted, match='"table"'):
-        plan_spline(start, goal, cell.arm, cell.T_flange_tcp, options)
+        plan_spline(start, goal_table(goal), cell.arm, cell.T_flange_tcp, options)
     plan_spline(
         start,
-        replace(goal, waypoints=(replace(goal.waypoints[0], twist=(0.0,) * 6),)),
+        goal_table(replace(goal, waypoints=(replace(goal.waypoints[0], twist=(0.0,) * 6),))),
         cell.arm,
         cell.T_flange_tcp,
         options,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
     Pose,
@@ -76,7 +77,7 @@ FRAME = Pose((0.5, -0.2, 0.1), quaternion_from_rotation_vector((0.4, -0.8, 1.1))
 @pytest.mark.parametrize('frame', [IDENTITY, FRAME])
 def test_pose_twist_and_acceleration_at_each_point_are_those_asked_for(quintic, frame):
     goal = random_goal(3, quintic, frame)
-    spline = ToolSpline.through(tool_points(goal, at_rest()))
+    spline = ToolSpline.through(tool_points(goal_table(goal), at_rest()))
     for point in goal.waypoints:
         # At the end of a piece, and where the next one begins.
         for time in (point.time - 1e-9, point.time)[: 1 if point is goal.waypoints[-1] else 2]:
@@ -94,7 +95,7 @@ def test_pose_twist_and_acceleration_at_each_point_are_those_asked_for(quintic, 
 
 @pytest.mark.parametrize('quintic', [False, True])
 def test_rates_of_the_curve_are_its_derivatives(quintic):
-    spline = ToolSpline.through(tool_points(random_goal(4, quintic), at_rest()))
+    spline = ToolSpline.through(tool_points(goal_table(random_goal(4, quintic)), at_rest()))
     times = np.random.default_rng(0).uniform(0.01, spline.times[-1] - 0.01, 60)
     _, twist = motion_at(spline, times)
     rows = spline.at(times)
@@ -112,7 +113,7 @@ def test_without_accelerations_the_way_from_rest_to_rest_is_the_straight_line_of
             ),
         )
     )
-    spline = ToolSpline.through(tool_points(goal, at_rest()))
+    spline = ToolSpline.through(tool_points(goal_table(goal), at_rest()))
     for u in (0.25, 0.5, 0.8):
         share = u * u * (3.0 - 2.0 * u)
         pose = pose_from_row(spline.at(np.array([2.0 * u])).poses[0])
@@ -122,7 +123,7 @@ def test_without_accelerations_the_way_from_rest_to_rest_is_the_straight_line_of
 
 
 def test_a_stretched_curve_is_the_same_way_with_slower_rates():
-    spline = ToolSpline.through(tool_points(random_goal(5, True), at_rest(time=0.5)))
+    spline = ToolSpline.through(tool_points(goal_table(random_goal(5, True)), at_rest(time=0.5)))
     slow = spline.stretch_times(1.7)
     times = np.linspace(0.5, spline.times[-1] - 1e-9, 40)
     a, b = spline.at(times), slow.at(0.5 + 1.7 * (times - 0.5))
@@ -146,7 +147,7 @@ def turning(time, twist=CHOOSE, acceleration=(0.0,) * 6):
 
 def test_chosen_twists_are_exact_for_an_even_acceleration():
     goal = Goal(waypoints=tuple(turning(time) for time in (0.5, 0.8, 1.5, 1.7)), keep_open=True)
-    points = tool_points(goal, at_rest())
+    points = tool_points(goal_table(goal), at_rest())
     for time, twist in zip(points.times[1:-1], points.twists[1:-1], strict=True):
         assert twist == pytest.approx(
             (0.1 * time, 0.2 * time, 0.0, 0.0, 0.24 * time, 0.32 * time), abs=1e-12
@@ -161,7 +162,7 @@ def test_chosen_accelerations_are_exact_for_an_even_acceleration():
         ),
         keep_open=True,
     )
-    points = tool_points(goal, at_rest())
+    points = tool_points(goal_table(goal), at_rest())
     assert points.quintic
     for acceleration in points.accelerations[1:-1]:
         assert acceleration == pytest.approx((0.1, 0.2, 0.0, 0.0, 0.24, 0.32), abs=1e-11)
@@ -177,7 +178,7 @@ def test_what_is_chosen_goes_along_the_axes_of_the_goal_frame_and_only_where_it_
             for t in (1.0, 2.0, 3.0)
         ),
     )
-    points = tool_points(goal, at_rest(FRAME))
+    points = tool_points(goal_table(goal), at_rest(FRAME))
     assert points.twists[1:3, :3] == pytest.approx(
         np.array([rotate(FRAME.quaternion, (0.1, 0.0, 0.0))] * 2)
     )
@@ -190,7 +191,9 @@ def test_a_closed_motion_ends_at_rest_and_an_open_one_with_its_last_speed():
         for t in (1.0, 2.0)
     ]
     for keep_open, speed in ((False, 0.0), (True, 0.1)):
-        chosen = tool_points(Goal(waypoints=tuple(points), keep_open=keep_open), at_rest())
+        chosen = tool_points(
+            goal_table(Goal(waypoints=tuple(points), keep_open=keep_open)), at_rest()
+        )
         assert chosen.twists[-1] == pytest.approx((speed, 0.0, 0.0, 0.0, 0.0, 0.0))
         assert not chosen.accelerations[-1].any()
 
@@ -207,7 +210,9 @@ def test_a_point_beside_a_wait_is_a_stop():
             Waypoint(time=1.0 + k, pose=pose, twist=CHOOSE) for k, pose in enumerate(poses)
         )
     )
-    assert tool_points(goal, at_rest()).twists[:, 0] == pytest.approx([0.0, 0.0, 0.0, 0.1, 0.0])
+    assert tool_points(goal_table(goal), at_rest()).twists[:, 0] == pytest.approx(
+        [0.0, 0.0, 0.0, 0.1, 0.0]
+    )
 
 
 def test_twelve_chosen_points_make_a_circle():
@@ -221,7 +226,7 @@ def test_twelve_chosen_points_make_a_circle():
         )
 
     goal = Goal(waypoints=tuple(point(k) for k in range(13)), keep_open=True)
-    spline = ToolSpline.through(tool_points(goal, at_rest(Pose((0.1, -0.05, 0.0)))))
+    spline = ToolSpline.through(tool_points(goal_table(goal), at_rest(Pose((0.1, -0.05, 0.0)))))
     rows = spline.at(np.linspace(2.0, 6.0, 200))
     assert np.linalg.norm(rows.poses[:, :3], axis=1) == pytest.approx(0.1, rel=0.004)
     speed = np.linalg.norm(rows.twists[:, :3], axis=1)

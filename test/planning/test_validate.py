@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
+from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
@@ -485,9 +486,10 @@ def test_a_spline_needs_a_robot_that_takes_joints_exactly(mode, options, text):
 
 def test_auto_is_a_spline_only_with_times_and_a_twist_or_acceleration_at_an_inner_point():
     for goal in (TIMED, with_point(TIMED, 2, twist=ONE), with_point(PLAIN, 1, twist=ONE)):
-        assert resolve_execution_mode(goal) is ExecutionMode.PRIMITIVES
+        assert resolve_execution_mode(goal_table(goal)) is ExecutionMode.PRIMITIVES
     for field in ('twist', 'acceleration'):
-        assert resolve_execution_mode(with_point(TIMED, 1, **{field: ONE})) is ExecutionMode.SPLINE
+        goal = with_point(TIMED, 1, **{field: ONE})
+        assert resolve_execution_mode(goal_table(goal)) is ExecutionMode.SPLINE
 
 
 @pytest.mark.parametrize('kind', [SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT])
@@ -531,7 +533,7 @@ def test_every_rule_refuses_some_goal_of_the_table():
     def refusing(goal, options=OPTIONS):
         for rule in RULES:
             try:
-                rule(goal, options)
+                rule(goal_table(goal), options)
             except Exception:
                 return rule
         return None

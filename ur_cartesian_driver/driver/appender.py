@@ -124,7 +124,7 @@ class Appender:
         :raises GoalRefused: as of :meth:`append`.
         """
         try:
-            new_points = with_declared_types(new_points, AppendedPoints, 'append')
+            new_points = with_declared_types(new_points, AppendedPoints, 'append').in_rows()
         except WrongType as error:
             raise InvalidGoal(error.field, error.problem) from None
         if not self._is_open:

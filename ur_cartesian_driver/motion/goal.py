@@ -9,6 +9,7 @@ A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -146,9 +147,9 @@ class Tolerance:
 class Goal:
     """A Cartesian trajectory and how to execute it."""
 
-    waypoints: tuple[Waypoint, ...]
+    waypoints: Sequence[Waypoint]
     #: Empty, or one for each waypoint.
-    segments: tuple[Segment, ...] = ()
+    segments: Sequence[Segment] = ()
     #: The frame of the goal in the robot's base.
     T_base_frame: Pose = IDENTITY
     frame_id: str = ''

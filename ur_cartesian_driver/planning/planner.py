@@ -25,7 +25,6 @@ from pkgutil import resolve_name
 from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidPosture,
@@ -126,13 +125,9 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 
 
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
-    try:
-        goal = with_declared_types(goal, Goal, 'Goal')
-    except WrongType as error:
-        raise InvalidGoal(error.field, error.problem) from None
-    check(goal, options)
-    goal = add_safe_outputs(apply_default_tolerances(goal, options), options)
-    retargeted = retarget_to_tcp(goal, state, options)
+    table = check(goal, options)
+    table = add_safe_outputs(apply_default_tolerances(table, options), options)
+    retargeted = retarget_to_tcp(table, state, options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
     return plan_goal(planner)
@@ -210,7 +205,8 @@ class GoalPlanner:
         self.remarks = list(retargeted.remarks)
         #: By point: why its primitive is not the plain one of its segment type.
         self.reasons: dict[int, list[str]] = {}
-        self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
+        points = goal.waypoints
+        self.targets = [goal.T_base_frame @ points.pose(i) for i in range(len(points))]
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)
         if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
@@ -249,7 +245,7 @@ class GoalPlanner:
         :raises InvalidGoal: point 0 is at time 0, but the robot is elsewhere.
         :raises InvalidPosture: point 0 is at time 0, but the arm has another posture.
         """
-        if not self.timed or self.goal.waypoints[0].time != 0.0:
+        if not self.timed or self.goal.waypoints.times[0] != 0.0:
             return 0
         self._check_start_pose()
         self._check_start_posture()
@@ -259,7 +255,7 @@ class GoalPlanner:
     def geometries(self) -> list[SegmentGeometry]:
         """Return the curve of every segment and the configuration in which it arrives."""
         first = self.first_target()
-        stops = [0.0, *(point.time for point in self.goal.waypoints)][first:]
+        stops = [0.0, *self.goal.waypoints.times.tolist()][first:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
         geometries = self.joint_path_planner.geometries(
             first, self.state.actual_tcp_pose, self.state.actual_q, times
@@ -351,7 +347,7 @@ class GoalPlanner:
 
     def _check_start_posture(self) -> None:
         """Refuse a first point at time 0 with another posture than that of the robot."""
-        posture = self.goal.waypoints[0].posture
+        posture = self.goal.waypoints.postures.get(0)
         if posture:
             named = named_joints(posture, self.options.tf_prefix)
             q = self.state.actual_q

@@ -25,7 +25,8 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment
+from ur_cartesian_driver.motion.goal import IOCommand, Segment
+from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
@@ -175,9 +176,11 @@ class _PartPlanner:
         if replannable:
             q_start, time_before = replannable[0].q_before, replannable[0].time_before
         first = before.points - len(replannable)
-        waypoints = (*(known.waypoint for known in replannable), *appended.waypoints)
-        if any(point.time != 0.0 for point in waypoints):
-            waypoints = tuple(replace(point, time=point.time - time_before) for point in waypoints)
+        waypoints = WaypointRows.of(
+            (*(known.waypoint for known in replannable), *appended.waypoints)
+        )
+        if waypoints.times.any():
+            waypoints = replace(waypoints, times=waypoints.times - time_before)
         goal = replace(
             before.goal,
             waypoints=waypoints,
@@ -288,7 +291,7 @@ class _PartPlanner:
             self._T_flange_tcp,
             self._options,
             first=before.points,
-            tool_tips=tool_tips(before.goal, before.T_flange_active),
+            tool_tips=tool_tips(goal, before.T_flange_active),
         )
         segments, reference, start_time = found.segments, found.reference, start.time
         if before.replanned_piece is not None:
@@ -307,32 +310,28 @@ class _PartPlanner:
         )
         return self.spline_part(plan, found.end, records_before, start_time)
 
-    def _spline_goal(self, start: SplineState) -> Goal:
+    def _spline_goal(self, start: SplineState) -> GoalTable:
         """Return the checked goal of the appended points for the TCP, in motion time."""
         before, appended = self._before, self._appended
+        points = WaypointRows.of(appended.waypoints)
         # It is checked as a goal of its own: its times count from the last point.
         goal = replace(
             before.goal,
-            waypoints=tuple(
-                replace(point, time=round(point.time - before.last_client_time, _DIGITS))
-                for point in appended.waypoints
+            waypoints=replace(
+                points, times=np.round(points.times - before.last_client_time, _DIGITS)
             ),
             segments=appended.segments,
             io_commands=numbered(appended, before.points),
             keep_open=not appended.last,
         )
         try:
-            check(goal, self._options)
-            goal = retarget_to_tcp(goal, self._state_at_rest(start.q), self._options).goal
+            table = check(goal, self._options)
+            table = retarget_to_tcp(table, self._state_at_rest(start.q), self._options).goal
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), before.points)) from None
-        return replace(
-            goal,
-            waypoints=tuple(
-                replace(point, time=point.time + before.last_client_time + before.time_offset)
-                for point in goal.waypoints
-            ),
-        )
+        points = table.waypoints
+        shift = before.last_client_time + before.time_offset
+        return replace(table, waypoints=replace(points, times=points.times + shift))
 
     def spline_part(
         self, plan: Plan, end: SplineState, records_before: int, start_time: float
@@ -477,12 +476,13 @@ class _PartPlanner:
             keep_open=not appended.last,
         )
         remarks = point_remarks if goal.execution.traits.is_spline else ignored_remarks
+        table = goal_table(goal)
         count = len(appended.waypoints)
         points = 'point' if count == 1 else 'points'
         end = ', these are the last' if appended.last else ''
         sentences = [
             f'{count} {points} appended, the goal has {self._points}{end}.',
-            *(f'{text[:1].upper()}{text[1:]}.' for text in remarks(goal, before.points)),
+            *(f'{text[:1].upper()}{text[1:]}.' for text in remarks(table, before.points)),
         ]
         return ' '.join(sentences)
 

@@ -4,10 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.goal_table import (
+    goal_table,
+    rows_where,
+    SegmentRows,
+    WaypointRows,
+)
 from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
@@ -22,13 +31,25 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 class AppendedPoints:
     """The points of one append request."""
 
-    waypoints: tuple[Waypoint, ...] = ()
+    waypoints: Sequence[Waypoint] = ()
     #: Empty, or one for each waypoint.
-    segments: tuple[Segment, ...] = ()
+    segments: Sequence[Segment] = ()
     #: Their waypoints are numbered from the start of the goal.
     io_commands: tuple[IOCommand, ...] = ()
     #: Whether they are the last.
     last: bool = False
+
+    def in_rows(self) -> AppendedPoints:
+        """
+        Return the same with points and segments as rows.
+
+        :raises WrongType: a value is not of its declared type; the text names the field.
+        """
+        return replace(
+            self,
+            waypoints=WaypointRows.of(self.waypoints, 'append.waypoints'),
+            segments=SegmentRows.of(self.segments, 'append.segments'),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +119,12 @@ def check_appended_points(
             )
     # The commands alone: the plan numbers them behind older ones.
     check_outputs(
-        replace(
-            appendable.goal, waypoints=appended.waypoints, io_commands=numbered(appended, first)
+        goal_table(
+            replace(
+                appendable.goal,
+                waypoints=appended.waypoints,
+                io_commands=numbered(appended, first),
+            )
         ),
         options,
     )
@@ -115,20 +140,19 @@ def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
 
 def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
     """Refuse points that are not later than those before them, in client time."""
-    before = appendable.last_client_time
-    if before == 0.0 and not any(point.time for point in appended.waypoints):
+    times, first = WaypointRows.of(appended.waypoints).times, appendable.points
+    if appendable.last_client_time == 0.0 and not times.any():
         return
-    for i, point in enumerate(appended.waypoints, appendable.points):
-        if appendable.last_client_time == 0.0 and appendable.points > 1:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'),
-                f'is {point.time:g} s, but the points before have no times',
-                'set it to 0 in all points',
-            )
-        if point.time <= before:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'),
-                f'is {point.time:g} s, not later than the {before:g} s of the point before',
-                'count times from the start of the goal',
-            )
-        before = point.time
+    if appendable.last_client_time == 0.0 and first > 1:
+        raise InvalidGoal(
+            point_field(first, 'time_from_start'),
+            f'is {times[0]:g} s, but the points before have no times',
+            'set it to 0 in all points',
+        )
+    before = np.append(appendable.last_client_time, times[:-1])
+    for i in rows_where(times <= before)[:1]:
+        raise InvalidGoal(
+            point_field(first + i, 'time_from_start'),
+            f'is {times[i]:g} s, not later than the {before[i]:g} s of the point before',
+            'count times from the start of the goal',
+        )

@@ -25,7 +25,8 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Goal, SegmentType
+from ur_cartesian_driver.motion.goal import Segment, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, NO_POSTURE
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
@@ -65,7 +66,6 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
 from ur_cartesian_driver.planning.request.goal_fields import (
-    DEFAULT_SEGMENT,
     point_field,
     segment_field,
 )
@@ -94,7 +94,7 @@ class JointPathPlanner:
 
     def __init__(
         self,
-        goal: Goal,
+        goal: GoalTable,
         targets: Sequence[Pose],
         kinematics: TcpKinematics,
         options: PlanningOptions,
@@ -255,7 +255,7 @@ class JointPathPlanner:
         """Return the refusal of a line or an arc that misses its posture."""
         clause = self.kinematics.explain_missed_posture(
             draft.known_curve.end,
-            self.goal.waypoints[draft.index].posture,
+            self.goal.waypoints.postures.get(draft.index, NO_POSTURE),
             q,
             draft.index,
             self.options.tf_prefix,
@@ -291,7 +291,7 @@ class JointPathPlanner:
     def _joint_move(self, k: int) -> None:
         draft, i = self._drafts[k], self._drafts[k].index
         q = self._start_joints(k)
-        target, posture = self.targets[i], self.goal.waypoints[i].posture
+        target, posture = self.targets[i], self.goal.waypoints.postures.get(i)
         where = point_field(i, 'pose')
         if posture:
             named = named_joints(posture, self.options.tf_prefix)
@@ -385,12 +385,13 @@ class JointPathPlanner:
     def _geometries(self, times: Sequence[float | None]) -> Iterator[SegmentGeometry]:
         speed_bounds = self.path_margins.joint_speed_bounds()
         margins = self.path_margins.tightest_margin()
-        for draft, time in zip(self._drafts, times, strict=True):
+        points = self.goal.waypoints[self._drafts[0].index :]
+        for draft, point, time in zip(self._drafts, points, times, strict=True):
             i = draft.index
             geometry = SegmentGeometry(
                 index=i,
                 kind=draft.kind,
-                waypoint=self.goal.waypoints[i],
+                waypoint=point,
                 segment=draft.segment,
                 curve=draft.known_curve,
                 joints=draft.known_joints,
@@ -432,7 +433,7 @@ class JointPathPlanner:
         return replace(
             geometry,
             kind=kind,
-            segment=replace(DEFAULT_SEGMENT, type=geometry.segment.type),
+            segment=Segment(type=geometry.segment.type),
             waypoint=replace(geometry.waypoint, twist=(0.0,) * 6),
             waits=waits,
         )

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from math import degrees, pi
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import ArcMode, Segment, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
@@ -26,7 +27,7 @@ from ur_cartesian_driver.planning.geometry.curves import (
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
-from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_of
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.validate import arc_through_via
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
@@ -92,7 +93,11 @@ class SegmentDraftBuilder:
     """
 
     def __init__(
-        self, goal: Goal, targets: Sequence[Pose], options: PlanningOptions, remarks: list[str]
+        self,
+        goal: GoalTable,
+        targets: Sequence[Pose],
+        options: PlanningOptions,
+        remarks: list[str],
     ) -> None:
         """Keep the goal."""
         self._goal, self._targets, self._options = goal, targets, options
@@ -106,8 +111,7 @@ class SegmentDraftBuilder:
         """
         drafts: list[SegmentDraft] = []
         before, last = start, len(self._goal.waypoints) - 1
-        for i in range(begin, last + 1):
-            segment = segment_of(self._goal, i)
+        for i, segment in enumerate(self._goal.motions[begin:], begin):
             kind = _LINEAR if segment.type == SegmentType.AUTO else SegmentType(segment.type)
             radius = (
                 0.0
@@ -156,7 +160,7 @@ class SegmentDraftBuilder:
         if first.radius <= 0.0:
             return
         target = self._targets[first.index]
-        if is_same_pose(start, target) and not self._goal.waypoints[first.index].posture:
+        if is_same_pose(start, target) and first.index not in self._goal.waypoints.postures:
             first.radius = 0.0  # the robot is already there, as the report says
             return
         check_blends_fit(first.index, start.distance_to(target), 0.0, first.radius)

@@ -8,25 +8,26 @@ A negative radius is refused by :mod:`~.number_rules`, one in a spline by :mod:`
 
 from __future__ import annotations
 
+import numpy as np
+
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, segment_field
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 
-def check_blends(goal: Goal, options: PlanningOptions) -> None:
+def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse blends that overlap between two points of the goal."""
     if is_spline(goal):
         return
-    last = len(goal.waypoints) - 1
-    for i in range(1, len(goal.segments)):
-        check_blends_fit(
-            i,
-            goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
-            goal.segments[i - 1].blend_radius,
-            0.0 if i == last else goal.segments[i].blend_radius,
-        )
+    radii = goal.segments.blend_radii
+    if not radii.any():
+        return
+    after = np.append(radii[1:-1], 0.0)  # the last point is never blended
+    lengths = np.linalg.norm(np.diff(goal.waypoints.poses[:, :3], axis=0), axis=1)
+    for k in rows_where(radii[:-1] + after > lengths):
+        check_blends_fit(k + 1, float(lengths[k]), float(radii[k]), float(after[k]))
 
 
 def check_blends_fit(index: int, length: float, before: float, after: float) -> None:

@@ -14,8 +14,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import degrees, isnan
 
+import numpy as np
+
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import ArcMode, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal_table import (
+    GoalTable,
+    rows_where,
+    SegmentRows,
+    WaypointRows,
+)
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
 from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
 from ur_cartesian_driver.motion.robot_state import RobotState
@@ -26,7 +34,6 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     point_field,
     segment_field,
-    segment_of,
 )
 
 #: The tool counts as not turning up to this angle on a straight or circular segment [rad]: a
@@ -44,7 +51,7 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 class RetargetedGoal:
     """A goal and the state of its robot, both for the TCP of the motion."""
 
-    goal: Goal
+    goal: GoalTable
     state: RobotState
     #: As in :class:`~ur_cartesian_driver.motion.plan.Plan`.
     T_flange_tcp: Pose | None = None
@@ -52,7 +59,9 @@ class RetargetedGoal:
     remarks: tuple[str, ...] = ()
 
 
-def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> RetargetedGoal:
+def retarget_to_tcp(
+    goal: GoalTable, state: RobotState, options: PlanningOptions
+) -> RetargetedGoal:
     """
     Return a checked goal for the TCP with which it will be executed.
 
@@ -85,7 +94,7 @@ def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> 
     )
 
 
-def tool_tips(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
+def tool_tips(goal: GoalTable, T_flange_active: Pose) -> tuple[Pose, ...]:
     """
     Return the tool tips to check for collisions: the active TCP and the controlled frame.
 
@@ -101,24 +110,24 @@ def _is_same_tcp(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= SAME_TCP and a.angle_to(b) <= SAME_TCP
 
 
-def _name(goal: Goal) -> str:
+def _name(goal: GoalTable) -> str:
     return goal.controlled_frame or 'the controlled frame'
 
 
-def _check_no_rotation(goal: Goal, T_base_start: Pose) -> None:
+def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
     """
     Refuse straight and circular segments that turn the tool.
 
     :param T_base_start: where the controlled frame is.
     """
-    before = goal.T_base_frame.inverse() @ T_base_start
-    starts_at_rest = is_timed(goal) and goal.waypoints[0].time == 0.0
-    for i, point in enumerate(goal.waypoints):
-        segment = segment_of(goal, i)
-        angle = before.angle_to(point.pose)
-        before = point.pose
-        if segment.type in _JOINT_TYPES or (i == 0 and starts_at_rest):
-            continue
+    points, segments = goal.waypoints, goal.motions
+    start = goal.T_base_frame.inverse() @ T_base_start
+    follows_path = ~np.isin(segments.types, _JOINT_TYPES)
+    if is_timed(goal) and points.times[0] == 0.0:
+        follows_path[0] = False
+    for i in rows_where(follows_path):
+        angle = (points.pose(i - 1) if i > 0 else start).angle_to(points.pose(i))
+        segment = segments[i]
         joint = '' if is_spline(goal) else 'use JOINT for that segment, '
         remedy = f'keep the orientation, {joint}or set allow_tcp_change to true'
         if angle > MAX_FIXED_ANGLE:
@@ -139,7 +148,7 @@ def _check_no_rotation(goal: Goal, T_base_start: Pose) -> None:
             )
 
 
-def _check_no_angular_rates(goal: Goal, index: int, remedy: str) -> None:
+def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
     """Refuse a point of a spline at which the tool turns; NaN stands for no turn."""
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
@@ -152,16 +161,20 @@ def _check_no_angular_rates(goal: Goal, index: int, remedy: str) -> None:
             )
 
 
-def _retarget_goal(goal: Goal, T_controlled_tcp: Pose) -> Goal:
+def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
     return replace(
         goal,
-        waypoints=tuple(_retarget_waypoint(point, T_controlled_tcp) for point in goal.waypoints),
-        segments=tuple(
-            _retarget_segment(segment, point, T_controlled_tcp)
-            for segment, point in zip(goal.segments, goal.waypoints, strict=True)
-        )
-        if goal.segments
-        else (),
+        waypoints=WaypointRows.of(
+            [_retarget_waypoint(point, T_controlled_tcp) for point in goal.waypoints]
+        ),
+        segments=SegmentRows.of(
+            [
+                _retarget_segment(segment, point, T_controlled_tcp)
+                for segment, point in zip(goal.segments, goal.waypoints, strict=True)
+            ]
+            if goal.segments
+            else ()
+        ),
     )
 
 

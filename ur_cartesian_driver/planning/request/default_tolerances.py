@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 from ur_cartesian_driver.motion.goal import Goal, Tolerance
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
+
+G = TypeVar('G', bound=Goal)
 
 #: The quantities in the names of the parameters ``path_tolerance_...``.
 _QUANTITIES = (
@@ -26,7 +29,7 @@ def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tole
     return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)
 
 
-def apply_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
+def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
     """Return the goal with parameters instead of zeros; a tolerance still zero has no limit."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)

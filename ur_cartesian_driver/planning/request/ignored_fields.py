@@ -4,66 +4,65 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.goal import Goal, SegmentType
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized, is_timed, segment_of
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
 
 #: How many points a remark lists before it counts the rest.
 _MAX_LISTED = 5
+#: Motions whose time is on the wire, without an acceleration.
+_TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
 
 
-def ignored_remarks(goal: Goal, first: int = 0) -> list[str]:
+def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     """Return a remark for each field without effect; the first point has the number ``first``."""
     remarks: list[str] = []
-    timed = is_timed(goal)
-    points = list(enumerate(goal.waypoints, first))
-    if timed:
-        add_remark(
-            remarks,
-            [i for i, p in points if any(p.twist)],
-            'twist is ignored: UR motion commands stop or blend at a point',
-        )
+    points, segments = goal.waypoints, goal.segments
+
+    def add(rows: NDArray[np.bool_] | np.bool_, what: str) -> None:
+        add_remark(remarks, [first + row for row in rows_where(rows)], what)
+
+    has_twist = points.twists.any(axis=1)
+    if timed := is_timed(goal):
+        add(has_twist, 'twist is ignored: UR motion commands stop or blend at a point')
     else:
-        add_remark(
-            remarks,
-            [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
+        add(
+            has_twist & ~_take_twist(goal),
             'twist is ignored: the segment has a velocity, or its type takes no tool speed',
         )
-    add_remark(
-        remarks,
-        [i for i, p in points if any(p.acceleration)],
+    add(
+        points.accelerations.any(axis=1),
         'acceleration is ignored: UR motion commands cannot meet it',
     )
-    add_remark(
-        remarks, [i for i, p in points if any(p.jerk)], 'jerk is ignored: no robot motion takes it'
-    )
+    add(points.jerks.any(axis=1), 'jerk is ignored: no robot motion takes it')
     if timed:
-        add_remark(
-            remarks,
-            [
-                i
-                for i, s in enumerate(goal.segments, first)
-                if s.acceleration > 0.0
-                and s.type in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
-            ],
+        add(
+            (segments.accelerations > 0.0) & np.isin(segments.types, _TIMED_TYPES),
             'the acceleration of the segment is ignored: its time sets the speed',
         )
-    if goal.segments and goal.segments[-1].blend_radius > 0.0 and not goal.keep_open:
+    if segments and segments.blend_radii[-1] > 0.0 and not goal.keep_open:
         remarks.append(
-            f'point {points[-1][0]}: blend_radius is ignored: the last point is never blended'
+            f'point {first + len(points) - 1}: blend_radius is ignored: the last point is never '
+            'blended'
         )
     return remarks
 
 
-def _takes_twist(goal: Goal, index: int) -> bool:
-    segment = segment_of(goal, index)
-    return (
-        segment.velocity == 0.0
-        and segment.type != SegmentType.JOINT
-        and not is_optimized(segment.type)
+def _take_twist(goal: GoalTable) -> NDArray[np.bool_]:
+    """Tell of each segment whether the twist at its end is its speed."""
+    segments = goal.motions
+    takes: NDArray[np.bool_] = (segments.velocities == 0.0) & ~np.isin(
+        segments.types, (SegmentType.JOINT, *OPTIMIZED_TYPES)
     )
+    return takes
 
 
-def add_remark(remarks: list[str], points: list[int], what: str) -> None:
+def add_remark(remarks: list[str], points: Sequence[int], what: str) -> None:
     """Add a remark about points, if there are any."""
     if not points:
         return

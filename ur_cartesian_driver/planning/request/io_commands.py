@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_names import (
     output_fault,
@@ -22,7 +23,7 @@ from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_m
 MAX_OUTPUT_OFFSET = 60.0
 
 
-def check_outputs(goal: Goal, options: PlanningOptions) -> None:
+def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     """
     Check the commands of a goal.
 
@@ -71,7 +72,7 @@ def _check_output(field: str, named: IOCommand | SafeOutput) -> None:
         raise InvalidGoal(f'{field}.{name}', wrong, remedy)
 
 
-def _check_safe_outputs(goal: Goal, options: PlanningOptions) -> None:
+def _check_safe_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     """Check the outputs that a goal, or the parameter, wants to be safe."""
     if (goal.safe_outputs or options.safe_outputs) and not options.dialect.supports_outputs:
         raise NotAvailable(
@@ -91,7 +92,7 @@ def _check_safe_outputs(goal: Goal, options: PlanningOptions) -> None:
         )
 
 
-def add_safe_outputs(goal: Goal, options: PlanningOptions) -> Goal:
+def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
     """Return a goal with the safe outputs of the parameter that it does not name itself."""
     named = {(output.output, output.pin) for output in goal.safe_outputs}
     added = tuple(

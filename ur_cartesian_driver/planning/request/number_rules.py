@@ -9,10 +9,15 @@ from enum import IntEnum
 from math import hypot, isfinite, isnan, sqrt
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.pose import Quaternion
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.default_tolerances import named_tolerances
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, point_field, segment_field
@@ -23,15 +28,18 @@ QUATERNION_TOLERANCE = 1e-3
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
 
-def check_enums(goal: Goal, options: PlanningOptions) -> None:
+def check_enums(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse a mode or a type that does not exist."""
     _check_enum('execution', goal.execution, ExecutionMode)
-    for i, segment in enumerate(goal.segments):
+    segments = goal.segments
+    known = np.isin(segments.types, list(SegmentType)) & np.isin(segments.arc_modes, list(ArcMode))
+    for i in rows_where(~known):
+        segment = segments[i]
         _check_enum(segment_field(i, 'type'), segment.type, SegmentType)
         _check_enum(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
 
 
-def check_frame_numbers(goal: Goal, options: PlanningOptions) -> None:
+def check_frame_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse poses of frames that are no poses."""
     for name, pose in (
         ('trajectory.header.frame_id', goal.T_base_frame),
@@ -42,19 +50,31 @@ def check_frame_numbers(goal: Goal, options: PlanningOptions) -> None:
             _check_unit(f'the orientation of {name}', pose.quaternion)
 
 
-def check_point_numbers(goal: Goal, options: PlanningOptions) -> None:
+def check_point_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse points with numbers that are not finite, or with no orientation."""
-    nan_allowed: bool | None = None
-    for i, point in enumerate(goal.waypoints):
-        if not _all_finite(point):
-            nan_allowed = is_spline(goal) if nan_allowed is None else nan_allowed
-            _refuse_not_finite(i, point, nan_allowed)
-        _check_unit(point_field(i, 'pose.orientation'), point.pose.quaternion)
+    points = goal.waypoints
+    numbers = (points.times[:, None], points.poses, points.jerks)
+    rates = (points.twists, points.accelerations)
+    fine = _are_units(points.poses[:, 3:])
+    for values in (*numbers, *rates):
+        fine &= np.isfinite(values).all(axis=1)
+    if fine.all():
+        return
+    # NaN in a rate of a spline lets the driver choose.
+    nan_allowed = is_spline(goal)
+    for i in rows_where(~fine):
+        _check_point(i, points[i], nan_allowed)
 
 
-def check_segment_numbers(goal: Goal, options: PlanningOptions) -> None:
+def check_segment_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse segments with negative numbers, or with ones that are not finite."""
-    for i, segment in enumerate(goal.segments):
+    segments = goal.segments
+    numbers = np.stack((segments.blend_radii, segments.velocities, segments.accelerations))
+    vias = segments.vias
+    fine = (np.isfinite(numbers) & (numbers >= 0.0)).all(axis=0)
+    fine &= ~segments.has_via | (np.isfinite(vias).all(axis=1) & _are_units(vias[:, 3:]))
+    for i in rows_where(~fine):
+        segment = segments[i]
         for field in ('blend_radius', 'velocity', 'acceleration'):
             value = getattr(segment, field)
             check_finite(segment_field(i, field), (value,))
@@ -68,7 +88,7 @@ def check_segment_numbers(goal: Goal, options: PlanningOptions) -> None:
             _check_unit(segment_field(i, 'via.orientation'), segment.via.quaternion)
 
 
-def check_tolerance_numbers(goal: Goal, options: PlanningOptions) -> None:
+def check_tolerance_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse tolerances that are not finite."""
     for name, tolerance in named_tolerances(goal):
         for field in ('position', 'orientation', 'twist', 'acceleration'):
@@ -84,23 +104,9 @@ def _check_enum(field: str, value: int, kind: type[_Enum]) -> None:
         raise InvalidGoal(field, f'is {value}; allowed are {names}') from None
 
 
-def _all_finite(point: Waypoint) -> bool:
-    # A sum is finite only if every term is. Huge numbers may add up to infinity: then the slow
-    # check finds nothing.
-    pose = point.pose
-    return isfinite(
-        point.time
-        + sum(pose.position)
-        + sum(pose.quaternion)
-        + sum(point.twist)
-        + sum(point.acceleration)
-        + sum(point.jerk)
-    )
-
-
-def _refuse_not_finite(index: int, point: Waypoint, nan_allowed: bool) -> None:
+def _check_point(index: int, point: Waypoint, nan_allowed: bool) -> None:
     """
-    Refuse the number that is not finite.
+    Refuse a number that is not finite, and an orientation that is none.
 
     :param nan_allowed: whether NaN in twist and acceleration lets the driver choose.
     """
@@ -116,6 +122,7 @@ def _refuse_not_finite(index: int, point: Waypoint, nan_allowed: bool) -> None:
                 for value in values
             ),
         )
+    _check_unit(point_field(index, 'pose.orientation'), point.pose.quaternion)
 
 
 def check_finite(field: str, values: Iterable[float]) -> None:
@@ -123,6 +130,13 @@ def check_finite(field: str, values: Iterable[float]) -> None:
     for value in values:
         if not isfinite(value):
             raise InvalidGoal(field, f'contains {value}; every number must be finite')
+
+
+def _are_units(quaternions: Floats) -> NDArray[np.bool_]:
+    """Tell of quaternions (n, 4) whether :func:`_check_unit` has nothing to say."""
+    squares = np.einsum('ij,ij->i', quaternions, quaternions)
+    are_units: NDArray[np.bool_] = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
+    return are_units
 
 
 def _check_unit(field: str, q: Quaternion) -> None:

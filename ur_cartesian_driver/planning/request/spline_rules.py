@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from math import isnan
 
+import numpy as np
+
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import Segment, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
-    DEFAULT_SEGMENT,
     is_spline,
     is_timed,
     point_field,
@@ -28,7 +30,7 @@ MAX_ACCELERATION = 10_000.0
 _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'
 
 
-def check_spline(goal: Goal, options: PlanningOptions) -> None:
+def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse a spline that the robot program cannot run, or that makes no sense."""
     if not is_spline(goal):
         return
@@ -41,18 +43,28 @@ def check_spline(goal: Goal, options: PlanningOptions) -> None:
         )
     _check_support(goal, name, options)
     _check_points(goal)
-    for i, segment in enumerate(goal.segments):
-        if segment is not DEFAULT_SEGMENT:
-            _check_segment(i, segment, name)
+    segments = goal.segments
+    is_plain = np.isin(segments.types, (SegmentType.AUTO, SegmentType.LINEAR))
+    for i in rows_where(~is_plain | (segments.blend_radii > 0.0)):
+        _check_segment(i, segments[i], name)
     if goal.waypoints[0].time == 0.0:
         _check_at_rest(goal, 0, 'starts')
     if not goal.keep_open:
         _check_at_rest(goal, len(goal.waypoints) - 1, 'ends')
 
 
-def _check_points(goal: Goal) -> None:
-    before = 0.0
-    for i, point in enumerate(goal.waypoints):
+def _check_points(goal: GoalTable) -> None:
+    points = goal.waypoints
+    times = points.times
+    wrong = (times > 0.0) & (times < np.append(0.0, times[:-1]) + MIN_SPLINE_TIME)
+    for values, bound in (
+        (points.poses[:, :3], MAX_POINT_COORDINATE),
+        (points.twists, MAX_TWIST),
+        (points.accelerations, MAX_ACCELERATION),
+    ):
+        wrong |= (np.abs(values) > bound).any(axis=1)
+    for i in rows_where(wrong):
+        point, before = points[i], float(times[i - 1]) if i > 0 else 0.0
         if 0.0 < point.time < before + MIN_SPLINE_TIME:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
@@ -60,13 +72,12 @@ def _check_points(goal: Goal) -> None:
                 f'{MIN_SPLINE_TIME:g} s that a piece of a spline needs',
                 'leave points out',
             )
-        before = point.time
-        for field, values, bound in (
+        for field, numbers, bound in (
             ('pose.position', point.pose.position, MAX_POINT_COORDINATE),
             ('twist', point.twist, MAX_TWIST),
             ('acceleration', point.acceleration, MAX_ACCELERATION),
         ):
-            if any(abs(value) > bound for value in values):
+            if any(abs(value) > bound for value in numbers):
                 raise InvalidGoal(
                     point_field(i, field),
                     f'contains a number beyond {bound:g}, more than any of these robots can do',
@@ -74,7 +85,7 @@ def _check_points(goal: Goal) -> None:
                 )
 
 
-def _check_support(goal: Goal, name: str, options: PlanningOptions) -> None:
+def _check_support(goal: GoalTable, name: str, options: PlanningOptions) -> None:
     remedy = 'set execution to PRIMITIVES'
     if not options.calibration_known:
         raise NotAvailable(
@@ -118,7 +129,7 @@ def _check_segment(index: int, segment: Segment, name: str) -> None:
         )
 
 
-def _check_at_rest(goal: Goal, index: int, verb: str) -> None:
+def _check_at_rest(goal: GoalTable, index: int, verb: str) -> None:
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values):

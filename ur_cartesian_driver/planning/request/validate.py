@@ -16,7 +16,10 @@ from collections.abc import Callable
 from math import isfinite, pi
 from typing import TypeAlias
 
+import numpy as np
+
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.declared_types import WrongType
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidJoints,
@@ -30,8 +33,9 @@ from ur_cartesian_driver.motion.goal import (
     Segment,
     SegmentType,
 )
+from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose, SAME_POSITION
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends
 from ur_cartesian_driver.planning.request.default_tolerances import (
@@ -39,15 +43,14 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     named_tolerances,
 )
 from ur_cartesian_driver.planning.request.goal_fields import (
-    DEFAULT_SEGMENT,
     is_optimized,
     is_spline,
-    is_straight,
     is_timed,
+    OPTIMIZED_TYPES,
     point_field,
     resolve_execution_mode,
     segment_field,
-    segment_of,
+    STRAIGHT_TYPES,
 )
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
 from ur_cartesian_driver.planning.request.number_rules import (
@@ -65,23 +68,29 @@ MAX_JOINT_VALUE = 8.0 * pi
 #: How far in the future a stamp may be [s].
 MAX_STAMP_AHEAD = 60.0
 
-Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
+Rule: TypeAlias = Callable[[GoalTable, PlanningOptions], None]
 
 
-def check(goal: Goal, options: PlanningOptions) -> None:
+def check(goal: Goal, options: PlanningOptions) -> GoalTable:
     """
-    Refuse a goal that is wrong for every robot.
+    Refuse a goal that is wrong for every robot; return it as a table.
 
     :raises GoalRefused: a subclass; its text names point, field, value and bound.
     """
-    for rule in RULES:
-        rule(goal, options)
+    try:
+        table = goal_table(goal)
+    except WrongType as error:
+        raise InvalidGoal(error.field, error.problem) from None
+    with np.errstate(over='ignore', invalid='ignore'):  # any numbers may come
+        for rule in RULES:
+            rule(table, options)
+    return table
 
 
 # -- the rules --------------------------------------------------------------------------------
 
 
-def _number_of_points(goal: Goal, options: PlanningOptions) -> None:
+def _number_of_points(goal: GoalTable, options: PlanningOptions) -> None:
     check_list_lengths(
         'trajectory.points',
         len(goal.waypoints),
@@ -92,7 +101,7 @@ def _number_of_points(goal: Goal, options: PlanningOptions) -> None:
     )
 
 
-def _tolerances_are_measurable(goal: Goal, options: PlanningOptions) -> None:
+def _tolerances_are_measurable(goal: GoalTable, options: PlanningOptions) -> None:
     if options.acceleration_known:
         return
     for name, tolerance in named_tolerances(apply_default_tolerances(goal, options)):
@@ -106,7 +115,7 @@ def _tolerances_are_measurable(goal: Goal, options: PlanningOptions) -> None:
             )
 
 
-def _stamp(goal: Goal, options: PlanningOptions) -> None:
+def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
     age = goal.age
     if age is None:
         return
@@ -124,7 +133,7 @@ def _stamp(goal: Goal, options: PlanningOptions) -> None:
         )
 
 
-def _supported(goal: Goal, options: PlanningOptions) -> None:
+def _supported(goal: GoalTable, options: PlanningOptions) -> None:
     if goal.keep_open and not options.dialect.supports_append:
         raise NotAvailable(
             'keep_open',
@@ -149,66 +158,79 @@ def _supported(goal: Goal, options: PlanningOptions) -> None:
         )
 
 
-def _times(goal: Goal, options: PlanningOptions) -> None:
+def _times(goal: GoalTable, options: PlanningOptions) -> None:
     if not is_timed(goal):
         return
-    before = 0.0
-    for i, point in enumerate(goal.waypoints):
-        if point.time < 0.0 or (i > 0 and point.time <= before):
+    times = goal.waypoints.times
+    steps = np.diff(times, prepend=0.0)
+    # The first point may be at 0: the robot is there already.
+    is_late = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
+    for i in rows_where(~is_late | (steps > options.max_segment_time))[:1]:
+        time, before = float(times[i]), float(times[i - 1]) if i > 0 else 0.0
+        if not is_late[i]:
             previous = f' of points[{i - 1}]' if i > 0 else ''
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
-                f'is {point.time:g} s, {"not later" if i > 0 else "less"} than the '
+                f'is {time:g} s, {"not later" if i > 0 else "less"} than the '
                 f'{before:g} s{previous}',
                 'increase it' + ('' if is_spline(goal) else ', or set all times to 0 for speeds'),
             )
-        if point.time - before > options.max_segment_time:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'),
-                f'gives the segment {point.time - before:g} s, '
-                f'more than max_segment_time = {options.max_segment_time:.0f} s',
-                'add points in between',
+        raise InvalidGoal(
+            point_field(i, 'time_from_start'),
+            f'gives the segment {time - before:g} s, '
+            f'more than max_segment_time = {options.max_segment_time:.0f} s',
+            'add points in between',
+        )
+
+
+def _segment_rules(goal: GoalTable, options: PlanningOptions) -> None:
+    timed, segments = is_timed(goal), goal.segments
+    is_fast = np.maximum(segments.velocities, segments.accelerations) > 1.0
+    is_arc = segments.types == SegmentType.CIRCULAR
+    has_via_fields = segments.arc_modes != ArcMode.UNCONSTRAINED
+    has_via_fields |= segments.has_via & (segments.vias != IDENTITY.row()).any(axis=1)
+    has_via_fields[list(segments.via_postures)] = True
+    suspect = np.isin(segments.types, OPTIMIZED_TYPES) & (
+        timed | is_fast | (not options.optimove_known)
+    )
+    suspect |= timed & (segments.velocities > 0.0)
+    suspect |= np.where(is_arc, ~segments.has_via, has_via_fields)
+    for i in rows_where(suspect):
+        segment = segments[i]
+        if is_optimized(segment.type) and not options.optimove_known:
+            raise NotAvailable(
+                segment_field(i, 'type'),
+                f'is {segment.type.name}, which needs PolyScope 5.21 or PolyScope X 10.8',
+                'use LINEAR or JOINT',
             )
-        before = point.time
+        _speeds(i, segment, timed)
+        _via(i, segment)
 
 
-def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
-    timed = is_timed(goal)
-    for i, segment in enumerate(goal.segments):
-        if segment is not DEFAULT_SEGMENT:
-            if is_optimized(SegmentType(segment.type)) and not options.optimove_known:
-                raise NotAvailable(
-                    segment_field(i, 'type'),
-                    f'is {SegmentType(segment.type).name}, which needs PolyScope 5.21 or '
-                    'PolyScope X 10.8',
-                    'use LINEAR or JOINT',
-                )
-            _speeds(i, segment, timed)
-            _via(i, segment)
+def _postures(goal: GoalTable, options: PlanningOptions) -> None:
+    for i, posture in goal.waypoints.postures.items():
+        check_posture(point_field(i, 'posture'), posture, options.tf_prefix)
+    for i, posture in goal.segments.via_postures.items():
+        check_posture(segment_field(i, 'via_posture'), posture, options.tf_prefix)
 
 
-def _postures(goal: Goal, options: PlanningOptions) -> None:
-    for i, point in enumerate(goal.waypoints):
-        if point.posture:
-            check_posture(point_field(i, 'posture'), point.posture, options.tf_prefix)
-    for i, segment in enumerate(goal.segments):
-        if segment.via_posture:
-            check_posture(segment_field(i, 'via_posture'), segment.via_posture, options.tf_prefix)
-
-
-def _motions(goal: Goal, options: PlanningOptions) -> None:
+def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     if is_spline(goal):
         return  # a spline can wait at a point
-    for i in range(1, len(goal.waypoints)):
-        start, end = goal.waypoints[i - 1], goal.waypoints[i]
-        segment = segment_of(goal, i)
-        if segment.type == SegmentType.CIRCULAR:
+    points, segments = goal.waypoints, goal.motions
+    lengths = np.linalg.norm(np.diff(points.poses[:, :3], axis=0), axis=1)
+    is_arc = segments.types[1:] == SegmentType.CIRCULAR
+    is_near = np.isin(segments.types[1:], STRAIGHT_TYPES) & (lengths < 2.0 * SAME_POSITION)
+    for i in rows_where(np.append(False, is_arc | is_near)):
+        start, end = points.pose(i - 1), points.pose(i)
+        if is_arc[i - 1]:
             # The start's orientation does not matter for the shape.
-            assert segment.via is not None
-            arc_through_via(i, start.pose, segment.via, end.pose, segment.arc_mode)
-        elif is_straight(segment.type) and is_same_pose(start.pose, end.pose):
+            via = segments.via(i)
+            assert via is not None
+            arc_through_via(i, start, via, end, ArcMode(segments.arc_modes[i]))
+        elif is_same_pose(start, end):
             # With a posture it may become a joint move: the planner decides.
-            if not (end.posture and options.on_posture_change == 'movej'):
+            if not (i in points.postures and options.on_posture_change == 'movej'):
                 raise duplicate_point_error(goal, i)
 
 
@@ -310,9 +332,10 @@ def arc_through_via(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode
         ) from None
 
 
-def duplicate_point_error(goal: Goal, index: int) -> InvalidGoal:
+def duplicate_point_error(goal: GoalTable, index: int) -> InvalidGoal:
     """Return the refusal of a segment without a motion."""
-    dwell = goal.waypoints[index].time - goal.waypoints[index - 1].time
+    times = goal.waypoints.times
+    dwell = float(times[index] - times[index - 1])
     dwell_clause = f', and the robot cannot wait there for {dwell:g} s' if is_timed(goal) else ''
     return InvalidGoal(
         point_field(index),

@@ -10,7 +10,7 @@ micrometres of the curve.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import degrees, pi
 
@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.errors import (
     JointLimitExceeded,
     NearSingularity,
 )
-from ur_cartesian_driver.motion.goal import Waypoint
+from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
@@ -101,7 +101,7 @@ class SplinePath:
 def solve_spline_path(
     kinematics: TcpKinematics,
     spline: ToolSpline,
-    waypoints: Sequence[Waypoint],
+    postures: Mapping[int, Posture],
     q_start: Joints,
     options: PlanningOptions,
     *,
@@ -111,7 +111,7 @@ def solve_spline_path(
     """
     Return the path of the arm along a spline.
 
-    :param waypoints: those at the ends of its pieces.
+    :param postures: those at the ends of its pieces, by their number.
     :param first: the number of the first of them.
     :param rests: whether the arm is at rest at its begin.
     :param q_start: the configuration at its begin [rad].
@@ -128,7 +128,7 @@ def solve_spline_path(
     angle = _cumulative(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
     measures = singularity_distance_rows(kinematics.arm, joint_path.q)
     leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
-    _check_path(kinematics, joint_path, np.where(leaving, np.inf, measures), waypoints, options)
+    _check_path(kinematics, joint_path, np.where(leaving, np.inf, measures), postures, options)
     return SplinePath(
         spline=spline,
         first=first,
@@ -148,20 +148,19 @@ def _check_path(
     kinematics: TcpKinematics,
     joint_path: JointPath,
     measures: Floats,
-    waypoints: Sequence[Waypoint],
+    postures: Mapping[int, Posture],
     options: PlanningOptions,
 ) -> None:
     """Raise the first reason why the arm cannot follow."""
     refusal, index = first_refusal(joint_path, measures, options)
-    for k, (piece, point) in enumerate(zip(joint_path.pieces, waypoints, strict=True)):
+    for k, posture in postures.items():
+        piece = joint_path.pieces[k]
         if refusal is not None and piece.index >= index:
             break
-        if not point.posture:
-            continue
         row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
         q = vector6(joint_path.q[row].tolist())
         if clause := kinematics.explain_missed_posture(
-            piece.pose(1.0), point.posture, q, piece.index, options.tf_prefix
+            piece.pose(1.0), posture, q, piece.index, options.tf_prefix
         ):
             raise InvalidPosture(
                 f'{point_field(piece.index, "posture")} cannot be reached along the spline: '

@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.polynomials import MotionRows
@@ -108,7 +108,7 @@ class SplinePieces:
 
 def plan_spline(
     start: SplineState,
-    goal: Goal,
+    goal: GoalTable,
     arm: Arm,
     T_flange_tcp: Pose,
     options: PlanningOptions,
@@ -132,7 +132,7 @@ def plan_spline(
     path = solve_spline_path(
         kinematics,
         ToolSpline.through(points),
-        goal.waypoints,
+        goal.waypoints.postures,
         start.q,
         options,
         first=first,
@@ -208,7 +208,7 @@ def _fit_to_limits(
     kinematics: TcpKinematics,
     path: SplinePath,
     start: SplineState,
-    goal: Goal,
+    goal: GoalTable,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, list[str]]:
     """Return the path in a time that keeps the limits, the factor, and its remarks."""
@@ -237,7 +237,7 @@ def _fit_to_limits(
 
 
 def _segments(
-    path: SplinePath, polynomials: JointPolynomials, goal: Goal
+    path: SplinePath, polynomials: JointPolynomials, goal: GoalTable
 ) -> Iterator[PlannedSegment]:
     length = np.interp(polynomials.times, path.times, path.length)
     angle = np.interp(polynomials.times, path.times, path.angle)
@@ -276,7 +276,9 @@ def _segments(
         )
 
 
-def _segment_line(path: SplinePath, goal: Goal, k: int, count: int, done: Sequence[float]) -> str:
+def _segment_line(
+    path: SplinePath, goal: GoalTable, k: int, count: int, done: Sequence[float]
+) -> str:
     """Return the line of the segment to a point: ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
@@ -286,7 +288,7 @@ def _segment_line(path: SplinePath, goal: Goal, k: int, count: int, done: Sequen
     point = path.first + k
     passes = (
         'stops there'
-        if not any(goal.waypoints[k].twist)
+        if not goal.waypoints.twists[k].any()
         or (k + 1 == len(goal.waypoints) and not goal.keep_open)
         else 'passes through'
     )
@@ -332,8 +334,7 @@ def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]
     )
 
 
-def stretch_times(goal: Goal, factor: float) -> Goal:
+def stretch_times(goal: GoalTable, factor: float) -> GoalTable:
     """Return a goal with all its times stretched."""
-    return replace(
-        goal, waypoints=tuple(replace(point, time=factor * point.time) for point in goal.waypoints)
-    )
+    points = goal.waypoints
+    return replace(goal, waypoints=replace(points, times=factor * points.times))

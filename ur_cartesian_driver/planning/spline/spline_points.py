@@ -10,14 +10,13 @@ point.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, WaypointRows
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import (
     conjugate_rows,
     Floats,
@@ -32,7 +31,7 @@ from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 _MIN_DISTANCE = 1e-9
 
 
-def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
+def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     """
     Return the points of a checked goal in base, behind the start.
 
@@ -52,42 +51,40 @@ def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
     return _in_frame(_without_nan(points, ends_moving=goal.keep_open), goal.T_base_frame)
 
 
-def point_remarks(goal: Goal, first: int) -> list[str]:
+def point_remarks(goal: GoalTable, first: int) -> list[str]:
     """Return the remarks on twists and accelerations; the first point has the number ``first``."""
-    points = list(enumerate(goal.waypoints, first))
+    points = goal.waypoints
     inner = points if goal.keep_open else points[:-1]
     lines: list[str] = []
-    stops = [i for i, point in inner if not any(point.twist)]
-    add_remark(
-        lines, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)'
+
+    def add(rows: NDArray[np.bool_] | np.bool_, what: str) -> None:
+        add_remark(lines, [first + row for row in rows_where(rows)], what)
+
+    add(
+        ~inner.twists.any(axis=1),
+        'the arm stops there, because the twist is 0 (NaN lets the driver choose)',
     )
-    for field in ('twist', 'acceleration'):
-        add_remark(
-            lines,
-            [i for i, point in inner if isnan(sum(getattr(point, field)))],
+    for field, rates in (('twist', inner.twists), ('acceleration', inner.accelerations)):
+        add(
+            np.isnan(rates).any(axis=1),
             f'{field} is NaN, so the driver chooses it to fit the neighbouring points',
         )
-    add_remark(
-        lines,
-        [i for i, point in points if any(point.jerk)],
-        'jerk is ignored: no robot motion takes it',
-    )
-    add_remark(
-        lines,
-        [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
+    add(points.jerks.any(axis=1), 'jerk is ignored: no robot motion takes it')
+    add(
+        goal.segments.accelerations > 0.0,
         'the acceleration of the segment is ignored: its time sets the speed',
     )
     return lines
 
 
-def _given(waypoints: Sequence[Waypoint]) -> ToolPoints:
-    poses = pose_rows(point.pose for point in waypoints)
+def _given(points: WaypointRows) -> ToolPoints:
+    poses = points.poses.copy()
     poses[:, 3:] = normalized_rows(poses[:, 3:])
     return ToolPoints(
-        times=np.array([point.time for point in waypoints]),
+        times=points.times,
         poses=poses,
-        twists=np.array([point.twist for point in waypoints]),
-        accelerations=np.array([point.acceleration for point in waypoints]),
+        twists=points.twists,
+        accelerations=points.accelerations,
         quintic=False,
     )
 
