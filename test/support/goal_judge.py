@@ -29,6 +29,8 @@ OVER = 0.02
 REACH = 5e-6
 #: So near is a line or an arc followed [m], [rad].
 PATH, PATH_TURN = 2e-5, 3e-4
+#: So far from a point may be all packets of an optimized move that stops there and goes on [m].
+OPTIMIZED_TURN = 1e-4
 #: An arc with FIXED orientation may arrive this far off [rad].
 FIXED_TURN = 0.006
 #: Spline: the tolerance of its joints [m].
@@ -312,6 +314,8 @@ class Judge:
             distance, turn = poses_apart(self.tool[row:], target)
             d = distance if radius > 0.0 or fixed else distance + ARM * turn
             reach = 2.0 * REACH + radius
+            if self._has_optimized(i + 2):
+                reach += OPTIMIZED_TURN
             least = np.minimum.accumulate(d)
             passed = np.flatnonzero((least <= reach) & (d > least + 1.5e-6))
             if i == last or not len(passed):
