@@ -10,6 +10,7 @@ from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import MotionSegment
+from ur_cartesian_driver.ros.client import in_flat_arrays
 from ur_cartesian_driver.ros.goals import action_server
 
 pytestmark = pytest.mark.slow
@@ -38,9 +39,10 @@ def later(cell, seconds):
     return goal
 
 
-def test_a_goal_moves_the_arm_and_tells_about_it(cell):
+@pytest.mark.parametrize('form', [lambda goal: goal, in_flat_arrays], ids=['plain', 'packed'])
+def test_a_goal_moves_the_arm_and_tells_about_it(cell, form):
     start = cell.T_base_tcp
-    status, result = cell.run(cell.goal((0.6, 0.03, 0.0, 0.0), (1.2, 0.03, 0.03, 0.0)))
+    status, result = cell.run(form(cell.goal((0.6, 0.03, 0.0, 0.0), (1.2, 0.03, 0.03, 0.0))))
     assert (status, result.error_code) == (SUCCEEDED, ErrorCode.SUCCESSFUL), result.error_string
     assert [line[:8] for line in result.report[:3]] == ['point 0:', 'point 1:', 'clearanc']
     x, y, z = start.position

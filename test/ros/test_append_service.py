@@ -7,6 +7,7 @@ from rclpy.duration import Duration
 from unique_identifier_msgs.msg import UUID
 
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.ros.client import in_flat_arrays
 from ur_cartesian_driver.srv import AppendPoints
 
 pytestmark = pytest.mark.slow
@@ -63,7 +64,9 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
         assert text in refused.message
     stranger = append(handle, 0, (0.5, 0.0, 0.0, 0.0), goal_id=UUID(uuid=[1] * 16))
     assert 'No goal with this goal_id' in stranger.message
-    assert append(handle, 3, (4.0, 0.0, 0.0, 0.0), last=True).accepted
+    packed = in_flat_arrays(cell.goal((4.0, 0.0, 0.0, 0.0))).packed
+    request = AppendPoints.Request(goal_id=handle.goal_id, first_index=3, packed=packed, last=True)
+    assert append.ask(request).accepted
     _, result = cell.result(handle)
     assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string
     assert result.error_string.startswith('All 4 points were')

@@ -51,7 +51,7 @@ class PlanningOptions:
     """
 
     #: Maximum number of points.
-    max_points: int = 20_000
+    max_points: int = 100_000
     #: Maximum age of ``header.stamp`` on receipt [s].
     stamp_tolerance: float = 1.0
     #: How far the robot may be from a first point at time 0 [m], [rad].

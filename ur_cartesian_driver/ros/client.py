@@ -36,7 +36,10 @@ from rosidl_parser.definition import (
 import yaml
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.msg import CartesianTrajectory, DriverStatus
+from ur_cartesian_driver.ros.messages.goal_conversion import point_rows, segment_rows
+from ur_cartesian_driver.ros.messages.packed_points import is_packed, packed_points
 
 Message: TypeAlias = Any
 
@@ -48,6 +51,8 @@ STATUS_NAMES = {
 }
 #: Time without a server after which the driver counts as gone [s].
 SERVER_TIMEOUT = 3.0
+#: From so many points on a goal is sent in flat arrays.
+MANY_POINTS = 200
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _INTEGERS = {
     f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
@@ -96,7 +101,7 @@ def add_tf_prefix(
     trajectory.controlled_frame = _prefixed(tf_prefix, trajectory.controlled_frame)
     postures = [point.posture for point in trajectory.points]
     postures += [segment.via_posture for segment in goal.segments]
-    for posture in postures:
+    for posture in (*postures, goal.packed):
         posture.posture_joint_names = [
             _prefixed(tf_prefix, name) for name in posture.posture_joint_names
         ]
@@ -156,6 +161,35 @@ def _number(typename: str, value: object, key: str) -> bool | int | float:
             f'{key} is {value!r}, but must be a whole number from {low} to {high}.'
         )
     return value
+
+
+def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
+    """
+    Return a goal with its points and segments packed, the same goal if it cannot be.
+
+    That is one with a jerk, which no motion takes, or one that will be refused anyway.
+    """
+    trajectory = goal.trajectory
+    try:
+        segments = segment_rows(goal.segments)
+    except InvalidGoal:
+        return goal
+    if len(segments) not in (0, len(trajectory.points)) or is_packed(goal.packed):
+        return goal
+    packed = packed_points(point_rows(trajectory.points), segments)
+    if packed is None:
+        return goal
+    fields = {name: getattr(goal, name) for name in goal.get_fields_and_field_types()}
+    return FollowCartesianTrajectory.Goal(
+        **fields
+        | {
+            'trajectory': CartesianTrajectory(
+                header=trajectory.header, controlled_frame=trajectory.controlled_frame
+            ),
+            'segments': [],
+            'packed': packed,
+        }
+    )
 
 
 # ---- sending ----------------------------------------------------------------------------------
@@ -218,6 +252,8 @@ class GoalClient:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
+        A goal of many points is sent in flat arrays (:func:`in_flat_arrays`).
+
         The first SIGINT, SIGTERM or SIGHUP cancels the goal and waits for its result, and
         :attr:`signal_number` is set; the second one gives up.
 
@@ -230,6 +266,8 @@ class GoalClient:
         """
         self._find_server(timeout)
         self.signal_number = 0
+        if len(goal.trajectory.points) >= MANY_POINTS:
+            goal = in_flat_arrays(goal)
         failures: list[BaseException] = []
 
         def take(message: Any) -> None:

@@ -4,15 +4,19 @@
 From a goal message to :class:`~ur_cartesian_driver.motion.goal.Goal`.
 
 Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
-planning, which knows no messages, checks the rest. A goal of 20,000 points passes through one
-plain loop, in which every attribute lookup counts.
+planning, which knows no messages, checks the rest. Points become rows of arrays at once, from
+either form (:mod:`~ur_cartesian_driver.ros.messages.packed_points`); of the plain form each
+attribute lookup counts.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import IntEnum
 from typing import TypeVar
+
+import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
@@ -26,11 +30,18 @@ from ur_cartesian_driver.motion.goal import (
     Segment,
     SegmentType,
     Tolerance,
-    Waypoint,
+)
+from ur_cartesian_driver.motion.goal_table import (
+    GoalTable,
+    rows_where,
+    SegmentRows,
+    WaypointRows,
+    zeros,
 )
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.message_fields import (
     Message,
@@ -38,6 +49,7 @@ from ur_cartesian_driver.ros.message_fields import (
     pose_from_message,
     seconds,
 )
+from ur_cartesian_driver.ros.messages.packed_points import is_packed, rows_from_message
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 _Enum = TypeVar('_Enum', bound=IntEnum)
@@ -64,10 +76,11 @@ def goal_from_message(
     :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
     """
     trajectory = message.trajectory
+    waypoints, segments = _rows(message, trajectory.points, 'trajectory.points')
     return resolve_frames(
-        Goal(
-            waypoints=tuple(map(_waypoint, trajectory.points)),
-            segments=_segments(message),
+        GoalTable(
+            waypoints=waypoints,
+            segments=segments,
             frame_id=trajectory.header.frame_id,
             age=_age(trajectory.header.stamp, now),
             path_tolerance=_tolerance(message.path_tolerance),
@@ -94,9 +107,10 @@ def appended_points_from_message(message: Message) -> AppendedPoints:
 
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
+    waypoints, segments = _rows(message, message.points, 'points')
     return AppendedPoints(
-        waypoints=tuple(map(_waypoint, message.points)),
-        segments=_segments(message),
+        waypoints=waypoints,
+        segments=segments,
         io_commands=_io_commands(message),
         last=message.last,
     )
@@ -134,16 +148,45 @@ def _age(stamp: Message, now: int) -> float | None:
     return None if sent == 0 else (now - sent) / 1_000_000_000
 
 
-def _waypoint(point: Message) -> Waypoint:
-    time = point.time_from_start
-    return Waypoint(
-        time=(time.sec * 1_000_000_000 + time.nanosec) / 1_000_000_000,
-        pose=pose_from_message(point.pose),
-        twist=_six(point.twist),
-        acceleration=_six(point.acceleration),
-        jerk=_six(point.jerk),
-        posture=_posture(point.posture),
+def _rows(
+    message: Message, points: Sequence[Message], field: str
+) -> tuple[WaypointRows, SegmentRows]:
+    """Return the points and segments of a message, whichever form they have."""
+    if not is_packed(message.packed):
+        return point_rows(points), segment_rows(message.segments)
+    if given := field if points else 'segments' if message.segments else '':
+        raise InvalidGoal('packed', f'is given beside {given}', 'use one form or the other')
+    waypoints, segments = rows_from_message(message.packed)
+    for name, enum in (('types', SegmentType), ('arc_modes', ArcMode)):
+        column = getattr(segments, name)
+        for i in rows_where(~np.isin(column, list(enum)))[:1]:
+            _member(enum, int(column[i]), f'packed.{name}[{i}]')
+    return waypoints, segments
+
+
+def point_rows(points: Sequence[Message]) -> WaypointRows:
+    """Return ``CartesianTrajectoryPoint`` messages as rows."""
+    n = len(points)
+    postures = ((i, _posture(point.posture)) for i, point in enumerate(points))
+    return WaypointRows(
+        times=np.array([nanoseconds(point.time_from_start) for point in points]) / 1_000_000_000,
+        poses=np.array([_seven(point.pose) for point in points]).reshape(n, 7),
+        twists=_six_rows([point.twist for point in points]),
+        accelerations=_six_rows([point.acceleration for point in points]),
+        jerks=_six_rows([point.jerk for point in points]),
+        postures={i: posture for i, posture in postures if posture},
     )
+
+
+def _seven(pose: Message) -> tuple[float, ...]:
+    p, q = pose.position, pose.orientation
+    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+
+
+def _six_rows(rates: Sequence[Message]) -> Floats:
+    """Return ``Twist`` or ``Accel`` messages as an array (n, 6); most goals have only zeros."""
+    rows = np.array([_six(rate) for rate in rates]).reshape(len(rates), 6)
+    return rows if rows.any() else zeros(len(rates))
 
 
 def _three(vector: Message) -> Vector3:
@@ -151,10 +194,9 @@ def _three(vector: Message) -> Vector3:
 
 
 def _six(twist: Message) -> Vector6:
-    """Return a ``Twist`` or ``Accel``; almost all points share one tuple of zeros."""
+    """Return a ``Twist`` or ``Accel``."""
     u, v = twist.linear, twist.angular
-    values = (u.x, u.y, u.z, v.x, v.y, v.z)
-    return values if any(values) else ZERO6
+    return (u.x, u.y, u.z, v.x, v.y, v.z)
 
 
 def _posture(posture: Message) -> Posture:
@@ -164,8 +206,13 @@ def _posture(posture: Message) -> Posture:
     return Posture(names=tuple(names), values=tuple(values))
 
 
-def _segments(message: Message) -> tuple[Segment, ...]:
-    return tuple(_segment(each, f'segments[{i}]') for i, each in enumerate(message.segments))
+def segment_rows(segments: Sequence[Message]) -> SegmentRows:
+    """
+    Return ``MotionSegment`` messages as rows.
+
+    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    """
+    return SegmentRows.of([_segment(each, f'segments[{i}]') for i, each in enumerate(segments)])
 
 
 def _segment(segment: Message, field: str) -> Segment:
