@@ -84,7 +84,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
     is_paused,
@@ -279,7 +279,7 @@ class Driver(RobotServices, InteractiveMotions):
             part = plan_first_part(plan, self.arm, options)
             points, job = encode_plan(part, self.config.dialect)
             return self._start_motion(plan, points, job, on_progress, part=part)
-        points = encode_points(plan.instructions, self.config.dialect)
+        points = encode_rows(plan.rows, self.config.dialect)
         return self._start_motion(
             plan, points, job_from_plan(plan, self.config.dialect), on_progress
         )

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_append
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 #: How long the robot loop may take to answer [s]; the arm is stopped when it hangs for so long.
@@ -56,7 +56,7 @@ def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
     job = job_from_plan(
         plan, dialect, start_time=part.start_time, ending_records=part.ending_records
     )
-    return (encode_points(plan.instructions, dialect), replace(job, due=part.end_time))
+    return (encode_rows(plan.rows, dialect), replace(job, due=part.end_time))
 
 
 class Appender:

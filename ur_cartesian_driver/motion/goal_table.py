@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 Integers = NDArray[np.int64]
 
 T = TypeVar('T')
-R = TypeVar('R', bound='_Rows[Any]')
+R = TypeVar('R', bound='Rows[Any]')
 
 NO_POSTURE = Posture()
 
@@ -52,12 +52,11 @@ def zeros(n: int, columns: int = 6) -> Floats:
     return np.broadcast_to(np.zeros(()), (n, columns))
 
 
-class _Rows(Sequence[T]):
+class Rows(Sequence[T]):
     """
     Columns of the same length that are also a sequence of objects.
 
-    Arrays are made read-only. Fields that are no arrays are postures by their row: few points have
-    any.
+    Arrays are made read-only. Mappings hold what few rows have, by row.
     """
 
     __slots__ = ()
@@ -79,9 +78,9 @@ class _Rows(Sequence[T]):
         return replace(  # type: ignore[type-var]
             self,
             **{
-                name: column[rows]
-                if isinstance(column, np.ndarray)
-                else {row - first: column[row] for row in column if first <= row < last}
+                name: {row - first: column[row] for row in column if first <= row < last}
+                if isinstance(column, Mapping)
+                else column[rows]
                 for name, column in self._columns()
             },
         )
@@ -115,7 +114,7 @@ class _Rows(Sequence[T]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class WaypointRows(_Rows[Waypoint]):
+class WaypointRows(Rows[Waypoint]):
     """The points of a goal in its frame; the units are those of a waypoint."""
 
     #: (n,) [s]
@@ -179,7 +178,7 @@ class WaypointRows(_Rows[Waypoint]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class SegmentRows(_Rows[Segment]):
+class SegmentRows(Rows[Segment]):
     """The segments of a goal: none, or one for each point; units as those of a segment."""
 
     #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.SegmentType`

@@ -8,7 +8,7 @@ A plan: primitives, the reference path of the tool, and a report of the choices.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput
+from ur_cartesian_driver.motion.vectors import vector6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,12 +76,83 @@ class PlannedSegment:
     outputs: tuple[SwitchOutput, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PlannedRows(Rows[PlannedSegment]):
+    """The segments of a plan in columns; units as in a planned segment."""
+
+    #: (n,)
+    waypoints: NDArray[np.int32]
+    lengths: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    durations: NDArray[np.float64]
+    #: (n, 6)
+    joints: NDArray[np.float64]
+    primitives: Sequence[Primitive]
+    #: Lines of the report, and what the outputs add to some of them.
+    report_lines: Sequence[str]
+    notes: Mapping[int, str] = field(default_factory=dict)
+    #: By row, those that follow it.
+    outputs: Mapping[int, tuple[SwitchOutput, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, segments: Iterable[PlannedSegment]) -> PlannedRows:
+        """Return segments as rows; rows themselves as they are."""
+        if isinstance(segments, cls):
+            return segments
+        every = tuple(segments)
+        return cls(
+            waypoints=np.array([segment.waypoint for segment in every], dtype=np.int32),
+            lengths=np.array([segment.length for segment in every], dtype=np.float64),
+            angles=np.array([segment.angle for segment in every], dtype=np.float64),
+            durations=np.array([segment.duration for segment in every], dtype=np.float64),
+            joints=np.array([segment.joints for segment in every]).reshape(len(every), 6),
+            primitives=tuple(segment.primitive for segment in every),
+            report_lines=tuple(segment.report_line for segment in every),
+            outputs={i: segment.outputs for i, segment in enumerate(every) if segment.outputs},
+        )
+
+    @property
+    def records(self) -> NDArray[np.intp]:
+        """How many records each has on the wire (n,): its primitive and its outputs."""
+        counts = np.ones(len(self), dtype=np.intp)
+        for row, outputs in self.outputs.items():
+            counts[row] += len(outputs)
+        return counts
+
+    def __len__(self) -> int:
+        return len(self.waypoints)
+
+    def __iter__(self) -> Iterator[PlannedSegment]:
+        for i, (waypoint, length, angle, duration, joints, primitive, line) in enumerate(
+            zip(
+                self.waypoints.tolist(),
+                self.lengths.tolist(),
+                self.angles.tolist(),
+                self.durations.tolist(),
+                self.joints.tolist(),
+                self.primitives,
+                self.report_lines,
+                strict=True,
+            )
+        ):
+            yield PlannedSegment(
+                primitive=primitive,
+                waypoint=waypoint,
+                length=length,
+                angle=angle,
+                duration=duration,
+                joints=vector6(joints),
+                report_line=line + self.notes.get(i, ''),
+                outputs=self.outputs.get(i, ()),
+            )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
     """A goal that passed all checks, ready to be executed from the state it was planned for."""
 
     goal: Goal
-    segments: tuple[PlannedSegment, ...]
+    segments: Sequence[PlannedSegment]
     reference: ReferencePath
     #: Joint positions of the start [rad].
     start: Joints
@@ -98,19 +171,24 @@ class Plan:
     @property
     def duration(self) -> float:
         """Expected time of the whole motion at full speed [s]."""
-        return sum(segment.duration for segment in self.segments)
+        return float(np.cumsum(self.rows.durations)[-1]) if self.segments else 0.0
+
+    @property
+    def rows(self) -> PlannedRows:
+        """The segments in columns."""
+        return PlannedRows.of(self.segments)
 
     @property
     def report(self) -> tuple[str, ...]:
         """One line for each segment, then the remarks."""
-        return (
-            tuple(segment.report_line for segment in self.segments if segment.report_line)
-            + self.remarks
-        )
+        rows = self.rows
+        lines = (line + rows.notes.get(i, '') for i, line in enumerate(rows.report_lines))
+        return (*filter(None, lines), *self.remarks)
 
     @property
     def instructions(self) -> Iterator[Instruction]:
         """The primitives and outputs, in the order of the wire."""
-        for segment in self.segments:
-            yield segment.primitive
-            yield from segment.outputs
+        rows = self.rows
+        for i, primitive in enumerate(rows.primitives):
+            yield primitive
+            yield from rows.outputs.get(i, ())

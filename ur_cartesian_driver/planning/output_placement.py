@@ -18,7 +18,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import IOCommand
-from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput
@@ -39,13 +39,13 @@ _BEYOND = 1e-4
 
 
 def place_outputs(
-    segments: Sequence[PlannedSegment],
+    segments: PlannedRows,
     reference: ReferencePath,
     commands: Sequence[IOCommand],
     *,
     blend_times: Sequence[float] = (),
     start_time: float = 0.0,
-) -> tuple[PlannedSegment, ...]:
+) -> PlannedRows:
     """
     Return the segments with the outputs that are switched during the motion, in order of time.
 
@@ -56,31 +56,27 @@ def place_outputs(
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at a time.
     """
     if not commands:
-        return tuple(segments)
+        return segments
     timed_path = _TimedPath(segments, reference, blend_times, start_time)
     switches = sorted(
         (timed_path.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
         key=lambda found: found.time,
     )
-    outputs: list[list[SwitchOutput]] = [[] for _ in segments]
-    notes = [segment.report_line for segment in segments]
+    outputs: dict[int, tuple[SwitchOutput, ...]] = {}
+    notes: dict[int, str] = {}
     for found in switches:
-        outputs[found.after_index].append(found.record)
-        notes[found.report_index] += f'; {found.text}'
-    for own, segment in zip(outputs, segments, strict=True):
-        if sum(record.trigger_pose is not None for record in own) > MAX_PENDING_OUTPUTS:
+        row, line = found.after_index, found.report_index
+        outputs[row] = (*outputs.get(row, ()), found.record)
+        notes[line] = f'{notes.get(line, "")}; {found.text}'
+    for row in sorted(outputs):
+        if sum(record.trigger_pose is not None for record in outputs[row]) > MAX_PENDING_OUTPUTS:
             raise InvalidGoal(
                 'io_commands',
                 f'switches more than {MAX_PENDING_OUTPUTS} outputs between two motions, '
-                f'after point {segment.waypoint}',
+                f'after point {segments.waypoints[row]}',
                 'add a point in between',
             )
-    return tuple(
-        replace(segment, outputs=tuple(own), report_line=note)
-        if own or note != segment.report_line
-        else segment
-        for segment, own, note in zip(segments, outputs, notes, strict=True)
-    )
+    return replace(segments, outputs=outputs, notes=notes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,17 +95,17 @@ class _TimedPath:
 
     def __init__(
         self,
-        segments: Sequence[PlannedSegment],
+        segments: PlannedRows,
         reference: ReferencePath,
         blend_times: Sequence[float],
         start_time: float,
     ) -> None:
         """Compute when each motion ends, and when it returns."""
         self.segments, self.reference = segments, reference
-        self.ends: Floats = start_time + np.cumsum([segment.duration for segment in segments])
+        self.ends: Floats = start_time + np.cumsum(segments.durations)
         self.blend_times = np.array(blend_times or [0.0] * len(segments))
         self.returns: Floats = self.ends - 0.5 * self.blend_times
-        self.index = {segment.waypoint: k for k, segment in enumerate(segments)}
+        self.index = {waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist())}
 
     def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
         """Return when and where a command switches its output."""
@@ -160,7 +156,7 @@ class _TimedPath:
 
     def _passes(self, k: int) -> bool:
         """Tell whether the arm moves at the end of a motion."""
-        piece = self.segments[k].primitive
+        piece = self.segments.primitives[k]
         return self.blend_times[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
     def _where(self, k: int) -> str:
@@ -173,7 +169,7 @@ class _TimedPath:
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), 0.5 * float(self.blend_times[k])
-        target = getattr(self.segments[k].primitive, 'target', None)
+        target = getattr(self.segments.primitives[k], 'target', None)
         if half <= 0.0 or not isinstance(target, Pose):
             return end
         return self._nearest(np.array(target.position), end - half, end + half, end)

@@ -15,7 +15,7 @@ path and report. The first reason for a refusal is raised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
@@ -24,6 +24,8 @@ from math import inf
 from pkgutil import resolve_name
 from typing import TypeAlias
 
+import numpy as np
+
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
@@ -31,8 +33,9 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import (
     Joints,
     MoveC,
@@ -52,7 +55,7 @@ from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
-    segment_line,
+    SegmentLines,
     tightest_remark,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
@@ -101,10 +104,14 @@ CB3_STATIC_ERROR = 3e-4
 MAX_MISMATCH_POSITION = 0.015
 MAX_MISMATCH_ANGLE = 0.05
 
-_UNTIMED_MOVES: dict[SegmentType, type[MoveP] | type[OptimoveJ] | type[OptimoveL]] = {
-    SegmentType.PROCESS: MoveP,
-    SegmentType.OPTIMIZED_JOINT: OptimoveJ,
-    SegmentType.OPTIMIZED_LINEAR: OptimoveL,
+#: The kind of the primitive's row, by type; that of an arc has no meaning.
+_KINDS = {
+    SegmentType.JOINT: MOVES.index(MoveJ),
+    SegmentType.LINEAR: MOVES.index(MoveL),
+    SegmentType.CIRCULAR: MOVES.index(MoveL),
+    SegmentType.PROCESS: MOVES.index(MoveP),
+    SegmentType.OPTIMIZED_JOINT: MOVES.index(OptimoveJ),
+    SegmentType.OPTIMIZED_LINEAR: MOVES.index(OptimoveL),
 }
 
 
@@ -150,10 +157,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     timings = schedule(geometries, options, arm.model)
     reference = reference_path(state.actual_tcp_pose, geometries, timings)
     segments = place_outputs(
-        [
-            planner.segment(geometry, timing)
-            for geometry, timing in zip(geometries, timings, strict=True)
-        ],
+        planner.segments(geometries, timings),
         reference,
         goal.io_commands,
         blend_times=[timing.blend_time for timing in timings],
@@ -181,7 +185,7 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    segments = place_outputs(found.segments, found.reference, goal.io_commands)
+    segments = place_outputs(PlannedRows.of(found.segments), found.reference, goal.io_commands)
     return planner.plan(
         stretch_times(goal, found.stretch), segments, found.reference, found.remarks
     )
@@ -266,7 +270,7 @@ class GoalPlanner:
     def plan(
         self,
         goal: Goal,
-        segments: tuple[PlannedSegment, ...],
+        segments: PlannedRows,
         reference: ReferencePath,
         remarks: Iterable[str],
     ) -> Plan:
@@ -283,23 +287,52 @@ class GoalPlanner:
             execution=self.mode,
         )
 
-    def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
-        """Return the primitive of a segment and what is expected of it."""
-        primitive, reason = adapt_to_dialect(
-            self._primitive(geometry, timing), geometry.index, geometry.joints, self.options
-        )
-        if reason:
-            self.reasons.setdefault(geometry.index, []).append(reason)
-        return PlannedSegment(
-            primitive=primitive,
-            waypoint=geometry.index,
-            length=geometry.curve.length,
-            angle=geometry.curve.angle,
-            duration=timing.duration,
-            joints=geometry.joints,
-            report_line=segment_line(
-                geometry, timing, primitive, self.reasons.get(geometry.index, ())
+    def segments(
+        self, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
+    ) -> PlannedRows:
+        """Return the primitive of each segment and what is expected of it."""
+        n = len(geometries)
+        joints = np.array([geometry.joints for geometry in geometries])
+        kinds = np.array([_KINDS[geometry.kind] for geometry in geometries])
+        moves = MoveRows(
+            kinds=kinds,
+            targets=pose_rows(self.targets[geometry.index] for geometry in geometries),
+            q_near=joints,
+            has_q_near=np.array([geometry.kind in JOINT_SPACE_TYPES for geometry in geometries]),
+            velocities=np.array([timing.velocity for timing in timings]),
+            accelerations=np.array([timing.acceleration for timing in timings]),
+            durations=np.array([timing.wire_time for timing in timings]),
+            blend_radii=np.array(
+                [
+                    geometry.blend_after.radius if geometry.blend_after else 0.0
+                    for geometry in geometries
+                ]
             ),
+            others={},
+        )
+        others = {
+            row: self._special(geometry, moves, row)
+            for row, geometry in enumerate(geometries)
+            if self._is_special(geometry)
+        }
+        moves = replace(moves, others=others)
+        return PlannedRows(
+            waypoints=np.arange(geometries[0].index, geometries[0].index + n, dtype=np.int32),
+            lengths=np.array([geometry.curve.length for geometry in geometries]),
+            angles=np.array([geometry.curve.angle for geometry in geometries]),
+            durations=np.array([timing.duration for timing in timings]),
+            joints=joints,
+            primitives=moves,
+            report_lines=SegmentLines(geometries, timings, moves, self.reasons),
+        )
+
+    def _is_special(self, geometry: SegmentGeometry) -> bool:
+        """Tell whether a primitive is more than a row of numbers."""
+        return (
+            geometry.waits
+            or geometry.kind == SegmentType.CIRCULAR
+            or bool(geometry.waypoint.posture)
+            or not self.options.dialect.supports_q_near
         )
 
     # -- checks of the start ---------------------------------------------------------------------
@@ -364,32 +397,29 @@ class GoalPlanner:
 
     # -- primitives ------------------------------------------------------------------------------
 
-    def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
-        blend = geometry.blend_after.radius if geometry.blend_after else 0.0
-        v, a, target = timing.velocity, timing.acceleration, self.targets[geometry.index]
+    def _special(self, geometry: SegmentGeometry, moves: MoveRows, row: int) -> Primitive:
+        """Return a primitive that is more than its row of numbers."""
+        primitive: Primitive
         if geometry.waits:  # no move of the robot does: a spline in which the joints rest
-            return Spline(target=self.state.actual_q, velocities=ZERO6, duration=timing.wire_time)
-        if geometry.kind == SegmentType.CIRCULAR:
-            return self._arc(geometry, v, a, blend)
-        q_near = (
-            self._q_near(geometry)
-            if geometry.kind in JOINT_SPACE_TYPES or geometry.waypoint.posture
-            else None
-        )
-        untimed = _UNTIMED_MOVES.get(geometry.kind)
-        if untimed is not None:
-            return untimed(
-                target=target, q_near=q_near, velocity=v, acceleration=a, blend_radius=blend
+            primitive = Spline(
+                target=self.state.actual_q,
+                velocities=ZERO6,
+                duration=float(moves.durations[row]),
             )
-        timed = MoveJ if geometry.kind == SegmentType.JOINT else MoveL
-        return timed(
-            target=target,
-            q_near=q_near,
-            velocity=v,
-            acceleration=a,
-            duration=timing.wire_time,
-            blend_radius=blend,
+        elif geometry.kind == SegmentType.CIRCULAR:
+            primitive = self._arc(geometry, moves, row)
+        else:
+            move = moves[row]
+            assert not isinstance(move, MoveC | Spline)
+            primitive = move
+            if geometry.kind in JOINT_SPACE_TYPES or geometry.waypoint.posture:
+                primitive = replace(move, q_near=self._q_near(geometry))
+        primitive, reason = adapt_to_dialect(
+            primitive, geometry.index, geometry.joints, self.options
         )
+        if reason:
+            self.reasons.setdefault(geometry.index, []).append(reason)
+        return primitive
 
     def _q_near(self, geometry: SegmentGeometry) -> Joints:
         """Return the chosen solution; a full posture itself where it selects the same one."""
@@ -401,9 +431,7 @@ class GoalPlanner:
                 return wanted
         return geometry.joints
 
-    def _arc(
-        self, geometry: SegmentGeometry, velocity: float, acceleration: float, blend: float
-    ) -> MoveC:
+    def _arc(self, geometry: SegmentGeometry, moves: MoveRows, row: int) -> MoveC:
         """Return the arc, with joint fields where target or via carry a posture."""
         segment = geometry.segment
         assert segment.via is not None
@@ -433,9 +461,9 @@ class GoalPlanner:
         return MoveC(
             target=target,
             via=via,
-            velocity=velocity,
-            acceleration=acceleration,
-            blend_radius=blend,
+            velocity=float(moves.velocities[row]),
+            acceleration=float(moves.accelerations[row]),
+            blend_radius=float(moves.blend_radii[row]),
             mode=segment.arc_mode,
         )
 

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import SafeOutput, Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized
+from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL, Spline, SwitchOutput
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
@@ -118,19 +120,17 @@ def job_from_plan(
     :param ending_records: see :class:`MotionJob`.
     """
     goal = plan.goal
-    times, output_delay = goal.waypoints[-1].time, _last_output_delay(plan)
-    waypoints = [
-        segment.waypoint for segment in plan.segments for _ in range(1 + len(segment.outputs))
-    ]
+    rows = plan.rows
+    times, output_delay = goal.waypoints[-1].time, _last_output_delay(rows)
     duration = start_time + plan.duration
-    end_times = start_time + np.cumsum([segment.duration for segment in plan.segments])
-    request_times = end_times - [_blend_lead_time(segment) for segment in plan.segments]
-    records = [1 + len(segment.outputs) for segment in plan.segments]
-    splines = [
-        segment.primitive for segment in plan.segments if isinstance(segment.primitive, Spline)
-    ]
+    end_times = start_time + np.cumsum(rows.durations)
+    request_times = end_times - _blend_lead_times(rows)
+    records = rows.records
+    first_records = np.cumsum(records) - records
+    is_motion = np.zeros(int(records.sum()), dtype=np.bool_)
+    is_motion[first_records] = True
     return MotionJob(
-        points=len(waypoints),
+        points=len(is_motion),
         reference=plan.reference,
         duration=duration,
         # A goal that was slowed as the client allows (on_too_fast) is not late because of that.
@@ -150,32 +150,31 @@ def job_from_plan(
         has_speed_profile=not (
             goal.keep_open
             or plan.execution.traits.streams_setpoints
-            or any(
-                isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in plan.segments
-            )
+            or has_optimized(rows.primitives)
         ),
         execution=plan.execution,
-        waypoint=np.array(waypoints, dtype=np.int32),
-        is_motion=np.array(
-            [not isinstance(instruction, SwitchOutput) for instruction in plan.instructions]
-        ),
+        waypoint=np.repeat(rows.waypoints, records),
+        is_motion=is_motion,
         end_times=np.repeat(end_times, records),
         request_times=np.repeat(request_times, records),
-        spline=JointSpline.of(plan.start, splines)
+        spline=JointSpline.of(
+            plan.start, (piece for piece in rows.primitives if isinstance(piece, Spline))
+        )
         if plan.execution.traits.streams_setpoints
         else None,
     )
 
 
-def _last_output_delay(plan: Plan) -> float:
+def _last_output_delay(rows: PlannedRows) -> float:
     """Return how long after the end of the motion the last output is switched [s]."""
-    return max((output.delay for output in plan.segments[-1].outputs), default=0.0)
+    last = rows.outputs.get(len(rows) - 1, ())
+    return max((output.delay for output in last), default=0.0)
 
 
-def _blend_lead_time(segment: PlannedSegment) -> float:
-    """Return an upper bound of the time from the start of a blend to the end of its motion [s]."""
-    radius = 0.0 if isinstance(segment.primitive, Spline) else segment.primitive.blend_radius
-    if radius <= 0.0:
-        return 0.0
+def _blend_lead_times(rows: PlannedRows) -> Floats:
+    """Return upper bounds of the times from the start of a blend to the end of its motion [s]."""
+    radii = blend_radii(rows.primitives)
     # The tool is slower in the segment than in its blend, except in the blend that it comes from.
-    return segment.duration * min(1.0, radius / max(segment.length, radius))
+    share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
+    times: Floats = rows.durations * share
+    return times

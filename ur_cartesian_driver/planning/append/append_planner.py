@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, WaypointRows
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
 from ur_cartesian_driver.motion.robot_state import RobotState
@@ -413,7 +413,7 @@ class _PartPlanner:
             waypoint = max(command.waypoint, segments[0].waypoint)
             offset = max(0.0, time - ends[waypoint])
             commands.append(replace(command, waypoint=waypoint, offset=offset))
-        found = place_outputs(segments, reference, commands, start_time=start_time)
+        found = place_outputs(PlannedRows.of(segments), reference, commands, start_time=start_time)
         segments = [
             replace(segment, waypoint=piece.waypoint, report_line=piece.report_line)
             for segment, piece in zip(found, pieces, strict=True)

@@ -46,10 +46,15 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import cast, TypeAlias, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     Instruction,
     MoveC,
@@ -63,6 +68,7 @@ from ur_cartesian_driver.motion.primitive import (
     SwitchOutput,
     Target,
 )
+from ur_cartesian_driver.motion.rotation_rows import log_rows
 from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
@@ -177,6 +183,9 @@ _ARC_TYPES = {
     (True, True): MotionType.MOVEC,
 }
 _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
+#: The kinds of rows up to this one take a duration.
+_LAST_TIMED = MOVES.index(MoveL)
+_POSE_TYPES = np.array([_TYPES[move][1] for move in MOVES])
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
@@ -228,6 +237,37 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
     words = dialect.encode_move(q_near, v, a)
     duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
     return (*target, *words, duration, primitive.blend_radius, kind)
+
+
+def move_fields(moves: MoveRows) -> Floats:
+    """
+    Return the 21 numbers of each row of moves (n, 21), in SI units, for dialects with q_near.
+
+    The rows of ``others`` have no meaning.
+    """
+    fields = np.zeros((len(moves), 21))
+    fields[:, 0:3] = moves.targets[:, :3]
+    fields[:, 3:6] = log_rows(moves.targets[:, 3:])
+    fields[:, 6:12] = np.where(moves.has_q_near[:, None], moves.q_near, 0.0)
+    fields[:, PointField.VELOCITY] = moves.velocities
+    fields[:, PointField.ACCELERATION] = moves.accelerations
+    fields[:, PointField.HAS_Q_NEAR] = moves.has_q_near
+    fields[:, PointField.DURATION] = np.where(moves.kinds <= _LAST_TIMED, moves.durations, 0.0)
+    fields[:, PointField.BLEND] = moves.blend_radii
+    fields[:, PointField.TYPE] = _POSE_TYPES[moves.kinds]
+    return fields
+
+
+def are_plain_moves(moves: MoveRows, dialect: Dialect) -> NDArray[np.bool_]:
+    """Tell of each row (n,) that it is no other, and that :func:`check_fields` accepts it."""
+    types, durations = _POSE_TYPES[moves.kinds], moves.durations
+    are_plain = np.isin(types, list(dialect.motion_types))
+    are_plain &= (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
+    are_plain &= (moves.blend_radii >= 0.0) & (durations <= dialect.max_duration)
+    are_plain &= (durations == 0.0) | (durations >= dialect.min_duration)
+    are_plain &= ~np.isin(types, list(_OPTIMOVES))
+    are_plain[list(moves.others)] = False
+    return are_plain
 
 
 def _output_fields(output: SwitchOutput) -> PointFields:

@@ -1,0 +1,110 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The primitives of a plan in columns: a row for each motion to a pose.
+
+Nearly all motions of a long goal go to a pose. The others (arcs, joint targets, waiting) stand
+beside the columns as objects, by their row. All are a sequence of primitives, made when somebody
+looks at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal_table import Integers, Rows
+from ur_cartesian_driver.motion.pose import pose_from_row
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.primitive import (
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+    Primitive,
+)
+from ur_cartesian_driver.motion.vectors import vector6
+
+#: The classes that have rows; a kind is an index into it.
+MOVES = (MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class MoveRows(Rows[Primitive]):
+    """Motions to poses of the TCP in base; units as in the primitives."""
+
+    #: (n,) indices into :data:`MOVES`
+    kinds: Integers
+    #: (n, 7) x y z [m], unit quaternion x y z w
+    targets: Floats
+    #: (n, 6) [rad], and whether there is one (n,)
+    q_near: Floats
+    has_q_near: NDArray[np.bool_]
+    #: (n,) each; durations of MoveJ and MoveL only
+    velocities: Floats
+    accelerations: Floats
+    durations: Floats
+    #: (n,) also of the others
+    blend_radii: Floats
+    #: By row, in place of its columns.
+    others: Mapping[int, Primitive]
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def __iter__(self) -> Iterator[Primitive]:
+        others = self.others
+        for i, (
+            kind,
+            target,
+            q_near,
+            has_q_near,
+            velocity,
+            acceleration,
+            time,
+            radius,
+        ) in enumerate(
+            zip(
+                self.kinds.tolist(),
+                self.targets.tolist(),
+                self.q_near.tolist(),
+                self.has_q_near.tolist(),
+                self.velocities.tolist(),
+                self.accelerations.tolist(),
+                self.durations.tolist(),
+                self.blend_radii.tolist(),
+                strict=True,
+            )
+        ):
+            if i in others:
+                yield others[i]
+                continue
+            move = MOVES[kind]
+            yield move(
+                target=pose_from_row(target),
+                q_near=vector6(q_near) if has_q_near else None,
+                velocity=velocity,
+                acceleration=acceleration,
+                blend_radius=radius,
+                **({'duration': time} if move in (MoveJ, MoveL) else {}),
+            )
+
+
+def blend_radii(primitives: Sequence[Primitive]) -> Floats:
+    """Return the blend radius of each primitive (n,) [m]; splines have none."""
+    if isinstance(primitives, MoveRows):
+        return primitives.blend_radii
+    return np.array([getattr(primitive, 'blend_radius', 0.0) for primitive in primitives])
+
+
+def has_optimized(primitives: Sequence[Primitive]) -> bool:
+    """Tell whether the robot chooses the time of some primitive."""
+    classes = (OptimoveJ, OptimoveL)
+    if not isinstance(primitives, MoveRows):
+        return any(isinstance(primitive, classes) for primitive in primitives)
+    in_rows = np.isin(primitives.kinds, [MOVES.index(move) for move in classes])
+    return bool(in_rows.any()) or has_optimized(tuple(primitives.others.values()))
