@@ -38,7 +38,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveJ
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveP
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -145,8 +145,22 @@ def promise_of(made):
         point_times=times,
         joints=made.segments[-1].joints if made.segments else made.start,
         slowed=any('instead of' in line or 'stretched' in line for line in made.remarks),
+        early=frozenset(
+            int(found[1])
+            for line in made.remarks
+            if (found := re.match(r'point (\d+): .*before its time', line))
+        ),
         joint_moves=joint_moves,
         radii=tuple(radii),
+    )
+
+
+def leaves_blends_out(made, cycle):
+    """Tell whether a robot of such a cycle leaves blends out that its model does not."""
+    return any(
+        isinstance(move := segment.primitive, MoveP | MoveC)
+        and 0.0 < move.blend_radius < move.velocity * cycle
+        for segment in made.segments
     )
 
 
@@ -236,6 +250,9 @@ async def run_goals(cell, robot, number, left, counts, wrong):
         counts['accepted'] += 1
         if made.duration > MAX_DURATION:
             counts['long'] += 1
+            continue
+        if leaves_blends_out(made, cell.robot.config.cycle):
+            counts['blends within a cycle'] += 1
             continue
         await cell.sleep(0.02)
         try:  # what has passed passes again, by another packet of the robot

@@ -53,6 +53,7 @@ def rows(n=12, seed=0, **columns):
         lengths=np.ones(n),
         angles=np.zeros(n),
         durations=np.ones(n),
+        blend_entries=np.zeros((n, 5)),
         joints=np.zeros((n, 6)),
         primitives=moves,
         report_lines=('',) * n,

@@ -119,7 +119,10 @@ def test_blends_that_touch_leave_numbers_that_can_be_sent(cell, turn):
             segments=(Segment(blend_radius=0.01), Segment(blend_radius=0.01), Segment()),
         ),
     )
-    assert made.segments[1].primitive.duration == pytest.approx(1.0)
+    # A time on the wire ends where the arm would rest; in sum they are those of the goal.
+    times = [segment.primitive.duration for segment in made.segments]
+    assert sum(times) == pytest.approx(3.0)
+    assert min(times) > 0.4
     assert made.segments[1].primitive.acceleration < 10.0
 
 

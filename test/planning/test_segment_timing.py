@@ -10,7 +10,7 @@ controller, which shares nothing with the planner.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, pi
+from math import pi
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,13 +23,7 @@ from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.geometry.speed_profile import (
-    cruise_speed_for,
-    profile_for_time,
-    required_acceleration,
-    shortest_duration,
-    trapezoid,
-)
+from ur_cartesian_driver.planning.moves.segment_timing import shortest_duration
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 TYPE = SegmentType
@@ -47,48 +41,7 @@ def test_a_trapezoid_takes_the_time_of_the_textbook(length, velocity, accelerati
         if long
         else 2.0 * (length / acceleration) ** 0.5
     )
-    assert trapezoid(length, velocity, acceleration).duration == pytest.approx(expected)
-
-
-@given(length=positive, duration=positive, acceleration=positive)
-def test_the_derived_speed_takes_exactly_the_time(length, duration, acceleration):
-    speed = cruise_speed_for(length, duration, acceleration, 2)
-    if speed is None:
-        assert acceleration * duration**2 < 4.0 * length * (1.0 + 1e-9)
-    else:
-        assert trapezoid(length, speed, acceleration).duration == pytest.approx(duration)
-
-
-@given(
-    length=positive,
-    speed=positive,
-    acceleration=positive,
-    ramps=st.integers(1, 2),
-    more=st.floats(1.0 + 1e-6, 3.0),
-)
-def test_the_least_acceleration_meets_every_time_within_the_speed(
-    length, speed, acceleration, ramps, more
-):
-    shortest = shortest_duration(length, speed, acceleration, ramps)
-    assert required_acceleration(length, shortest, speed, ramps) == pytest.approx(acceleration)
-    needed = required_acceleration(length, shortest * more, speed, ramps)
-    assert needed <= acceleration
-    cruise = cruise_speed_for(length, shortest * more, needed * (1.0 + 1e-9), ramps)
-    assert cruise <= speed * (1.0 + 1e-4)
-    profile = trapezoid(
-        length, cruise, needed * (1.0 + 1e-9), stop_distance=inf if ramps == 1 else 0.0
-    )
-    assert profile.duration == pytest.approx(shortest * more, rel=1e-4)
-
-
-@given(length=positive, duration=positive, before=st.booleans(), after=st.booleans())
-def test_time_rises_with_the_way_from_nothing_to_the_duration(length, duration, before, after):
-    profile = profile_for_time(length, duration, before, after)
-    assert profile.duration == pytest.approx(duration)
-    times = [profile.time_at(length * k / 20) for k in range(21)]
-    assert times == sorted(times)
-    assert times[0] == 0.0
-    assert times[-1] == pytest.approx(duration)
+    assert shortest_duration(length, velocity, acceleration, 2) == pytest.approx(expected)
 
 
 def one(cell, options=OPTIONS, segment=None, **point):
@@ -325,14 +278,14 @@ def round_trip(cell, kind, radius, timed_by, turn=0.0):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('turn', [0.0, 0.9])
-@pytest.mark.parametrize(('radius', 'within'), [(0.0, 0.01), (0.02, 0.05)])
+@pytest.mark.parametrize('radius', [0.0, 0.02])
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
-def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, radius, within, turn):
+def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, radius, turn):
     if kind in (TYPE.PROCESS, TYPE.CIRCULAR):
         turn /= 6.0  # where it is the larger number, times are refused
     made = plan(round_trip(cell, kind, radius, 4.0, turn), cell.state, cell.arm, OPTIONS)
     rows = drive(made, cell)
-    assert rows[-1, 0] == pytest.approx(20.0, rel=within)
+    assert rows[-1, 0] == pytest.approx(20.0, abs=5 * CYCLE)
     assert made.duration == pytest.approx(20.0, rel=1e-3)
     assert rows[:, 4].max() <= 0.25 + 1e-6
     assert away(made, rows[::5]) < (30e-6 if kind != TYPE.CIRCULAR else 200e-6)
@@ -344,7 +297,7 @@ def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, rad
 def test_without_times_the_expected_time_is_near(cell, kind, radius):
     made = plan(round_trip(cell, kind, radius, 0.0), cell.state, cell.arm, OPTIONS)
     rows = drive(made, cell)
-    assert rows[-1, 0] == pytest.approx(made.duration, rel=0.1 if radius else 0.01)
+    assert rows[-1, 0] == pytest.approx(made.duration, abs=5 * CYCLE)
     assert rows[:, 4].max() <= 0.25 + 1e-6
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,27 @@ class ReferencePath:
             array.setflags(write=False)
 
 
+class BlendEntry(NamedTuple):
+    """
+    The state of the controller where the blend after a segment begins.
+
+    In units of the blend's parameter, which runs from 0 to 1.
+    """
+
+    #: The rate of the parameter [1/s].
+    rate: float
+    #: Time until the segment would rest at its point [s].
+    remaining: float
+    #: Its acceleration [1/s^2] and, if it is sent with a time, its length.
+    acceleration: float
+    length: float
+    #: Time from there until the point is passed, in the middle of the blend [s].
+    half: float
+
+
+_NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedSegment:
     """One primitive and what is expected of it."""
@@ -72,6 +94,8 @@ class PlannedSegment:
     #: Its line in the report; empty where another piece of the same segment has it (a SPLINE takes
     #: several pieces from point to point).
     report_line: str
+    #: Where the blend after it begins; None = there is none, or it is not known.
+    blend_entry: BlendEntry | None = None
     #: The outputs that follow it on the wire, in this order.
     outputs: tuple[SwitchOutput, ...] = ()
 
@@ -85,6 +109,8 @@ class PlannedRows(Rows[PlannedSegment]):
     lengths: NDArray[np.float64]
     angles: NDArray[np.float64]
     durations: NDArray[np.float64]
+    #: (n, 5) the blend entries, zeros where there is no blend.
+    blend_entries: NDArray[np.float64]
     #: (n, 6)
     joints: NDArray[np.float64]
     primitives: Sequence[Primitive]
@@ -105,6 +131,9 @@ class PlannedRows(Rows[PlannedSegment]):
             lengths=np.array([segment.length for segment in every], dtype=np.float64),
             angles=np.array([segment.angle for segment in every], dtype=np.float64),
             durations=np.array([segment.duration for segment in every], dtype=np.float64),
+            blend_entries=np.array(
+                [segment.blend_entry or _NO_BLEND for segment in every]
+            ).reshape(len(every), 5),
             joints=np.array([segment.joints for segment in every]).reshape(len(every), 6),
             primitives=tuple(segment.primitive for segment in every),
             report_lines=tuple(segment.report_line for segment in every),
@@ -123,12 +152,13 @@ class PlannedRows(Rows[PlannedSegment]):
         return len(self.waypoints)
 
     def __iter__(self) -> Iterator[PlannedSegment]:
-        for i, (waypoint, length, angle, duration, joints, primitive, line) in enumerate(
+        for i, (waypoint, length, angle, duration, entry, joints, primitive, line) in enumerate(
             zip(
                 self.waypoints.tolist(),
                 self.lengths.tolist(),
                 self.angles.tolist(),
                 self.durations.tolist(),
+                self.blend_entries.tolist(),
                 self.joints.tolist(),
                 self.primitives,
                 self.report_lines,
@@ -141,6 +171,7 @@ class PlannedRows(Rows[PlannedSegment]):
                 length=length,
                 angle=angle,
                 duration=duration,
+                blend_entry=BlendEntry(*entry) if entry[0] > 0.0 else None,
                 joints=vector6(joints),
                 report_line=line + self.notes.get(i, ''),
                 outputs=self.outputs.get(i, ()),

@@ -34,6 +34,8 @@ _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
 # turn [m/rad].
 _MIN_MOTION = 1e-7
 _TURNING = 0.01
+# Where the tool gets on by less than this part of its way, it turns back.
+_TURNS_BACK = 0.1
 # From this distance beyond the trigger pose on, the tool counts as coming round to it [m], [rad].
 _BEYOND = 1e-4
 
@@ -43,7 +45,7 @@ def place_outputs(
     reference: ReferencePath,
     commands: Sequence[IOCommand],
     *,
-    blend_times: Sequence[float] = (),
+    blend_halves: Floats | None = None,
     start_time: float = 0.0,
 ) -> PlannedRows:
     """
@@ -51,13 +53,14 @@ def place_outputs(
 
     :param reference: the path of the TCP; its times are those of the segments.
     :param commands: their waypoints are numbered as those of the segments.
-    :param blend_times: the time in the blend after each segment [s]; empty = no blends.
+    :param blend_halves: the time in the first half of the blend after each segment [s]; None =
+        no blends.
     :param start_time: when the first segment begins [s].
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at a time.
     """
     if not commands:
         return segments
-    timed_path = _TimedPath(segments, reference, blend_times, start_time)
+    timed_path = _TimedPath(segments, reference, blend_halves, start_time)
     switches = sorted(
         (timed_path.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
         key=lambda found: found.time,
@@ -97,14 +100,14 @@ class _TimedPath:
         self,
         segments: PlannedRows,
         reference: ReferencePath,
-        blend_times: Sequence[float],
+        blend_halves: Floats | None,
         start_time: float,
     ) -> None:
         """Compute when each motion ends, and when it returns."""
         self.segments, self.reference = segments, reference
         self.ends: Floats = start_time + np.cumsum(segments.durations)
-        self.blend_times = np.array(blend_times or [0.0] * len(segments))
-        self.returns: Floats = self.ends - 0.5 * self.blend_times
+        self.blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
+        self.returns: Floats = self.ends - self.blend_halves
         self.index = {waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist())}
 
     def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
@@ -157,10 +160,10 @@ class _TimedPath:
     def _passes(self, k: int) -> bool:
         """Tell whether the arm moves at the end of a motion."""
         piece = self.segments.primitives[k]
-        return self.blend_times[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
+        return self.blend_halves[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
     def _where(self, k: int) -> str:
-        if self.blend_times[k] > 0.0:
+        if self.blend_halves[k] > 0.0:
             return 'in the middle of its blend'
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
@@ -168,7 +171,7 @@ class _TimedPath:
         """Return when the tool is closest to the end of a motion [s], None where it stops."""
         if not self._passes(k):
             return None
-        end, half = float(self.ends[k]), 0.5 * float(self.blend_times[k])
+        end, half = float(self.ends[k]), float(self.blend_halves[k])
         target = getattr(self.segments.primitives[k], 'target', None)
         if half <= 0.0 or not isinstance(target, Pose):
             return end
@@ -213,11 +216,13 @@ class _TimedPath:
         return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
 
     def _trigger_direction(self, time: float) -> Vector6 | None:
-        """Return the direction of the path at a time, None where the tool rests."""
+        """Return the direction of the path at a time, None where the tool rests or turns back."""
         pose, half = self._pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
             a, b = self._pose(time - half), self._pose(time + half)
             distance, angle = a.distance_to(b), a.angle_to(b)
+            if distance < _TURNS_BACK * (a.distance_to(pose) + pose.distance_to(b)):
+                return None
             if distance > max(_MIN_MOTION, _TURNING * angle):
                 displacement = subtract(b.position, a.position)
                 x, y, z = rotate(conjugate(pose.quaternion), displacement)

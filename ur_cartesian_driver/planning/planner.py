@@ -34,8 +34,9 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
-from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     Joints,
     MoveC,
@@ -119,23 +120,36 @@ _KINDS = {
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
 
 
-def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
+def plan(
+    goal: Goal,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
+    running: PlannedSegment | None = None,
+) -> Plan:
     """
     Return the plan of a goal for a robot that rests in a state.
 
     :param state: joints, TCP pose and TCP offset are read from it.
     :param arm: the kinematics, the robot's own calibrated one where it is known.
+    :param running: the motion to the first point as it was planned, where it has been sent.
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
     with _garbage_collection_paused():
-        return _plan(goal, state, arm, options)
+        return _plan(goal, state, arm, options, running)
 
 
-def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
+def _plan(
+    goal: Goal,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
+    running: PlannedSegment | None,
+) -> Plan:
     table = check(goal, options)
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
     retargeted = retarget_to_tcp(table, state, options)
-    planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options)
+    planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
     return plan_goal(planner)
 
@@ -154,13 +168,17 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         samples.segment,
         samples.fraction,
     )
-    timings = schedule(geometries, options, arm.model)
-    reference = reference_path(state.actual_tcp_pose, geometries, timings)
+    margins = planner.joint_path_planner.path_margins
+    timings, chain = schedule(
+        geometries, options, arm.model, margins.blend_samples, planner.running
+    )
+    entries = chain.blend_entries
+    reference = reference_path(state.actual_tcp_pose, geometries, chain.times)
     segments = place_outputs(
-        planner.segments(geometries, timings),
+        planner.segments(geometries, timings, entries),
         reference,
         goal.io_commands,
-        blend_times=[timing.blend_time for timing in timings],
+        blend_halves=entries[:, -1],
     )
     remarks = [
         *ignored_remarks(goal),
@@ -197,13 +215,20 @@ class GoalPlanner:
 
     :param retargeted: the checked goal for the TCP with which it runs.
     :param T_flange_active: the TCP that the robot has now.
+    :param running: the first segment as it was planned, where it has been sent.
     """
 
     def __init__(
-        self, retargeted: RetargetedGoal, T_flange_active: Pose, arm: Arm, options: PlanningOptions
+        self,
+        retargeted: RetargetedGoal,
+        T_flange_active: Pose,
+        arm: Arm,
+        options: PlanningOptions,
+        running: PlannedSegment | None = None,
     ) -> None:
         goal, state = retargeted.goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
+        self.running = running
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks = list(retargeted.remarks)
@@ -288,9 +313,16 @@ class GoalPlanner:
         )
 
     def segments(
-        self, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
+        self,
+        geometries: Sequence[SegmentGeometry],
+        timings: Sequence[SegmentTiming],
+        blend_entries: Floats,
     ) -> PlannedRows:
-        """Return the primitive of each segment and what is expected of it."""
+        """
+        Return the primitive of each segment and what is expected of it.
+
+        :param blend_entries: (n, 5) as in the rows.
+        """
         n = len(geometries)
         joints = np.array([geometry.joints for geometry in geometries])
         kinds = np.array([_KINDS[geometry.kind] for geometry in geometries])
@@ -321,6 +353,7 @@ class GoalPlanner:
             lengths=np.array([geometry.curve.length for geometry in geometries]),
             angles=np.array([geometry.curve.angle for geometry in geometries]),
             durations=np.array([timing.duration for timing in timings]),
+            blend_entries=blend_entries,
             joints=joints,
             primitives=moves,
             report_lines=SegmentLines(geometries, timings, moves, self.reasons),

@@ -188,10 +188,13 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
+        # The last but one is under way: the robot goes on from its state in the blend after it.
+        running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
-            plan = plan_goal(goal, self._state_at_rest(q_start), self._arm, self._options)
+            plan = plan_goal(goal, self._state_at_rest(q_start), self._arm, self._options, running)
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), first)) from None
+        start_time += _blend_half(plan.segments[0]) - _blend_half(running) if running else 0.0
         plan = _renumber_plan(plan, first, before.points - bool(replannable), start_time)
         return self.moves_part(plan, records_before, start_time)
 
@@ -237,7 +240,10 @@ class _PartPlanner:
         ]
         first = self._points - len(known)
         for segment in plan.segments:
-            k = segment.waypoint + 1 - first
+            k = segment.waypoint - first
+            if 0 <= k < len(known):
+                known[k] = replace(known[k], planned=segment)
+            k += 1
             if k < len(known):
                 known[k] = replace(
                     known[k], q_before=segment.joints, time_before=known[k - 1].waypoint.time
@@ -542,6 +548,11 @@ def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[in
         now += segment.duration
         ends[segment.waypoint] = now
     return ends
+
+
+def _blend_half(segment: PlannedSegment) -> float:
+    """Return the time from where the blend after a segment begins to its point [s]."""
+    return segment.blend_entry.half if segment.blend_entry else 0.0
 
 
 def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:

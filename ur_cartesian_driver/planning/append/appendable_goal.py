@@ -60,6 +60,8 @@ class ReplannablePoint:
     segment: Segment
     q_before: Joints
     time_before: float
+    #: Its motion as it was planned last.
+    planned: PlannedSegment | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

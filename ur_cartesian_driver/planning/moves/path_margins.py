@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.blend import Blend
-from ur_cartesian_driver.planning.geometry.samples import CurvePiece, Ints, PathSamples
-from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound
+from ur_cartesian_driver.planning.geometry.samples import Ints, PathSamples
+from ur_cartesian_driver.planning.moves.segment_data import BlendSamples, JointSpeedBound
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     margins_by_segment,
@@ -45,6 +43,8 @@ class PathMargins:
         """Begin without samples."""
         self._arm = arm
         self._solved: list[SolvedPieces] = []
+        #: The samples in blends; set by :meth:`joint_speed_bounds`.
+        self.blend_samples: BlendSamples
 
     def add(self, solved: SolvedPieces) -> None:
         """Add the next pieces."""
@@ -70,7 +70,15 @@ class PathMargins:
     def joint_speed_bounds(self) -> dict[int, JointSpeedBound]:
         """Return the time that the joints need for the whole segment, by segment."""
         limits = np.array(self._arm.model.max_joint_speed)
-        parts = [_speed_samples(solved, limits) for solved in self._solved]
+        blends, parts = zip(
+            *(_speed_samples(solved, limits) for solved in self._solved), strict=True
+        )
+        self.blend_samples = BlendSamples(
+            **{
+                field.name: np.concatenate([getattr(found, field.name) for found in blends])
+                for field in fields(BlendSamples)
+            }
+        )
         segment, time, joint, fraction, joint_time, local_time = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
@@ -99,7 +107,7 @@ class _SpeedSamples(NamedTuple):
     """What samples say about their segments, each (n,); a sample in a blend counts for two."""
 
     segment: Ints
-    #: Time of the whole segment at the rate there [s], and the joint that takes longest.
+    #: Time of the whole segment at the rate there [s], 0 in blends; the joint that takes longest.
     time: Floats
     joint: NDArray[np.intp]
     fraction: Floats
@@ -109,8 +117,8 @@ class _SpeedSamples(NamedTuple):
     local_time: Floats
 
 
-def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
-    """Return how fast a segment may be at each sample."""
+def _speed_samples(solved: SolvedPieces, limits: Floats) -> tuple[BlendSamples, _SpeedSamples]:
+    """Return the samples in blends, and how fast a segment may be at each sample."""
     joint_path, pieces = solved.joint_path, solved.joint_path.pieces
     begin = np.array([piece.begin for piece in pieces])[joint_path.piece]
     before = np.concatenate([[0.0], joint_path.t[:-1]])
@@ -123,34 +131,23 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
     rate = np.where(step > _MIN_STEP, joint_time / np.maximum(step, _MIN_STEP), 0.0)
     local_time = np.where(step > _MIN_STEP, rate, np.inf)
     index = np.array([p.index for p in pieces], dtype=np.int32)[joint_path.piece]
-    leaving, joining = (rate[joint_path.piece] for rate in _blend_rates(pieces))
-    on_blend = np.flatnonzero(joining > 0.0)
+    on_blend = np.flatnonzero(np.array([p.is_blend for p in pieces])[joint_path.piece])
+    places = joint_path.poses[:, :3]
+    distance = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1)
+    blend_samples = BlendSamples(
+        index=index[on_blend],
+        s=(joint_path.t - 0.5 * step)[on_blend],
+        joint_time=rate[on_blend],
+        joint=joint[on_blend],
+        tool_distance=(distance / np.maximum(step, _MIN_STEP))[on_blend],
+    )
     joint_time[on_blend] *= 0.5
-    local_time[on_blend] = np.inf
-    return _SpeedSamples(
+    local_time[on_blend], rate[on_blend] = np.inf, 0.0
+    return blend_samples, _SpeedSamples(
         np.concatenate([index, index[on_blend] + 1]),
-        np.concatenate([rate / leaving, rate[on_blend] / joining[on_blend]]),
+        np.concatenate([rate, rate[on_blend]]),
         *(
             np.concatenate([column, column[on_blend]])
             for column in (joint, joint_path.fractions, joint_time, local_time)
         ),
     )
-
-
-def _blend_rates(pieces: Sequence[CurvePiece]) -> tuple[Floats, Floats]:
-    """
-    Return du/ds of each piece, for the curve that it leaves and the one that it joins.
-
-    The rate of a blend's ``s`` lies between those of its two segments, see the timing of blends:
-    so a bound on a segment there holds at that end of the blend.
-    """
-    leaving, joining = np.ones(len(pieces)), np.zeros(len(pieces))
-    for k, piece in enumerate(pieces):
-        blend = piece.curve
-        if isinstance(blend, Blend):
-            if blend.fillet:
-                leaving[k] = blend.length / blend.first.length
-                joining[k] = blend.length / blend.second.length
-            else:
-                leaving[k], joining[k] = 2.0 * (1.0 - blend.leave), 2.0 * blend.join
-    return leaving, joining

@@ -6,11 +6,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
 from ur_cartesian_driver.planning.geometry.curves import SegmentCurve
-from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile
+from ur_cartesian_driver.planning.geometry.samples import Ints
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargin
 
 
@@ -57,24 +61,34 @@ class SegmentGeometry:
     waits: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlendSamples:
+    """The samples in all blends of a goal; columns (n,)."""
+
+    #: The waypoint that the blend rounds, and the parameter half-way to the sample before.
+    index: Ints
+    s: Floats
+    #: For a unit of ``s`` there: time at the joint speed limits [s], with the joint that takes
+    #: longest, and distance of the tool [m].
+    joint_time: Floats
+    joint: NDArray[np.intp]
+    tool_distance: Floats
+
+
 @dataclass(slots=True)
 class SegmentTiming:
-    """The speed of one segment over time; its blends change it until it is returned."""
+    """The speed of one segment over time."""
 
     #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
     velocity: float
     acceleration: float
-    #: The speed profile of its leading quantity between the blends.
-    profile: SpeedProfile
     #: Where speed or time come from, for the report.
     source: str
     #: On a change that the limits made; empty = none.
     remark: str
     wire_time: float = 0.0
-    #: Expected time, half of each blend included [s]; 0 until the blends are timed.
+    #: Expected time from point to point [s]; blended points are passed in the middle of the blend.
     duration: float = 0.0
-    #: Time in the blend after it [s], 0 without one.
-    blend_time: float = 0.0
     #: Bounds of the time, whatever the law by which the robot passes its blends [s].
     least_time: float = 0.0
     greatest_time: float = 0.0

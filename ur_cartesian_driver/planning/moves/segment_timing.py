@@ -5,29 +5,34 @@ The speed of each segment: from the times of the goal, from its speeds, or from 
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
 derived so that the time is met. All numbers are about the leading quantity of a segment, see
-:mod:`~.speed_limits`.
+:mod:`~.speed_limits`. How moves and blends follow each other is that of :mod:`~.move_chain`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import ceil, hypot, inf, sqrt
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, hypot, inf, isnan, nan, sqrt
 
-from ur_cartesian_driver.kinematics.robot_models import RobotModel
+import numpy as np
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.planning.geometry.speed_profile import (
-    cruise_speed_for,
-    min_duration,
-    peak_speed_and_acceleration,
-    profile_for_time,
-    RAMP_SHARE,
-    required_acceleration,
-    shortest_duration,
-    SpeedProfile,
-    trapezoid,
+from ur_cartesian_driver.motion.plan import PlannedSegment
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.moves.move_chain import (
+    MoveChain,
+    Moves,
+    Rows,
 )
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.segment_data import (
+    BlendSamples,
+    SegmentGeometry,
+    SegmentTiming,
+)
 from ur_cartesian_driver.planning.moves.speed_limits import (
     is_blended,
     leading_quantity,
@@ -41,6 +46,11 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
 )
+
+#: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
+#: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
+#: braking, which is also what robots would do that ignore the two.
+RAMP_SHARE = 1.0 / 3.0
 
 #: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
@@ -56,100 +66,299 @@ _NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
 #: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
-#: A time that is longer by less than this factor is not remarked.
-_NOTICEABLY = 1.001
-#: Iterations until speeds and the times in blends agree.
-_MAX_ITERATIONS = 12
+#: A time that is longer by less than this factor is not remarked, or kept.
+_NOTICEABLY, _NEARLY = 1.001, 1.0 + 1e-5
+#: What exceeds a limit by less than this factor keeps to it. Faster moves are slowed so often.
+_WITHIN = 1.0 + 1e-6
+_MAX_ROUNDS = 12
+#: A point that is passed no earlier than this is in time [s].
+_EARLY = 0.001
+
+
+def min_duration(length: float, speed: float, acceleration: float, peak: float = _PEAK) -> float:
+    """
+    Return the shortest time on the wire that keeps its peaks from rest to rest within bounds [s].
+
+    :param peak: speed over mean speed; 2 where it might be a triangle, whose acceleration is less.
+    """
+    return max(
+        peak * length / speed,
+        sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
+    )
+
+
+def shortest_duration(
+    length: Floats, speed: Floats, acceleration: Floats, ramps: Floats | float
+) -> Floats:
+    """
+    Return the shortest times of motions that are sent with speeds [s].
+
+    From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a).
+
+    :param ramps: from and to rest, 0 to 2.
+    """
+    peak = np.minimum(speed, np.sqrt(2.0 * acceleration * length / np.maximum(ramps, 1e-9)))
+    time: Floats = length / peak + 0.5 * ramps * peak / acceleration
+    return time
 
 
 def schedule(
-    geometries: Sequence[SegmentGeometry], options: PlanningOptions, model: RobotModel
-) -> list[SegmentTiming]:
+    geometries: Sequence[SegmentGeometry],
+    options: PlanningOptions,
+    model: RobotModel,
+    blend_samples: BlendSamples,
+    running: PlannedSegment | None = None,
+) -> tuple[list[SegmentTiming], MoveChain]:
     """
-    Return the timing of every segment.
+    Return the timing of every segment, and the chain of moves.
 
+    :param running: the first segment as it was planned, where it has been sent.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire.
     """
     timers = [_SegmentTimer(geometry, options, model) for geometry in geometries]
-    timings = [timer.first_guess() for timer in timers]
-    _meet_times_by_speed(timers, timings)
-    for timer, timing in zip(timers, timings, strict=True):
-        timer.check_wire(timing)
-        timer.check_blend(timing)
-    for k, geometry in enumerate(geometries):
-        if geometry.blend_before is not None and geometry.time is None:
-            timings[k].profile = _profile_after_blend(geometries, timings, k)
-    for k, timing in enumerate(timings):
-        timing.blend_time = _blend_time(geometries, timings, k)
-    before = 0.0
-    for timer, timing in zip(timers, timings, strict=True):
-        timer.add_time_in_blends(timing, 0.5 * (before + timing.blend_time))
-        before = timing.blend_time
-    for timer, timing in zip(timers, timings, strict=True):
-        timer.bound_time(timing)
-    for k, geometry in enumerate(geometries):
-        if (blend := geometry.blend_after) is not None:
-            speed = max(timers[n].tool_speed(timings[n]) for n in (k, k + 1))
-            # Legs of the radius r with a chord c between them: no blend is longer than r + c / 2.
-            timings[k].least_time += max(2.0 * (blend.length - blend.radius), 0.0) / speed
-    return timings
+    timetable = _Timetable(timers, options, blend_samples, running)
+    timetable.solve()
+    return timetable.timings(), timetable.chain
 
 
-def _meet_times_by_speed(timers: Sequence[_SegmentTimer], timings: list[SegmentTiming]) -> None:
-    """Replace the first guesses of segments that have to meet a time by their speed."""
-    geometries = [timer.geometry for timer in timers]
-    derived = [
-        k
-        for k, timer in enumerate(timers)
-        if timer.geometry.time is not None and not timer.takes_time
-    ]
-    # The time in a blend depends on the speeds on both of its sides, so iterate.
-    for _ in range(_MAX_ITERATIONS if any(is_blended(geometries[k]) for k in derived) else 1):
-        changed = 0.0
-        for k in derived:
-            halves = sum(_blend_time(geometries, timings, n) / 2.0 for n in (k - 1, k) if n >= 0)
-            new = timers[k].by_speed_for_time(halves)
-            changed = max(changed, abs(new.velocity / timings[k].velocity - 1.0))
-            timings[k] = new
-        if changed < 1e-6:
-            break
+@dataclass(slots=True, kw_only=True)
+class SpeedRequest:
+    """What a segment asks of its move, in the lengths that the robot counts."""
+
+    #: Its greatest speed; its acceleration, and the greatest one that may follow from a time.
+    speed: float
+    acceleration: float
+    max_acceleration: float
+    #: 1 / time on the wire, or speed / length [1/s]. Faster only as its limits allow.
+    rate: float
+    has_wire_time: bool = False
+    source: str
+    remark: str = ''
+    #: Its time; NaN = it has none. At least: what its limits allow at rest at both ends.
+    time: float = nan
+    min_time: float = 0.0
 
 
-def _blend_time(
-    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
-) -> float:
-    """Return the time in the blend after a segment [s]; the tool's speed changes evenly."""
-    blend = geometries[k].blend_after
-    if blend is None:
-        return 0.0
-    speeds = 0.0
-    for n, speed in ((k, timings[k].profile.leave), (k + 1, timings[k + 1].profile.enter)):
-        curve, profile = geometries[n].curve, timings[n].profile
-        speeds += speed * curve.length / profile.length * geometries[n].unblended_fraction
-    return 2.0 * blend.length / max(speeds, 1e-9)
+class _Timetable:
+    """Finds the speeds of all segments; columns (n,)."""
 
+    def __init__(
+        self,
+        timers: Sequence[_SegmentTimer],
+        options: PlanningOptions,
+        blend_samples: BlendSamples,
+        running: PlannedSegment | None,
+    ) -> None:
+        """Begin with what is asked for."""
+        self._timers, self._options, self._samples = timers, options, blend_samples
+        self._requests = requests = [
+            timer.request() if k or running is None else timer.request_again(running)
+            for k, timer in enumerate(timers)
+        ]
+        self._time, min_time, self._speed, self._least, self._most, self._rate, timed = np.array(
+            [
+                (
+                    r.time,
+                    r.min_time,
+                    r.speed,
+                    r.acceleration,
+                    r.max_acceleration,
+                    r.rate,
+                    r.has_wire_time,
+                )
+                for r in requests
+            ]
+        ).T
+        self._timed = timed > 0.0
+        self._wanted = np.maximum(self._time, min_time)
+        #: So much before their times points are passed, for the sake of the next ones [s].
+        self._ahead = np.zeros(len(timers))
+        #: What slows a segment where it is not a limit of its own.
+        self._limit_names: dict[int, str] = {}
+        self._moves = Moves.of([timer.move() for timer in timers])
+        self._max_rate = np.where(
+            np.isnan(self._time), self._rate, self._speed / self._moves.length
+        )
+        self._allow_acceleration()
+        self._rate = np.minimum(self._rate, self._max_rate)
+        self._moves = self._at_rate(np.arange(len(timers)), self._rate)
+        entry = running.blend_entry if running and self._moves.tail[0] > 0.0 else None
+        self.chain = MoveChain(self._moves, entry)
+        if entry is not None:
+            self._wanted[0] = self.chain.times.between[0] + entry.half
 
-def _profile_after_blend(
-    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
-) -> SpeedProfile:
-    """
-    Return the profile of a segment that leaves a blend no faster than both segments accelerate.
+    def solve(self) -> None:
+        """Meet the times within the limits; what cannot be met takes longer."""
+        for _ in range(_MAX_ROUNDS):
+            wanted = self._wanted - self._ahead + np.append(0.0, self._ahead[:-1])
+            self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate)
+            late = self.chain.times.durations - wanted
+            late[~((late > wanted * (_NEARLY - 1.0)) & (self._rate >= self._max_rate))] = 0.0
+            if not self._slow_down() and not self._go_ahead(late):
+                break
+        self._wanted += late
 
-    In the blend the distance left on the first segment is r1 (1 - s)^2, that done on the second
-    r2 s^2, so s' may grow to sqrt(a / 2r) of either.
-    """
-    before, old, velocity = timings[k - 1].profile, timings[k].profile, timings[k].velocity
-    r1 = (1.0 - geometries[k - 1].u_leave) * before.length / geometries[k - 1].unblended_fraction
-    r2 = geometries[k].u_join * old.length / geometries[k].unblended_fraction
-    blend_rate = max(
-        before.leave / (2.0 * r1), sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0)
-    )
-    enter = min(
-        velocity, 2.0 * r2 * blend_rate, sqrt(2.0 * old.acceleration * old.length + old.leave**2)
-    )
-    stop_distance = 0.5 * old.leave**2 / old.acceleration
-    return trapezoid(old.length, velocity, old.acceleration, enter, stop_distance)
+    def _go_ahead(self, late: Floats) -> bool:
+        """
+        Let points be passed early where the next one would be late; return whether there are any.
+
+        Where a slow move is blended into a fast one they share the speed in the blend.
+        """
+        moves = self._moves
+        alone = shortest_duration(moves.length, self._speed, self._most, 2.0)
+        rows = np.flatnonzero(
+            (late[1:] > 0.0)
+            & (self._wanted[1:] > alone[1:])
+            & (moves.tail[:-1] > 0.0)
+            & (self._rate[:-1] < self._max_rate[:-1])
+            & (self._ahead[:-1] + late[1:] < 0.5 * self._wanted[:-1])
+        )
+        self._ahead[rows] += late[rows + 1]
+        return len(rows) > 0
+
+    def timings(self) -> list[SegmentTiming]:
+        """
+        Return the timings of the segments.
+
+        :raises GoalRefused: a time is too short, a speed too low, a blend too small.
+        """
+        times, moves = self.chain.times, self._moves
+        least, greatest = self._bounds()
+        columns = (
+            moves.speed,
+            moves.acceleration,
+            moves.time,
+            times.durations,
+            self._wanted,
+            self._ahead,
+            least,
+            greatest,
+        )
+        return [
+            timer.timing(request, self._limit_names.get(k, ''), *row)
+            for k, (timer, request, *row) in enumerate(
+                zip(self._timers, self._requests, *(c.tolist() for c in columns), strict=True)
+            )
+        ]
+
+    def _at_rate(self, rows: Rows, rate: Floats) -> Moves:
+        """Return moves at rates; a rate beyond the greatest speed stands for more acceleration."""
+        moves, speed = self._moves.take(rows), self._speed[rows]
+        asked = rate * moves.length
+        more = np.maximum(asked / speed, 1.0) ** 2
+        moves.speed = np.minimum(asked, speed)
+        moves.acceleration = np.minimum(self._least[rows] * more, self._most[rows])
+        moves.time = np.where(self._timed[rows], 1.0 / rate, 0.0)
+        return moves
+
+    def _allow_acceleration(self) -> None:
+        """Let moves that meet a time by their speed accelerate as hard as they may."""
+        self._max_rate = np.where(
+            self._timed | np.isnan(self._time),
+            self._max_rate,
+            self._speed / self._moves.length * np.sqrt(self._most / self._least),
+        )
+
+    def _slow_down(self) -> bool:
+        """Slow moves that are too fast when blended; return whether there are any."""
+        times, slowed = self.chain.times, False
+        over = np.maximum(
+            np.maximum(times.cruise, times.enter) / self._speed,
+            np.sqrt(
+                np.maximum(
+                    np.where(times.enter != times.cruise, times.acceleration, 0.0),
+                    np.where(times.leave < times.cruise, times.braking, 0.0),
+                )
+                / self._most
+            ),
+        )
+        slower = np.where(self._timed & (over > _WITHIN), self._rate / over, self._max_rate)
+        speed = self._speed.copy()
+        for k, ratio, name in self._fast_blends():
+            # The move at the faster end of the blend is slowed.
+            row = k if times.end_rate[k] > times.begin_rate[k] else k - 1
+            there = times.enter[k] if row == k else times.leave[k - 1]
+            if self._timed[row]:
+                slower[row] = min(slower[row], self._rate[row] / ratio)
+            else:
+                speed[row] = min(speed[row], there / ratio)
+            self._limit_names[row] = name
+        by_speed = ~self._timed & (speed < self._speed)
+        self._speed = speed
+        slower = np.where(by_speed, np.minimum(slower, speed / self._moves.length), slower)
+        rows = np.flatnonzero((slower < self._max_rate) | by_speed)
+        self._max_rate = slower
+        self._allow_acceleration()
+        self._rate = np.minimum(self._rate, self._max_rate)
+        if len(rows):
+            self._moves.put(rows, self._at_rate(rows, self._rate[rows]))
+            self.chain.follow(rows)
+            slowed = True
+        return slowed
+
+    def _fast_blends(self) -> Iterator[tuple[int, float, str]]:
+        """Yield the blends (as the rows behind them) that are too fast, and how much."""
+        samples, times = self._samples, self.chain.times
+        if not len(samples.s):
+            return
+        row = samples.index - self._timers[0].geometry.index + 1
+        begin, end = times.begin_rate[row], times.end_rate[row]
+        rate = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * samples.s, 0.0))
+        least = samples.joint_time
+        if self._options.max_tool_speed > 0.0:
+            least = np.maximum(least, samples.tool_distance / self._options.max_tool_speed)
+        over = rate * least
+        for worst in np.flatnonzero(over > _WITHIN):
+            name = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+            joint = samples.joint[worst]
+            if samples.joint_time[worst] >= least[worst]:
+                source = self._timers[0].model.speed_source(joint)
+                name = (
+                    f'the joint speed limits ({JOINT_NAMES[joint]} in the blend at point '
+                    f'{samples.index[worst]}{source})'
+                )
+            yield int(row[worst]), float(over[worst]), name
+
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """
+        Return bounds of the times of segments, whatever the law by which blends are passed [s].
+
+        At most the arm rests at each point; at least it cruises between the blends and passes each
+        straight across, at the faster of its two speeds.
+        """
+        times, moves, geometries = (
+            self.chain.times,
+            self._moves,
+            [t.geometry for t in self._timers],
+        )
+        blended = np.array([is_blended(geometry) for geometry in geometries])
+        timed = moves.time > 0.0
+        time = np.where(timed, moves.time, 1.0)
+        speed = np.where(timed, moves.length / time / (1.0 - RAMP_SHARE), moves.speed)
+        acceleration = np.where(timed, speed / (RAMP_SHARE * time), moves.acceleration)
+        ramps = np.array(
+            [(g.blend_before is None) + (g.blend_after is None) for g in geometries], dtype=float
+        )
+        between = moves.length * np.array([g.unblended_fraction for g in geometries])
+        least = shortest_duration(between, speed, acceleration, ramps)
+        greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
+        tool_speed = speed * np.array([max(g.curve.length, 1e-9) for g in geometries])
+        tool_speed /= moves.length
+        # Legs of the radius r with a chord c between them: no blend is longer than r + c / 2.
+        across = np.array(
+            [
+                2.0 * max(g.blend_after.length - g.blend_after.radius, 0.0)
+                if g.blend_after
+                else 0.0
+                for g in geometries
+            ]
+        )
+        least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
+        return (
+            np.where(blended, least, times.durations),
+            np.where(blended, np.where(timed, moves.time, greatest), times.durations),
+        )
 
 
 class _SegmentTimer:
@@ -158,11 +367,10 @@ class _SegmentTimer:
     def __init__(
         self, geometry: SegmentGeometry, options: PlanningOptions, model: RobotModel
     ) -> None:
-        self.geometry, self._options, self._model = geometry, options, model
+        self.geometry, self._options, self.model = geometry, options, model
         self._length, self._unit = leading_quantity(geometry)
         self._speed_unit = speed_unit(self._unit)
         self._limits = speed_limits(geometry, self._length, options, model)
-        self._rests = geometry.blend_before is None, geometry.blend_after is None
         self._turn_leads_line = self._unit == 'rad' and geometry.kind == SegmentType.LINEAR
         self._peak = _PEAK_OF_TURN if self._turn_leads_line else _PEAK
         self._ramp_share = RAMP_SHARE
@@ -173,6 +381,10 @@ class _SegmentTimer:
             self._counted = counted / self._length
             # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
             self._ramp_share = 1.0 / (1.0 + max(1.0, 2.0 * self._counted))
+        #: The acceleration that the robot makes of the one that is sent.
+        self._acceleration_unit = 1.0
+        if is_optimized(geometry.kind):
+            self._acceleration_unit = _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
 
     @property
     def takes_time(self) -> bool:
@@ -185,23 +397,124 @@ class _SegmentTimer:
         """
         return self.geometry.kind in _TIMED_ON_WIRE and not self._options.dialect.is_coarse
 
-    def first_guess(self) -> SegmentTiming:
-        """Return the timing, final unless the segment has to meet a time by its speed."""
-        if self.geometry.time is None:
+    def move(self) -> tuple[float, ...]:
+        """Return its row of :class:`Moves`, still without speeds and time."""
+        geometry, counted = self.geometry, self._length * self._counted
+        before, after = geometry.blend_before, geometry.blend_after
+        head = counted * geometry.u_join if before else 0.0
+        tail = max(counted * (1.0 - geometry.u_leave), 1e-12) if after else 0.0
+        stops_within = inf
+        if after is not None and geometry.kind == SegmentType.PROCESS:
+            stops_within = after.radius
+        return (
+            counted,
+            1.0,
+            1.0,
+            0.0,
+            self._ramp_share,
+            stops_within,
+            head,
+            tail,
+            self._blend_rate(before, head),
+            self._blend_rate(after, tail),
+        )
+
+    def _blend_rate(self, blend: Blend | None, part: float) -> float:
+        """Return its length for a unit of ``s`` at its end of a blend."""
+        if blend is not None and blend.fillet:
+            return blend.length * self._length / self.geometry.curve.length
+        return max(2.0 * part, 1e-12)
+
+    def request(self) -> SpeedRequest:
+        """Return what it asks for."""
+        geometry = self.geometry
+        if geometry.time is None:
             return self._by_speed()
-        if self.takes_time:
-            return self._by_time()
-        if self._unit == 'rad' and self.geometry.kind in _UNMEASURED_TURNS:
+        if not self.takes_time and self._unit == 'rad' and geometry.kind in _UNMEASURED_TURNS:
             raise InvalidGoal(
-                point_field(self.geometry.index, 'time_from_start'),
-                f'is the time of a {self.geometry.kind.name} segment that turns the tool by '
-                f'{self._length:.3f} rad over {self.geometry.curve.length:.3f} m; how fast the '
+                point_field(geometry.index, 'time_from_start'),
+                f'is the time of a {geometry.kind.name} segment that turns the tool by '
+                f'{self._length:.3f} rad over {geometry.curve.length:.3f} m; how fast the '
                 'robot runs it where the turn is the larger number has not been measured',
                 'give velocity instead of times, or turn the tool on LINEAR segments',
             )
-        return self.by_speed_for_time(0.0, strict=False)
+        return self._by_time()
 
-    def check_wire(self, timing: SegmentTiming) -> None:
+    def request_again(self, running: PlannedSegment) -> SpeedRequest:
+        """Return what has been sent already."""
+        sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
+        assert not isinstance(sent, Spline)
+        speed, acceleration = sent.velocity, sent.acceleration * self._acceleration_unit
+        return SpeedRequest(
+            speed=speed,
+            acceleration=acceleration,
+            max_acceleration=acceleration,
+            rate=1.0 / time if time else speed / (self._length * self._counted),
+            has_wire_time=time > 0.0,
+            source='',
+        )
+
+    def timing(
+        self,
+        request: SpeedRequest,
+        limit_name: str,
+        speed: float,
+        acceleration: float,
+        wire_time: float,
+        duration: float,
+        wanted: float,
+        ahead: float,
+        least_time: float,
+        greatest_time: float,
+    ) -> SegmentTiming:
+        """
+        Return its timing.
+
+        :param limit_name: what slows it where it is not a limit of its own.
+        :param wanted: its time, longer where it is slowed [s]; NaN = none.
+        :param ahead: so much before its time its point is passed [s].
+        """
+        geometry, remark = self.geometry, request.remark
+        limit_name = limit_name or self._limits.name
+        if wanted > request.time * _NEARLY:
+            remark = self._too_fast(wanted, limit_name)
+        elif wire_time > 1.0 / request.rate * _NEARLY and isnan(request.time):
+            remark = (
+                f'point {geometry.index}: takes {wire_time:.3f} s instead of '
+                f'{1.0 / request.rate:.3f} s, because of {limit_name}'
+            )
+        elif isnan(request.time) and wire_time <= 0.0 and speed * _NEARLY < request.speed:
+            remark = (
+                f'point {geometry.index}: slowed from {request.speed:.3g} to {speed:.3g} '
+                f'{self._speed_unit} by {limit_name}'
+            )
+        if ahead > _EARLY:
+            early = (
+                f'point {geometry.index}: passed {ahead:.3f} s before its time, because the next '
+                'segment could not make good the time in the blend'
+            )
+            remark = f'{remark}; {early}' if remark else early
+        timing = SegmentTiming(
+            speed,
+            acceleration / self._acceleration_unit,
+            request.source,
+            remark,
+            wire_time=wire_time,
+            duration=duration,
+            least_time=least_time,
+            greatest_time=greatest_time,
+        )
+        if wire_time > 0.0:
+            # A third each of speeding up, cruising and braking, as far as the speed is allowed.
+            timing.velocity = self._length / wire_time / (1.0 - RAMP_SHARE)
+            if not self._turn_leads_line:
+                timing.velocity = min(timing.velocity, max(self._limits.speed, MIN_SPEED))
+            timing.acceleration = 2.0 * timing.velocity**2 / self._length
+        self._check_wire(timing)
+        self._check_blend(timing)
+        return timing
+
+    def _check_wire(self, timing: SegmentTiming) -> None:
         """Refuse speeds too small for the wire, and times too large for it."""
         if timing.wire_time > self._options.max_segment_time:
             raise InvalidGoal(
@@ -224,12 +537,12 @@ class _SegmentTimer:
                     else 'raise velocity or acceleration',
                 )
 
-    def check_blend(self, timing: SegmentTiming) -> None:
+    def _check_blend(self, timing: SegmentTiming) -> None:
         """Refuse a blend that the robot does not make: it would stop at the point (C171)."""
         blend = self.geometry.blend_after
         if blend is None or self.geometry.kind not in _NEEDS_A_CYCLE:
             return
-        travel = timing.velocity * self._model.control_cycle
+        travel = timing.velocity * self.model.control_cycle
         if blend.radius < travel:
             raise InvalidGoal(
                 segment_field(self.geometry.index, 'blend_radius'),
@@ -239,48 +552,10 @@ class _SegmentTimer:
                 'enlarge it, move slower, or set it to 0 to stop there',
             )
 
-    def add_time_in_blends(self, timing: SegmentTiming, time_in_blends: float) -> None:
-        """
-        Set the expected duration.
-
-        :param time_in_blends: half of the time in the blends at its ends [s].
-        """
-        profile = timing.profile
-        if timing.wire_time > 0.0 and time_in_blends > 0.0:
-            # The time on the wire is met in total: blends are shorter, so the rest takes longer.
-            left = max(timing.wire_time - time_in_blends, 0.05 * timing.wire_time)
-            profile = timing.profile = profile_for_time(
-                profile.length, left, *self._rests, self._ramp_share
-            )
-        timing.duration = profile.duration + time_in_blends
-
-    def bound_time(self, timing: SegmentTiming) -> None:
-        """
-        Set the least time without its blends, and the greatest time: with rest at each point.
-
-        Both hold for whatever law by which the robot passes blends.
-        """
-        if not is_blended(self.geometry):
-            timing.least_time = timing.greatest_time = timing.duration
-            return
-        speed, acceleration = timing.velocity, timing.acceleration
-        if timing.wire_time <= 0.0:
-            speed, acceleration = speed / self._counted, timing.profile.acceleration
-        between = self._length * self.geometry.unblended_fraction
-        timing.least_time = shortest_duration(between, speed, acceleration, sum(self._rests))
-        timing.greatest_time = (
-            timing.wire_time or trapezoid(self._length, speed, acceleration).duration
-        )
-
-    def tool_speed(self, timing: SegmentTiming) -> float:
-        """Return the speed of the tool when it cruises [m/s]."""
-        speed = timing.velocity if timing.wire_time > 0.0 else timing.velocity / self._counted
-        return speed * max(self.geometry.curve.length, 1e-9) / self._length
-
     # -- speeds ----------------------------------------------------------------------------------
 
-    def _by_speed(self) -> SegmentTiming:
-        """Return the timing of a segment without a time."""
+    def _by_speed(self) -> SpeedRequest:
+        """Return what a segment without a time asks for."""
         geometry, limits = self.geometry, self._limits
         bound, name, unit = limits.speed, limits.name, self._speed_unit
         if self._turn_leads_line and translates(geometry):
@@ -294,15 +569,19 @@ class _SegmentTimer:
                 f'by {name}'
             )
         acceleration = geometry.segment.acceleration or self._default_acceleration()
-        rate = acceleration
-        if is_optimized(geometry.kind):
-            rate *= _OPTIMIZED_JOINT_ACCELERATION / min(self._model.max_joint_speed)
-        else:
-            rate = acceleration = min(acceleration, limits.acceleration)
+        if not is_optimized(geometry.kind):
+            acceleration = min(acceleration, limits.acceleration)
         if self._turn_leads_line:
             return self._turning_line(velocity, acceleration, source, remark)
-        profile = self._profile_by_speed(velocity, rate)
-        return SegmentTiming(velocity, acceleration, profile, source, remark)
+        acceleration *= self._acceleration_unit
+        return SpeedRequest(
+            speed=velocity,
+            acceleration=acceleration,
+            max_acceleration=acceleration,
+            rate=velocity / self._length,
+            source=source,
+            remark=remark,
+        )
 
     def _wanted_speed(self) -> tuple[float, str]:
         """Return the speed that the goal asks for, and where it comes from."""
@@ -341,9 +620,9 @@ class _SegmentTimer:
 
     def _turning_line(
         self, velocity: float, acceleration: float, source: str, remark: str
-    ) -> SegmentTiming:
+    ) -> SpeedRequest:
         """
-        Return the timing of a line on which the turn leads.
+        Return what a line asks for on which the turn leads.
 
         The robot may turn the tool as slowly as it moves it, or several times as fast: a time is
         sent instead, in which the tool keeps its speed [m/s] and turns no faster than the default
@@ -367,119 +646,82 @@ class _SegmentTimer:
                 f'because of {limits.name}'
             )
             remark = f'{remark}; {slowed}' if remark else slowed
-        speed, rate = peak_speed_and_acceleration(self._length, time)
-        timing = SegmentTiming(
-            speed, rate, self._profile_by_time(time), source, remark, wire_time=time
+        counted, timed, peak = self._counted, self.takes_time, self._peak
+        # Without a time on the wire: a third each of speeding up, cruising and braking.
+        speed = self._length / time * (peak if timed else _PEAK)
+        acceleration = turn_rate if timed else 4.5 * self._length / time**2
+        return SpeedRequest(
+            speed=speed * counted,
+            acceleration=acceleration * counted,
+            max_acceleration=acceleration * counted,
+            rate=1.0 / time if timed else speed / self._length,
+            has_wire_time=timed,
+            source=source,
+            remark=remark,
         )
-        if not self.takes_time:
-            timing.wire_time = 0.0
-            timing.velocity, timing.acceleration = speed * self._counted, rate * self._counted
-        return timing
-
-    def _profile_by_speed(self, velocity: float, acceleration: float) -> SpeedProfile:
-        """Return the profile between the blends of a segment that is sent as a speed."""
-        distance = self._length * self.geometry.unblended_fraction
-        enter = inf if self.geometry.blend_before else 0.0
-        return trapezoid(distance, velocity, acceleration, enter, self._stop_distance())
-
-    def _stop_distance(self) -> float:
-        """Return how far behind the start of its blend the robot plans to stop, see trapezoid."""
-        if self.geometry.blend_after is not None and self.geometry.kind == SegmentType.PROCESS:
-            return inf
-        return self._length * (1.0 - self.geometry.u_leave)
 
     # -- times -----------------------------------------------------------------------------------
 
-    def _by_time(self) -> SegmentTiming:
-        """Return the timing of a segment for which the wire carries the time."""
-        limits = self._limits
-        min_time = min_duration(self._length, limits.speed, limits.acceleration, self._peak)
-        time, remark = self._time_within_limits(min_time)
-        # These make the robot speed up, cruise and brake for a third of the time each.
-        velocity, acceleration = peak_speed_and_acceleration(self._length, time)
-        profile = self._profile_by_time(time)
-        return SegmentTiming(
-            velocity, acceleration, profile, self._time_source(), remark, wire_time=time
+    def _by_time(self) -> SpeedRequest:
+        """Return what a segment with a time asks for."""
+        geometry, limits = self.geometry, self._limits
+        assert geometry.time is not None
+        length = self._length * geometry.unblended_fraction
+        mean = length / geometry.time
+        most = self._max_acceleration()
+        least = most
+        if not self.takes_time:
+            least = self._own_acceleration() or max(
+                self._default_acceleration(),
+                # A third each of speeding up, cruising and braking; and no braking before a blend.
+                4.5 * length / geometry.time**2,
+                mean**2 / (self._length * (1.0 - geometry.u_leave))
+                if geometry.blend_after and geometry.kind != SegmentType.PROCESS
+                else 0.0,
+            )
+        counted = self._counted
+        return SpeedRequest(
+            speed=limits.speed * counted,
+            acceleration=min(least, most) * counted,
+            max_acceleration=most * counted,
+            rate=1.0 / geometry.time,
+            has_wire_time=self.takes_time,
+            source=f'time from points[{geometry.index}].time_from_start',
+            time=geometry.time,
+            # A move with a time is planned to rest at its waypoint, also where it is blended.
+            min_time=min_duration(self._length, limits.speed, limits.acceleration, self._peak)
+            if self.takes_time
+            else 0.0,
         )
 
-    def _profile_by_time(self, time: float) -> SpeedProfile:
-        """Return the profile between the blends of a segment that is sent with a time [s]."""
-        fraction = self.geometry.unblended_fraction
-        length, share = self._length * fraction, self._ramp_share
-        return profile_for_time(length, time * fraction, *self._rests, share)
-
-    def by_speed_for_time(self, time_in_blends: float, strict: bool = True) -> SegmentTiming:
+    def _too_fast(self, min_time: float, limit_name: str) -> str:
         """
-        Return the timing of a segment that has to meet a time by its speed.
+        Return the remark on a time that is too short.
 
-        :param time_in_blends: the part of the time spent in the blends at its ends [s].
-        :param strict: whether a time that is too short is refused (not in a first guess).
-        :raises TooFast: the time is too short.
-        """
-        assert self.geometry.time is not None
-        distance = self._length * self.geometry.unblended_fraction
-        stop_distance = self._stop_distance()
-        bound, ramps = self._max_acceleration(), sum(self._rests)
-        time, remark = self.geometry.time, ''
-        if strict:
-            between = shortest_duration(distance, self._limits.speed, bound, ramps)
-            time, remark = self._time_within_limits(time_in_blends + between)
-        between = max(time - time_in_blends, 0.05 * time)
-        acceleration = self._own_acceleration() or max(
-            self._default_acceleration(),
-            # A third each of speeding up, cruising and braking; and no braking before a blend.
-            4.5 * distance / between**2,
-            (distance / between) ** 2 / stop_distance if 0.0 < stop_distance < inf else 0.0,
-            # With less, the speed that meets the time would be too high.
-            required_acceleration(distance, between, self._limits.speed, ramps),
-        )
-        acceleration = min(acceleration, bound)
-        velocity = cruise_speed_for(distance, between, acceleration, ramps)
-        if velocity is None:  # only before the blends are known, or within rounding
-            velocity = 2.0 * distance / between
-        return SegmentTiming(
-            velocity * self._counted,
-            acceleration * self._counted,
-            self._profile_by_speed(velocity, acceleration),
-            self._time_source(),
-            remark,
-        )
-
-    def _time_source(self) -> str:
-        return f'time from points[{self.geometry.index}].time_from_start'
-
-    def _time_within_limits(self, min_time: float) -> tuple[float, str]:
-        """
-        Return the time of the goal; the shortest one, with a remark, where that is too short.
-
-        :raises TooFast: the time is too short.
+        :raises TooFast: it is refused.
         """
         time, limits, unit = self.geometry.time, self._limits, self._speed_unit
         assert time is not None
-        is_too_short = time < min_time * (1.0 - 1e-9)
-        if not is_too_short:  # the minimum of a segment without any motion is not a number
-            return time, ''
         where = point_field(self.geometry.index, 'time_from_start')
         if min_time > self._options.max_segment_time:
             raise TooFast(
                 where,
-                f'gives the segment {time:.3f} s, but because of {limits.name} it takes '
+                f'gives the segment {time:.3f} s, but because of {limit_name} it takes '
                 f'{min_time:.0f} s, more than max_segment_time = '
                 f'{self._options.max_segment_time:.0f} s',
                 'move the path away from there, or use a JOINT segment',
             )
         if self._options.on_too_fast == 'slow':
-            return min_time, (
+            return (
                 f'point {self.geometry.index}: takes {min_time:.3f} s instead of {time:.3f} s, '
-                f'because of {limits.name}'
+                f'because of {limit_name}'
             )
-        speed, acceleration = peak_speed_and_acceleration(self._length, time)
-        speed *= self._peak / _PEAK
+        speed, acceleration = self._peak * self._length / time, 4.5 * self._length / time**2
         raise TooFast(
             where,
             f'gives the segment {time:.3f} s for {self._length:.3f} {self._unit}, which needs up '
             f'to {speed:.3f} {unit} and {acceleration:.3f} {unit}^2; '
-            f'allowed are {limits.speed:.3f} {unit} ({limits.name}) and '
+            f'allowed are {limits.speed:.3f} {unit} ({limit_name}) and '
             f'{self._max_acceleration():.3f} {unit}^2',
             f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
         )

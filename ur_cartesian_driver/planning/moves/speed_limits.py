@@ -70,7 +70,6 @@ def speed_limits(
                     f'the speed limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
                     f'{model.speed_source(k)}'
                 )
-        speed, name = _limit_in_blends(geometry, length, speed, name, model)
         return SpeedLimits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
     if not is_optimized(geometry.kind):
         min_time = geometry.speed_bound.time
@@ -89,16 +88,6 @@ def speed_limits(
         turn = min(geometry.curve.angle, length)  # a FIXED arc turns the tool by its angle
         faster = min(1.0, max(geometry.curve.length, turn / options.turn_ratio) / length)
     return SpeedLimits(speed=speed * faster, name=name, acceleration=bound * faster)
-
-
-def _limit_in_blends(
-    geometry: SegmentGeometry, length: float, speed: float, name: str, model: RobotModel
-) -> tuple[float, str]:
-    """Return the limit of a joint move, whose joints may turn faster in its blends."""
-    min_time = geometry.speed_bound.time
-    if is_blended(geometry) and min_time > 0.0 and length / min_time < speed * (1.0 - 1e-9):
-        return length / min_time, _joint_limit(geometry.speed_bound, model)
-    return speed, name
 
 
 def _joint_limit(speed_bound: JointSpeedBound, model: RobotModel) -> str:

@@ -170,19 +170,6 @@ def timed_ramp(length: float, acceleration: float, speed: float) -> float:
     return 1.0 / (1.0 + max(1.0, length * acceleration / (speed * speed)))
 
 
-def timed_cruise(
-    length: float, duration: float, start_speed: float = 0.0, part: float = TIMED_RAMP
-) -> float:
-    """
-    Return the cruising speed c of :func:`timed`.
-
-    With ramps of x and y seconds, d = v0 x/2 + c (T - x/2 - y/2). y is the part of T; x too, or
-    less where a fast start would otherwise use up the length.
-    """
-    x, y = _timed_ramps(length, duration, start_speed, part)
-    return (length - 0.5 * start_speed * x) / (duration - 0.5 * (x + y))
-
-
 def timed(
     length: float, duration: float, start_speed: float = 0.0, part: float = TIMED_RAMP
 ) -> MotionProfile:
@@ -192,13 +179,16 @@ def timed(
     From rest it is the trapezoid of speed and acceleration, stretched evenly to the duration, as
     five recordings of a UR3 (3.5) show: the speeds of both are lost, the shape remains.
 
+    With ramps of x and y seconds, d = v0 x/2 + c (T - x/2 - y/2). y is the part of T; x too, or
+    less where a fast start would otherwise use up the length.
+
     :param part: of the time for speeding up, and for braking, see :func:`timed_ramp`. A third:
         c = 1.5 d/T, a = 4.5 d/T^2.
     """
     if length <= 0.0:
         return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
     x, y = _timed_ramps(length, duration, start_speed, part)
-    c = timed_cruise(length, duration, start_speed, part)
+    c = (length - 0.5 * start_speed * x) / (duration - 0.5 * (x + y))
     return _chain(
         length,
         start_speed,

@@ -21,7 +21,6 @@ from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     ramp,
     s_curve,
     timed,
-    timed_cruise,
     timed_ramp,
     trapezoid,
 )
@@ -69,6 +68,13 @@ class ProfileParameters:
     def ramp_part(self, length: float) -> float:
         """Return the part of its time in which a timed move of a length speeds up, and brakes."""
         return timed_ramp(length, self.acceleration, self.speed)
+
+    def strongest(self, length: float) -> float:
+        """Return the acceleration over a length, from rest to rest where it has a time."""
+        if self.time > 0.0:
+            part = self.ramp_part(length)
+            return length / (part * (1.0 - part) * self.time**2)
+        return max(self.acceleration, self.braking or 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +221,8 @@ def append_move_path(
         (blend.entry_rate, blend.exit_rate),
         last.profile.speed(leave),
         last.profile.duration - leave,
-        (last_move.parameters, parameters),
+        last_move,
+        parameters,
         head,
         move_path.length - head,
     )
@@ -256,7 +263,8 @@ def _blend_profiles(
     rates: tuple[float, float],
     speed: float,
     remaining: float,
-    parameters: tuple[ProfileParameters, ProfileParameters],
+    last_move: LastMove,
+    after: ProfileParameters,
     head: float,
     rest: float,
 ) -> tuple[MotionProfile, MotionProfile]:
@@ -266,38 +274,37 @@ def _blend_profiles(
     The rate of the blend changes evenly from that of the entry to that of the next cruising
     speed, within three bounds: it does not grow beyond what keeps both parts within their
     accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must
-    suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway.
+    suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway. A
+    move with a time has no acceleration of its own: in its blend it accelerates as from rest to
+    rest, or as the next move does in proportion to their lengths.
 
     The sum of times is kept: the time that the move before had left until its waypoint is added
     to the time of the next one.
 
     :param rates: path units per unit of the blend's parameter, at entry and exit.
     :param speed: at the entry; ``remaining`` [s]: until rest at the waypoint.
-    :param parameters: of the move before and of the new one.
+    :param after: the parameters of the new move.
     :param head: length of the new path within the blend; ``rest``: behind it.
     """
-    (entry_rate, exit_rate), (before, after) = rates, parameters
+    (entry_rate, exit_rate), before = rates, last_move.parameters
     u0 = speed / entry_rate
-    time = after.time + remaining
-    whole = head + rest
-    part = after.ramp_part(whole)
+    time, whole = after.time + remaining, head + rest
+    acceleration = after.strongest(whole) if after.time > 0.0 else after.acceleration
+    length = last_move.move_path.length
+    strongest = before.strongest(length)
+    if before.time > 0.0:
+        strongest = max(strongest, acceleration * length / whole)
     if after.time > 0.0:
-        cruise = timed_cruise(whole + head, time, u0 * exit_rate, part)
-        acceleration, stoppable = whole / (part * (1.0 - part) * after.time**2), inf
+        # Evenly, but for the braking at its end.
+        cruise = (whole + head) / (time * (1.0 - 0.5 * after.ramp_part(whole)))
     else:
-        cruise, acceleration = after.speed, after.acceleration
         stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)
-    allowed = sqrt(min(_acceleration(before) / entry_rate, acceleration / exit_rate))
-    u1 = min(cruise / exit_rate, stoppable / exit_rate, max(u0, allowed))
+        cruise = min(after.speed, stoppable)
+    allowed = sqrt(min(strongest / entry_rate, acceleration / exit_rate))
+    u1 = min(cruise / exit_rate, max(u0, allowed))
     through = ramp(1.0, u0, u1)
     if after.time > 0.0:
         min_time = time * rest / (whole + head) / _MAX_CATCH_UP
         left = max(time - through.duration, min_time)
-        return through, timed(rest, left, u1 * exit_rate, part)
+        return through, timed(rest, left, u1 * exit_rate, after.ramp_part(whole))
     return through, after.profile(rest, u1 * exit_rate)
-
-
-def _acceleration(parameters: ProfileParameters) -> float:
-    return (
-        inf if parameters.time > 0.0 else max(parameters.acceleration, parameters.braking or 0.0)
-    )
