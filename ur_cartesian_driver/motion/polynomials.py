@@ -63,6 +63,23 @@ def quintic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats
     )
 
 
+def values(coefficients: Floats, t: Floats) -> Floats:
+    """
+    Return the values of polynomials, without derivatives: (m, k) or (m, c, k).
+
+    :param coefficients: (m, 6, k).
+    :param t: (m,) or (m, c): one or several times since the piece began [s].
+    """
+    if t.ndim > 1:
+        coefficients = coefficients[:, :, None]
+    t = t[..., None]
+    x = coefficients[:, 5] * t + coefficients[:, 4]
+    for power in range(3, -1, -1):
+        x *= t
+        x += coefficients[:, power]
+    return x
+
+
 def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     """
     Return the values of polynomials, one for each row.

@@ -16,7 +16,13 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
+from ur_cartesian_driver.motion.polynomials import (
+    cubic_rows,
+    evaluate,
+    MotionRows,
+    quintic_rows,
+    values,
+)
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import (
     conjugate_rows,
@@ -112,9 +118,15 @@ class ToolSpline:
             np.concatenate([x.a, e], axis=1),
         )
 
+    def poses(self, piece: Ints, t: Floats) -> Floats:
+        """Return the poses of :meth:`rows` (m, 7)."""
+        position, turn = self.vectors(piece, t)
+        turned = multiply_rows(exp_rows(turn), self.orientations[piece])
+        return np.concatenate([position, normalized_rows(turned)], axis=1)
+
     def vectors(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
-        return (evaluate(self.positions[piece], t).x, evaluate(self.turns[piece], t).x)
+        return values(self.positions[piece], t), values(self.turns[piece], t)
 
     def at(self, times: Floats) -> ToolRows:
         """Return the tool at times (m,) [s]; where two pieces meet, on the second one."""
@@ -149,7 +161,7 @@ class ToolCurve:
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
         begin, end = self.spline.times[self.piece : self.piece + 2]
-        return self.spline.rows(np.full(len(u), self.piece), u * (end - begin)).poses
+        return self.spline.poses(np.full(len(u), self.piece), u * (end - begin))
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""

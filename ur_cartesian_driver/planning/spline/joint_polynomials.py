@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import TooFast
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
+from ur_cartesian_driver.motion.polynomials import cubic_rows, MotionRows, quintic_rows, values
 from ur_cartesian_driver.motion.pose_rows import angle_rows, compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -144,11 +144,10 @@ class _PieceRefinement:
         )
         count = int(np.clip(sample_count.max(), *_COMPARED_SAMPLES))
         t = (end - begin)[:, None] * (np.arange(1, count + 1) / (count + 1))
-        coefficients = np.repeat(self._coefficients(rows), count, axis=0)
-        q = evaluate(coefficients, t.ravel()).x
+        q = values(self._coefficients(rows), t).reshape(-1, 6)
         tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)
         spline, piece = self.path.spline, np.repeat(self.piece[rows], count)
-        wanted = spline.rows(piece, (begin[:, None] + t).ravel() - spline.times[piece]).poses
+        wanted = spline.poses(piece, (begin[:, None] + t).ravel() - spline.times[piece])
         distance = np.linalg.norm(tool[:, :3] - wanted[:, :3], axis=1)
         deviation = np.stack([distance, angle_rows(wanted[:, 3:], tool[:, 3:])], axis=1)
         largest: Floats = deviation.reshape(len(rows), count, 2).max(axis=1)

@@ -122,7 +122,7 @@ def solve_spline_path(
     samples = _pose_samples(spline, coarse, first)
     pieces = _pieces(spline, samples, first)
     joint_path = solve_joint_path(kinematics, pieces, q_start, samples)
-    start = spline.rows(np.zeros(1, dtype=np.intp), np.zeros(1)).poses
+    start = spline.poses(np.zeros(1, dtype=np.intp), np.zeros(1))
     poses = np.concatenate([start, joint_path.poses])
     length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
     angle = _cumulative(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
@@ -253,13 +253,13 @@ def _pose_samples(
     piece = np.repeat(np.arange(n), count)
     number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
     u = number / count[piece]
-    return PoseSamples(piece, u, spline.rows(piece, u * h[piece]).poses)
+    return PoseSamples(piece, u, spline.poses(piece, u * h[piece]))
 
 
 def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> list[CurvePiece]:
     """Return the pieces, with lengths measured along chords."""
     n = len(spline.positions)
-    starts = spline.rows(np.arange(n), np.zeros(n)).poses
+    starts = spline.poses(np.arange(n), np.zeros(n))
     begins = np.searchsorted(samples.piece, np.arange(n))
     before = np.concatenate([samples.poses[:1], samples.poses[:-1]])
     before[begins] = starts
