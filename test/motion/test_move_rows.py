@@ -9,8 +9,14 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, MoveRows, MOVES
-from ur_cartesian_driver.motion.plan import PlannedRows
+from ur_cartesian_driver.motion.move_rows import (
+    blend_radii,
+    has_optimized,
+    MoveRows,
+    MOVES,
+    SplineRows,
+)
+from ur_cartesian_driver.motion.plan import LateLines, PlannedRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     MoveC,
@@ -122,3 +128,39 @@ def test_radii_and_optimized_moves_are_found_among_all():
     one = {4: OptimoveL(target=Pose())}
     assert has_optimized(rows(kinds=np.ones(12, dtype=np.int64), others=one).primitives)
     assert isinstance(rows(kinds=np.zeros(12, dtype=np.int64)).primitives[0], MoveJ)
+
+
+@pytest.mark.parametrize('quintic', [True, False])
+def test_pieces_of_a_spline_are_encoded_from_columns(quintic):
+    rng = np.random.default_rng(3)
+    pieces = SplineRows(
+        targets=rng.uniform(-3.0, 3.0, (8, 6)),
+        velocities=rng.uniform(-1.0, 1.0, (8, 6)),
+        accelerations=rng.uniform(-1.0, 1.0, (8, 6)),
+        durations=rng.uniform(0.1, 2.0, 8),
+        quintic=np.full(8, quintic),
+    )
+    plan = replace(rows(8), primitives=pieces)
+    assert encode_rows(plan) == encode_points(instructions(plan))
+    assert (plan.primitives[0].accelerations is not None) == quintic
+    assert not has_optimized(pieces)
+    assert not blend_radii(pieces).any()
+    short = replace(plan, primitives=replace(pieces, durations=np.full(8, 1e-9)))
+    with pytest.raises(LocalProtocolError, match='Point 0: duration is 1e-09 s'):
+        encode_rows(short)
+
+
+def test_lines_are_made_when_one_is_read():
+    made = []
+
+    def make():
+        made.append(1)
+        return ['a', 'b', 'c']
+
+    lines = LateLines(3, make)
+    part = lines[1:]
+    assert (len(lines), len(part), made) == (3, 2, [])
+    assert (part[0], part[-1], lines[0], list(lines)) == ('b', 'c', 'a', ['a', 'b', 'c'])
+    assert made == [1]
+    with pytest.raises(IndexError):
+        part[2]

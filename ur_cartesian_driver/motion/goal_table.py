@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
-from operator import attrgetter
+from operator import attrgetter, eq
 from typing import Any, overload, TypeVar
 
 import numpy as np
@@ -105,12 +105,20 @@ class Rows(Sequence[T]):
                 return all(a == b for a, b in zip(self, other, strict=True))
             return NotImplemented
         return all(
-            np.array_equal(a, b, equal_nan=True) if isinstance(a, np.ndarray) else a == b
+            _are_equal(a, b)
             for (_, a), (_, b) in zip(self._columns(), other._columns(), strict=True)
         )
 
     def __hash__(self) -> int:
         return hash((type(self), len(self)))
+
+
+def _are_equal(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, Sequence):
+        return len(a) == len(b) and all(map(eq, a, b))
+    return bool(a == b)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The primitives of a plan in columns: a row for each motion to a pose.
+The primitives of a plan in columns: a row for each motion.
 
-Nearly all motions of a long goal go to a pose. The others (arcs, joint targets, waiting) stand
-beside the columns as objects, by their row. All are a sequence of primitives, made when somebody
-looks at them.
+Nearly all motions of a long goal go to a pose, or are pieces of a spline. The others (arcs, joint
+targets, waiting) stand beside the columns as objects, by their row. All are a sequence of
+primitives, made when somebody looks at them.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveJ,
     OptimoveL,
     Primitive,
+    Spline,
 )
 from ur_cartesian_driver.motion.vectors import vector6
 
@@ -94,16 +95,53 @@ class MoveRows(Rows[Primitive]):
             )
 
 
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class SplineRows(Rows[Primitive]):
+    """Pieces of a joint spline; units as in a :class:`Spline`."""
+
+    #: (n, 6) each
+    targets: Floats
+    velocities: Floats
+    accelerations: Floats
+    #: (n,)
+    durations: Floats
+    #: (n,) whether the accelerations count
+    quintic: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.durations)
+
+    def __iter__(self) -> Iterator[Primitive]:
+        for target, velocity, acceleration, duration, quintic in zip(
+            self.targets.tolist(),
+            self.velocities.tolist(),
+            self.accelerations.tolist(),
+            self.durations.tolist(),
+            self.quintic.tolist(),
+            strict=True,
+        ):
+            yield Spline(
+                target=vector6(target),
+                velocities=vector6(velocity),
+                accelerations=vector6(acceleration) if quintic else None,
+                duration=duration,
+            )
+
+
 def blend_radii(primitives: Sequence[Primitive]) -> Floats:
     """Return the blend radius of each primitive (n,) [m]; splines have none."""
     if isinstance(primitives, MoveRows):
         return primitives.blend_radii
+    if isinstance(primitives, SplineRows):
+        return np.zeros(len(primitives))
     return np.array([getattr(primitive, 'blend_radius', 0.0) for primitive in primitives])
 
 
 def has_optimized(primitives: Sequence[Primitive]) -> bool:
     """Tell whether the robot chooses the time of some primitive."""
     classes = (OptimoveJ, OptimoveL)
+    if isinstance(primitives, SplineRows):
+        return False
     if not isinstance(primitives, MoveRows):
         return any(isinstance(primitive, classes) for primitive in primitives)
     in_rows = np.isin(primitives.kinds, [MOVES.index(move) for move in classes])

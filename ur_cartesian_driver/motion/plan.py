@@ -8,9 +8,10 @@ A plan: primitives, the reference path of the tool, and a report of the choices.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import cache
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +99,36 @@ class PlannedSegment:
     blend_entry: BlendEntry | None = None
     #: The outputs that follow it on the wire, in this order.
     outputs: tuple[SwitchOutput, ...] = ()
+
+
+class LateLines(Sequence[str]):
+    """Lines that are made when somebody reads one of them: long goals have many."""
+
+    def __init__(self, count: int, make: Callable[[], Sequence[str]]) -> None:
+        """
+        Keep what makes all of them.
+
+        :param count: how many that will be.
+        """
+        self._rows, self._lines = range(count), cache(make)
+
+    def __len__(self) -> int:
+        """Return how many lines there are."""
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> LateLines: ...
+
+    def __getitem__(self, index: int | slice) -> str | LateLines:
+        """Return a line, or some of them; these are not made yet."""
+        if isinstance(index, int):
+            return self._lines()[self._rows[index]]
+        part = LateLines(0, self._lines)
+        part._rows = self._rows[index]
+        return part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

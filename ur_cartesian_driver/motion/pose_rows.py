@@ -9,10 +9,13 @@ so many poses that an object for each would take longer than the inverse kinemat
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import overload
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 
 Floats = NDArray[np.float64]
 
@@ -66,6 +69,52 @@ def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
     rows[:, 2] = T_a_b[:, 2] + z + aw * tz + ax * ty - ay * tx
     rows[:, 3:] = multiply_rows(T_a_b[:, 3:], np.array([T_b_c.quaternion]))
     return rows
+
+
+def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
+    """Return ``T_a_c`` (n, 7) of one pose before rows ``T_b_c`` (n, 7), normalised."""
+    ux, uy, uz, w = T_a_b.quaternion
+    x, y, z = T_b_c[:, :3].T
+    # v + 2 u x (u x v + w v), as in motion.pose.
+    tx, ty, tz = 2.0 * (uy * z - uz * y), 2.0 * (uz * x - ux * z), 2.0 * (ux * y - uy * x)
+    px, py, pz = T_a_b.position
+    rows = np.empty((len(T_b_c), 7))
+    rows[:, 0] = x + w * tx + uy * tz - uz * ty + px
+    rows[:, 1] = y + w * ty + uz * tx - ux * tz + py
+    rows[:, 2] = z + w * tz + ux * ty - uy * tx + pz
+    turned = multiply_rows(np.array([T_a_b.quaternion]), T_b_c[:, 3:])
+    # In the order of motion.pose, so that both give the same bits.
+    x, y, z, w = turned.T
+    rows[:, 3:] = turned * (1.0 / np.sqrt(x * x + y * y + z * z + w * w))[:, None]
+    return rows
+
+
+class PoseRows(Sequence[Pose]):
+    """Poses in the rows of an array (n, 7), made when somebody looks at them."""
+
+    def __init__(self, rows: Floats) -> None:
+        """Keep the rows."""
+        self.rows = rows
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.rows)
+
+    @overload
+    def __getitem__(self, index: int) -> Pose: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> PoseRows: ...
+
+    def __getitem__(self, index: int | slice) -> Pose | PoseRows:
+        """Return a pose, or some of them."""
+        if isinstance(index, slice):
+            return PoseRows(self.rows[index])
+        return pose_from_row(self.rows[index].tolist())
+
+    def __iter__(self) -> Iterator[Pose]:
+        """Make the poses one by one."""
+        return map(pose_from_row, self.rows.tolist())
 
 
 def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:

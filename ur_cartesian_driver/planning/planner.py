@@ -35,8 +35,8 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import Floats, PoseRows, transform_rows
 from ur_cartesian_driver.motion.primitive import (
     Joints,
     MoveC,
@@ -56,7 +56,7 @@ from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
-    SegmentLines,
+    segment_lines,
     tightest_remark,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
@@ -203,7 +203,7 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    segments = place_outputs(PlannedRows.of(found.segments), found.reference, goal.io_commands)
+    segments = place_outputs(found.segments, found.reference, goal.io_commands)
     return planner.plan(
         stretch_times(goal, found.stretch), segments, found.reference, found.remarks
     )
@@ -234,8 +234,7 @@ class GoalPlanner:
         self.remarks = list(retargeted.remarks)
         #: By point: why its primitive is not the plain one of its segment type.
         self.reasons: dict[int, list[str]] = {}
-        points = goal.waypoints
-        self.targets = [goal.T_base_frame @ points.pose(i) for i in range(len(points))]
+        self.targets = PoseRows(transform_rows(goal.T_base_frame, goal.waypoints.poses))
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)
         if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
@@ -328,7 +327,7 @@ class GoalPlanner:
         kinds = np.array([_KINDS[geometry.kind] for geometry in geometries])
         moves = MoveRows(
             kinds=kinds,
-            targets=pose_rows(self.targets[geometry.index] for geometry in geometries),
+            targets=self.targets[geometries[0].index :].rows,
             q_near=joints,
             has_q_near=np.array([geometry.kind in JOINT_SPACE_TYPES for geometry in geometries]),
             velocities=np.array([timing.velocity for timing in timings]),
@@ -356,7 +355,7 @@ class GoalPlanner:
             blend_entries=blend_entries,
             joints=joints,
             primitives=moves,
-            report_lines=SegmentLines(geometries, timings, moves, self.reasons),
+            report_lines=segment_lines(geometries, timings, moves, self.reasons),
         )
 
     def _is_special(self, geometry: SegmentGeometry) -> bool:

@@ -302,7 +302,8 @@ class _PartPlanner:
         segments, reference, start_time = found.segments, found.reference, start.time
         if before.replanned_piece is not None:
             piece, path = before.replanned_piece
-            segments, start_time = (piece, *segments), start.time - piece.duration
+            segments = PlannedRows.of((piece, *segments))
+            start_time = start.time - piece.duration
             reference = _join_paths(path, reference)
         plan = Plan(
             goal=goal,

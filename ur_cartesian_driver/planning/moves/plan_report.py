@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import degrees
-from typing import overload
 
 from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE, Goal, SegmentType
+from ur_cartesian_driver.motion.plan import LateLines
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
@@ -36,45 +36,24 @@ def segment_line(
     return f'{", ".join(parts)}; margin {geometry.tightest_margin}'
 
 
-class SegmentLines(Sequence[str]):
-    """The lines of all segments, each made when somebody reads it."""
+def segment_lines(
+    geometries: Sequence[SegmentGeometry],
+    timings: Sequence[SegmentTiming],
+    primitives: Sequence[Primitive],
+    reasons: Mapping[int, Sequence[str]],
+) -> LateLines:
+    """
+    Return the lines of all segments.
 
-    def __init__(
-        self,
-        geometries: Sequence[SegmentGeometry],
-        timings: Sequence[SegmentTiming],
-        primitives: Sequence[Primitive],
-        reasons: Mapping[int, Sequence[str]],
-    ) -> None:
-        """
-        Keep what the lines are made of.
-
-        :param reasons: by point, for the choice of the primitive.
-        """
-        self._parts, self._reasons = (geometries, timings, primitives), reasons
-
-    def __len__(self) -> int:
-        """Return how many segments there are."""
-        return len(self._parts[0])
-
-    @overload
-    def __getitem__(self, index: int) -> str: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> SegmentLines: ...
-
-    def __getitem__(self, index: int | slice) -> str | SegmentLines:
-        """Return a line, or some of them."""
-        if isinstance(index, int):
-            index = range(len(self))[index]
-            return next(iter(self[index : index + 1]))
-        geometries, timings, primitives = self._parts
-        return SegmentLines(geometries[index], timings[index], primitives[index], self._reasons)
-
-    def __iter__(self) -> Iterator[str]:
-        """Make the lines one by one."""
-        for geometry, timing, primitive in zip(*self._parts, strict=True):
-            yield segment_line(geometry, timing, primitive, self._reasons.get(geometry.index, ()))
+    :param reasons: by point, for the choice of the primitive.
+    """
+    return LateLines(
+        len(geometries),
+        lambda: [
+            segment_line(geometry, timing, primitive, reasons.get(geometry.index, ()))
+            for geometry, timing, primitive in zip(geometries, timings, primitives, strict=True)
+        ],
+    )
 
 
 def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:

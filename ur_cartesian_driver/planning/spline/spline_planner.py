@@ -11,7 +11,7 @@ moving one, and :func:`plan_stop` brings such a motion to rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 
@@ -21,9 +21,16 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal_table import GoalTable, zeros
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan import (
+    LateLines,
+    Plan,
+    PlannedRows,
+    PlannedSegment,
+    ReferencePath,
+)
 from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
@@ -96,7 +103,7 @@ class SplinePieces:
     """A part of a motion that passed all checks."""
 
     #: One for each piece; the last piece to a point carries its report line.
-    segments: tuple[PlannedSegment, ...]
+    segments: PlannedRows
     #: Row 0 is the start; times are from the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
@@ -142,7 +149,7 @@ def plan_spline(
     polynomials = fit_joint_polynomials(
         kinematics, path, start.rows(), points.quintic, options.spline_tolerance
     )
-    segments = tuple(_segments(path, polynomials, goal))
+    segments = _segments(path, polynomials, goal)
     end = SplineState.after(segments[-1], float(polynomials.times[-1]))
     remarks_made += _clearance_remarks(
         path, end, arm, tool_tips or (T_flange_tcp,), start, options
@@ -236,44 +243,40 @@ def _fit_to_limits(
     return path, found.factor, [remark]
 
 
-def _segments(
-    path: SplinePath, polynomials: JointPolynomials, goal: GoalTable
-) -> Iterator[PlannedSegment]:
-    length = np.interp(polynomials.times, path.times, path.length)
-    angle = np.interp(polynomials.times, path.times, path.angle)
-    columns = (
-        polynomials.piece,
-        np.diff(polynomials.piece, append=-1) != 0,
-        np.diff(length),
-        np.diff(angle),
-        np.round(np.diff(polynomials.times), 6),
-        polynomials.q[1:],
-        polynomials.qd[1:],
-        polynomials.qdd[1:],
-    )
-    done, count = [0.0, 0.0, 0.0], 0
-    for k, is_last, metres, radians, duration, q, qd, qdd in zip(
-        *(column.tolist() for column in columns), strict=True
-    ):
-        done = [a + b for a, b in zip(done, (metres, radians, duration), strict=True)]
-        count, line = count + 1, ''
-        if is_last:
-            line = _segment_line(path, goal, k, count, done)
-            done, count = [0.0, 0.0, 0.0], 0
-        yield PlannedSegment(
-            primitive=Spline(
-                target=tuple(q),
-                velocities=tuple(qd),
-                duration=duration,
-                accelerations=tuple(qdd) if polynomials.quintic else None,
-            ),
-            waypoint=path.first + k,
-            length=metres,
-            angle=radians,
-            duration=duration,
-            joints=tuple(q),
-            report_line=line,
+def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:
+    durations = np.round(np.diff(polynomials.times), 6)
+    lengths = np.diff(np.interp(polynomials.times, path.times, path.length))
+    angles = np.diff(np.interp(polynomials.times, path.times, path.angle))
+    n = len(durations)
+
+    def lines() -> list[str]:
+        """Make those of the last pieces to the points."""
+        last = np.flatnonzero(np.diff(polynomials.piece, append=-1))
+        count = np.diff(last, prepend=-1)
+        done = np.add.reduceat(
+            np.stack([lengths, angles, durations], axis=1), last + 1 - count, axis=0
         )
+        made = [''] * n
+        for row, pieces, sums in zip(last.tolist(), count.tolist(), done.tolist(), strict=True):
+            made[row] = _segment_line(path, goal, int(polynomials.piece[row]), pieces, sums)
+        return made
+
+    return PlannedRows(
+        waypoints=(path.first + polynomials.piece).astype(np.int32),
+        lengths=lengths,
+        angles=angles,
+        durations=durations,
+        blend_entries=zeros(n, 5),
+        joints=polynomials.q[1:],
+        primitives=SplineRows(
+            targets=polynomials.q[1:],
+            velocities=polynomials.qd[1:],
+            accelerations=polynomials.qdd[1:],
+            durations=durations,
+            quintic=np.full(n, polynomials.quintic),
+        ),
+        report_lines=LateLines(n, lines),
+    )
 
 
 def _segment_line(

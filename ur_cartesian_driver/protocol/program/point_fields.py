@@ -52,7 +52,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
@@ -256,6 +256,30 @@ def move_fields(moves: MoveRows) -> Floats:
     fields[:, PointField.BLEND] = moves.blend_radii
     fields[:, PointField.TYPE] = _POSE_TYPES[moves.kinds]
     return fields
+
+
+def spline_fields(pieces: SplineRows) -> Floats:
+    """Return the 21 numbers of each piece (n, 21), in SI units."""
+    quintic = pieces.quintic
+    return np.concatenate(
+        [
+            pieces.targets,
+            pieces.velocities,
+            np.where(quintic[:, None], pieces.accelerations, 0.0),
+            pieces.durations[:, None],
+            np.where(quintic, SplineKind.QUINTIC, SplineKind.CUBIC)[:, None],
+            np.full((len(pieces), 1), MotionType.SPLINE),
+        ],
+        axis=1,
+    )
+
+
+def are_plain_splines(pieces: SplineRows, dialect: Dialect) -> NDArray[np.bool_]:
+    """Tell of each piece (n,) that :func:`check_fields` accepts it."""
+    fits: NDArray[np.bool_] = (pieces.durations >= dialect.min_duration) & (
+        pieces.durations <= dialect.max_duration
+    )
+    return fits & (MotionType.SPLINE in dialect.motion_types)
 
 
 def are_plain_moves(moves: MoveRows, dialect: Dialect) -> NDArray[np.bool_]:

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.move_rows import MoveRows
+from ur_cartesian_driver.motion.move_rows import MoveRows, SplineRows
 from ur_cartesian_driver.motion.plan import PlannedRows
 from ur_cartesian_driver.motion.primitive import Instruction
 from ur_cartesian_driver.protocol.framing import (
@@ -46,6 +46,7 @@ from ur_cartesian_driver.protocol.framing import (
 )
 from ur_cartesian_driver.protocol.program.point_fields import (
     are_plain_moves,
+    are_plain_splines,
     check_fields,
     field_names,
     from_fields,
@@ -53,6 +54,7 @@ from ur_cartesian_driver.protocol.program.point_fields import (
     move_fields,
     PointField,
     PointFields,
+    spline_fields,
     to_fields,
 )
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
@@ -112,14 +114,17 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     :raises LocalProtocolError: names the record (from 0), the field and the bound.
     """
     moves, records = rows.primitives, rows.records
-    if not isinstance(moves, MoveRows) or not dialect.supports_q_near:
-        return encode_points(_instructions(rows), dialect)
     first = np.cumsum(records) - records
     fields = np.zeros((int(records.sum()), POINT_FIELDS))
-    fields[first] = move_fields(moves)
     fine = np.zeros(len(fields), dtype=np.bool_)
-    fine[first] = are_plain_moves(moves, dialect)
-    others: dict[int, Instruction] = {int(first[row]): move for row, move in moves.others.items()}
+    others: dict[int, Instruction] = {}
+    if isinstance(moves, SplineRows):
+        fields[first], fine[first] = spline_fields(moves), are_plain_splines(moves, dialect)
+    elif isinstance(moves, MoveRows) and dialect.supports_q_near:
+        fields[first], fine[first] = move_fields(moves), are_plain_moves(moves, dialect)
+        others |= {int(first[row]): move for row, move in moves.others.items()}
+    else:
+        return encode_points(_instructions(rows), dialect)
     for row, outputs in rows.outputs.items():
         others |= {int(first[row]) + 1 + k: output for k, output in enumerate(outputs)}
     for record in np.flatnonzero(~fine).tolist():
