@@ -37,6 +37,7 @@ class CompileThread:
         self._loop = loop
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._pending = 0
+        self._closed = False
         self._idle = asyncio.Event()
         self._idle.set()
         # A daemon: the process may end while it compiles.
@@ -50,6 +51,8 @@ class CompileThread:
         """
 
         def finish(result: T) -> None:
+            if self._closed:
+                return
             self._pending -= 1
             if not self._pending:
                 self._idle.set()
@@ -69,11 +72,16 @@ class CompileThread:
         await self._idle.wait()
 
     def close(self) -> None:
-        """End the thread after what it is compiling."""
+        """
+        End the thread after what it is compiling, without waiting; nothing follows from that.
+
+        To be called in the event loop.
+        """
+        self._closed = True
         self._jobs.put(None)
 
     def _run(self) -> None:
-        while (job := self._jobs.get()) is not None:
+        while (job := self._jobs.get()) is not None and not self._closed:
             interval, collects = sys.getswitchinterval(), gc.isenabled()
             sys.setswitchinterval(SWITCH_INTERVAL)
             gc.disable()
