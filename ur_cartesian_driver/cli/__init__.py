@@ -28,6 +28,9 @@ from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 
+#: Of options that are times [s].
+MAX_SECONDS = 86400.0
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; 0 means that the command succeeded."""
@@ -252,7 +255,7 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     send.add_argument(
         '--wait',
-        type=float,
+        type=_seconds,
         default=10.0,
         metavar='SECONDS',
         help='time until the driver must be ready; 0 = do not check',
@@ -347,7 +350,7 @@ def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
     ):
         check.add_argument(f'--{name}-port', type=_port, default=port, help='its port')
     check.add_argument(
-        '--seconds', type=float, default=5.0, help='how long the RTDE stream is recorded [s]'
+        '--seconds', type=_seconds, default=5.0, help='how long the RTDE stream is recorded [s]'
     )
     check.add_argument(
         '--with-motion',
@@ -421,3 +424,13 @@ def _port(text: str) -> int:
     if not 0 <= port <= 65535:
         raise argparse.ArgumentTypeError(f'{port} is no port; give 0 to 65535')
     return port
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{error}; give seconds') from None
+    if not 0.0 <= seconds <= MAX_SECONDS:  # NaN neither
+        raise argparse.ArgumentTypeError(f'{seconds:g} s is not within 0 and {MAX_SECONDS:g} s')
+    return seconds
