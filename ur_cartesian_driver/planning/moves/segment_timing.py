@@ -1,18 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The speed of each segment: from the times of the goal, from its speeds, or from the defaults.
+The speed of each segment, so that times are met within the limits.
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
-derived so that the time is met. All numbers are about the leading quantity of a segment, see
-:mod:`~.speed_limits`. How moves and blends follow each other is that of :mod:`~.move_chain`.
+derived so that the time is met. How moves and blends follow each other is that of
+:mod:`~.move_chain`; what they are asked for is found in :mod:`~.speed_requests`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import ceil, hypot, inf, isnan, nan, sqrt
+from math import ceil, isnan
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,70 +21,32 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.planning.geometry.blend import Blend
-from ur_cartesian_driver.planning.moves.move_chain import (
-    MoveChain,
-    Moves,
-    Rows,
-)
+from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
 from ur_cartesian_driver.planning.moves.segment_data import (
     BlendSamples,
     SegmentGeometry,
     SegmentTiming,
 )
-from ur_cartesian_driver.planning.moves.speed_limits import (
-    is_blended,
-    leading_quantity,
-    speed_limits,
-    speed_unit,
-    translates,
+from ur_cartesian_driver.planning.moves.speed_limits import is_blended
+from ur_cartesian_driver.planning.moves.speed_requests import (
+    RAMP_SHARE,
+    SegmentTimer,
+    SpeedRequest,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import (
-    is_optimized,
-    point_field,
-    segment_field,
-)
+from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_field
 
-#: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
-#: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
-#: braking, which is also what robots would do that ignore the two.
-RAMP_SHARE = 1.0 / 3.0
-
+#: A time that is longer by less than this factor is kept.
+_NEARLY = 1.0 + 1e-5
 #: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
-#: Assumed acceleration of an OPTIMIZED move at fraction 1 [rad/s^2]; the robot's own limits are
-#: not published. It only serves to estimate the time of such a move.
-_OPTIMIZED_JOINT_ACCELERATION = 40.0
-#: Motions that take a time on the wire.
-_TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
-#: Motions that take none, whose turn has never been measured.
-_UNMEASURED_TURNS = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Motions whose blends the robot leaves out if it passes their radius within a control cycle.
 _NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
-#: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
-#: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
-_PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
-#: A time that is longer by less than this factor is not remarked, or kept.
-_NOTICEABLY, _NEARLY = 1.001, 1.0 + 1e-5
 #: What exceeds a limit by less than this factor keeps to it. Faster moves are slowed so often.
 _WITHIN = 1.0 + 1e-6
 _MAX_ROUNDS = 12
 #: A point that is passed no earlier than this is in time [s].
 _EARLY = 0.001
-
-
-def min_duration(length: float, speed: float, acceleration: float, peak: float = _PEAK) -> float:
-    """
-    Return the shortest time on the wire that keeps its peaks from rest to rest within bounds [s].
-
-    :param peak: speed over mean speed; 2 where it might be a triangle, whose acceleration is less.
-    """
-    return max(
-        peak * length / speed,
-        sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
-    )
 
 
 def shortest_duration(
@@ -116,28 +78,25 @@ def schedule(
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire.
     """
-    timers = [_SegmentTimer(geometry, options, model) for geometry in geometries]
+    timers = [SegmentTimer(geometry, options, model) for geometry in geometries]
     timetable = _Timetable(timers, options, blend_samples, running)
     timetable.solve()
     return timetable.timings(), timetable.chain
 
 
-@dataclass(slots=True, kw_only=True)
-class SpeedRequest:
-    """What a segment asks of its move, in the lengths that the robot counts."""
+class _Result(NamedTuple):
+    """What has been found for a segment, or columns of it; see :class:`SegmentTiming`."""
 
-    #: Its greatest speed; its acceleration, and the greatest one that may follow from a time.
-    speed: float
-    acceleration: float
-    max_acceleration: float
-    #: 1 / time on the wire, or speed / length [1/s]. Faster only as its limits allow.
-    rate: float
-    has_wire_time: bool = False
-    source: str
-    remark: str = ''
-    #: Its time; NaN = it has none. At least: what its limits allow at rest at both ends.
-    time: float = nan
-    min_time: float = 0.0
+    speed: Any
+    acceleration: Any
+    wire_time: Any
+    duration: Any
+    #: Its time, longer where it is slowed [s]; NaN = none.
+    wanted: Any
+    #: So much before its time its point is passed [s].
+    ahead: Any
+    least_time: Any
+    greatest_time: Any
 
 
 class _Timetable:
@@ -145,7 +104,7 @@ class _Timetable:
 
     def __init__(
         self,
-        timers: Sequence[_SegmentTimer],
+        timers: Sequence[SegmentTimer],
         options: PlanningOptions,
         blend_samples: BlendSamples,
         running: PlannedSegment | None,
@@ -224,19 +183,17 @@ class _Timetable:
         :raises GoalRefused: a time is too short, a speed too low, a blend too small.
         """
         times, moves = self.chain.times, self._moves
-        least, greatest = self._bounds()
-        columns = (
+        columns = _Result(
             moves.speed,
             moves.acceleration,
             moves.time,
             times.durations,
             self._wanted,
             self._ahead,
-            least,
-            greatest,
+            *self._bounds(),
         )
         return [
-            timer.timing(request, self._limit_names.get(k, ''), *row)
+            _timing(timer, request, self._limit_names.get(k, timer.limits.name), _Result(*row))
             for k, (timer, request, *row) in enumerate(
                 zip(self._timers, self._requests, *(c.tolist() for c in columns), strict=True)
             )
@@ -361,376 +318,122 @@ class _Timetable:
         )
 
 
-class _SegmentTimer:
-    """Times one segment."""
+def _timing(
+    timer: SegmentTimer, request: SpeedRequest, limit_name: str, result: _Result
+) -> SegmentTiming:
+    """
+    Return the timing of a segment.
 
-    def __init__(
-        self, geometry: SegmentGeometry, options: PlanningOptions, model: RobotModel
-    ) -> None:
-        self.geometry, self._options, self.model = geometry, options, model
-        self._length, self._unit = leading_quantity(geometry)
-        self._speed_unit = speed_unit(self._unit)
-        self._limits = speed_limits(geometry, self._length, options, model)
-        self._turn_leads_line = self._unit == 'rad' and geometry.kind == SegmentType.LINEAR
-        self._peak = _PEAK_OF_TURN if self._turn_leads_line else _PEAK
-        self._ramp_share = RAMP_SHARE
-        #: Part of its length that the robot counts, by the turn ratio.
-        self._counted = 1.0
-        if self._turn_leads_line:
-            counted = max(geometry.curve.length, self._length / options.turn_ratio)
-            self._counted = counted / self._length
-            # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
-            self._ramp_share = 1.0 / (1.0 + max(1.0, 2.0 * self._counted))
-        #: The acceleration that the robot makes of the one that is sent.
-        self._acceleration_unit = 1.0
-        if is_optimized(geometry.kind):
-            self._acceleration_unit = _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
-
-    @property
-    def takes_time(self) -> bool:
-        """
-        Tell whether the wire carries a time for the motion.
-
-        Never in the dialect that counts in milliseconds: a robot program that counts in
-        microseconds would run a segment a thousand times too fast, and a program does not report
-        how it counts.
-        """
-        return self.geometry.kind in _TIMED_ON_WIRE and not self._options.dialect.is_coarse
-
-    def move(self) -> tuple[float, ...]:
-        """Return its row of :class:`Moves`, still without speeds and time."""
-        geometry, counted = self.geometry, self._length * self._counted
-        before, after = geometry.blend_before, geometry.blend_after
-        head = counted * geometry.u_join if before else 0.0
-        tail = max(counted * (1.0 - geometry.u_leave), 1e-12) if after else 0.0
-        stops_within = inf
-        if after is not None and geometry.kind == SegmentType.PROCESS:
-            stops_within = after.radius
-        return (
-            counted,
-            1.0,
-            1.0,
-            0.0,
-            self._ramp_share,
-            stops_within,
-            head,
-            tail,
-            self._blend_rate(before, head),
-            self._blend_rate(after, tail),
+    :param limit_name: what slows it.
+    :raises GoalRefused: its time is too short, its speed too low, its blend too small.
+    """
+    geometry, remark = timer.geometry, request.remark
+    speed, acceleration, wire_time, duration, wanted, ahead, least, greatest = result
+    if wanted > request.time * _NEARLY:
+        remark = _too_fast(timer, wanted, limit_name)
+    elif wire_time > 1.0 / request.rate * _NEARLY and isnan(request.time):
+        remark = (
+            f'point {geometry.index}: takes {wire_time:.3f} s instead of '
+            f'{1.0 / request.rate:.3f} s, because of {limit_name}'
         )
+    elif isnan(request.time) and wire_time <= 0.0 and speed * _NEARLY < request.speed:
+        remark = (
+            f'point {geometry.index}: slowed from {request.speed:.3g} to {speed:.3g} '
+            f'{timer.speed_unit} by {limit_name}'
+        )
+    if ahead > _EARLY:
+        early = (
+            f'point {geometry.index}: passed {ahead:.3f} s before its time, because the next '
+            'segment could not make good the time in the blend'
+        )
+        remark = f'{remark}; {early}' if remark else early
+    timing = SegmentTiming(
+        speed,
+        acceleration / timer.acceleration_unit,
+        request.source,
+        remark,
+        wire_time=wire_time,
+        duration=duration,
+        least_time=least,
+        greatest_time=greatest,
+    )
+    if wire_time > 0.0:
+        # A third each of speeding up, cruising and braking, as far as the speed is allowed.
+        timing.velocity = timer.length / wire_time / (1.0 - RAMP_SHARE)
+        if not timer.turn_leads_line:
+            timing.velocity = min(timing.velocity, max(timer.limits.speed, MIN_SPEED))
+        timing.acceleration = 2.0 * timing.velocity**2 / timer.length
+    _check_wire(timer, timing)
+    _check_blend(timer, timing)
+    return timing
 
-    def _blend_rate(self, blend: Blend | None, part: float) -> float:
-        """Return its length for a unit of ``s`` at its end of a blend."""
-        if blend is not None and blend.fillet:
-            return blend.length * self._length / self.geometry.curve.length
-        return max(2.0 * part, 1e-12)
 
-    def request(self) -> SpeedRequest:
-        """Return what it asks for."""
-        geometry = self.geometry
-        if geometry.time is None:
-            return self._by_speed()
-        if not self.takes_time and self._unit == 'rad' and geometry.kind in _UNMEASURED_TURNS:
+def _check_wire(timer: SegmentTimer, timing: SegmentTiming) -> None:
+    """Refuse speeds too small for the wire, and times too large for it."""
+    if timing.wire_time > timer.options.max_segment_time:
+        raise InvalidGoal(
+            point_field(timer.geometry.index),
+            f'would be approached in {timing.wire_time:.4g} s, more than '
+            f'max_segment_time = {timer.options.max_segment_time:.0f} s',
+            'raise velocity or acceleration',
+        )
+    if timing.wire_time > 0.0:
+        return
+    unit = timer.speed_unit
+    for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
+        if value < MIN_SPEED:
             raise InvalidGoal(
-                point_field(geometry.index, 'time_from_start'),
-                f'is the time of a {geometry.kind.name} segment that turns the tool by '
-                f'{self._length:.3f} rad over {geometry.curve.length:.3f} m; how fast the '
-                'robot runs it where the turn is the larger number has not been measured',
-                'give velocity instead of times, or turn the tool on LINEAR segments',
+                point_field(timer.geometry.index),
+                f'would be approached with {value:.2g} {name}, less than '
+                f'the {MIN_SPEED:g} that can be sent',
+                'give it less time' if timer.geometry.time else 'raise velocity or acceleration',
             )
-        return self._by_time()
 
-    def request_again(self, running: PlannedSegment) -> SpeedRequest:
-        """Return what has been sent already."""
-        sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
-        assert not isinstance(sent, Spline)
-        speed, acceleration = sent.velocity, sent.acceleration * self._acceleration_unit
-        return SpeedRequest(
-            speed=speed,
-            acceleration=acceleration,
-            max_acceleration=acceleration,
-            rate=1.0 / time if time else speed / (self._length * self._counted),
-            has_wire_time=time > 0.0,
-            source='',
+
+def _check_blend(timer: SegmentTimer, timing: SegmentTiming) -> None:
+    """Refuse a blend that the robot does not make: it would stop at the point (C171)."""
+    blend = timer.geometry.blend_after
+    if blend is None or timer.geometry.kind not in _NEEDS_A_CYCLE:
+        return
+    travel = timing.velocity * timer.model.control_cycle
+    if blend.radius < travel:
+        raise InvalidGoal(
+            segment_field(timer.geometry.index, 'blend_radius'),
+            f'is {1e3 * blend.radius:g} mm, less than the {1e3 * travel:.3g} mm that the '
+            f'robot moves in one control cycle at {timing.velocity:.3g} {timer.speed_unit}: '
+            'it would stop at the point',
+            'enlarge it, move slower, or set it to 0 to stop there',
         )
 
-    def timing(
-        self,
-        request: SpeedRequest,
-        limit_name: str,
-        speed: float,
-        acceleration: float,
-        wire_time: float,
-        duration: float,
-        wanted: float,
-        ahead: float,
-        least_time: float,
-        greatest_time: float,
-    ) -> SegmentTiming:
-        """
-        Return its timing.
 
-        :param limit_name: what slows it where it is not a limit of its own.
-        :param wanted: its time, longer where it is slowed [s]; NaN = none.
-        :param ahead: so much before its time its point is passed [s].
-        """
-        geometry, remark = self.geometry, request.remark
-        limit_name = limit_name or self._limits.name
-        if wanted > request.time * _NEARLY:
-            remark = self._too_fast(wanted, limit_name)
-        elif wire_time > 1.0 / request.rate * _NEARLY and isnan(request.time):
-            remark = (
-                f'point {geometry.index}: takes {wire_time:.3f} s instead of '
-                f'{1.0 / request.rate:.3f} s, because of {limit_name}'
-            )
-        elif isnan(request.time) and wire_time <= 0.0 and speed * _NEARLY < request.speed:
-            remark = (
-                f'point {geometry.index}: slowed from {request.speed:.3g} to {speed:.3g} '
-                f'{self._speed_unit} by {limit_name}'
-            )
-        if ahead > _EARLY:
-            early = (
-                f'point {geometry.index}: passed {ahead:.3f} s before its time, because the next '
-                'segment could not make good the time in the blend'
-            )
-            remark = f'{remark}; {early}' if remark else early
-        timing = SegmentTiming(
-            speed,
-            acceleration / self._acceleration_unit,
-            request.source,
-            remark,
-            wire_time=wire_time,
-            duration=duration,
-            least_time=least_time,
-            greatest_time=greatest_time,
-        )
-        if wire_time > 0.0:
-            # A third each of speeding up, cruising and braking, as far as the speed is allowed.
-            timing.velocity = self._length / wire_time / (1.0 - RAMP_SHARE)
-            if not self._turn_leads_line:
-                timing.velocity = min(timing.velocity, max(self._limits.speed, MIN_SPEED))
-            timing.acceleration = 2.0 * timing.velocity**2 / self._length
-        self._check_wire(timing)
-        self._check_blend(timing)
-        return timing
+def _too_fast(timer: SegmentTimer, min_time: float, limit_name: str) -> str:
+    """
+    Return the remark on a time that is too short.
 
-    def _check_wire(self, timing: SegmentTiming) -> None:
-        """Refuse speeds too small for the wire, and times too large for it."""
-        if timing.wire_time > self._options.max_segment_time:
-            raise InvalidGoal(
-                point_field(self.geometry.index),
-                f'would be approached in {timing.wire_time:.4g} s, more than '
-                f'max_segment_time = {self._options.max_segment_time:.0f} s',
-                'raise velocity or acceleration',
-            )
-        if timing.wire_time > 0.0:
-            return
-        unit = self._speed_unit
-        for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
-            if value < MIN_SPEED:
-                raise InvalidGoal(
-                    point_field(self.geometry.index),
-                    f'would be approached with {value:.2g} {name}, less than '
-                    f'the {MIN_SPEED:g} that can be sent',
-                    'give it less time'
-                    if self.geometry.time
-                    else 'raise velocity or acceleration',
-                )
-
-    def _check_blend(self, timing: SegmentTiming) -> None:
-        """Refuse a blend that the robot does not make: it would stop at the point (C171)."""
-        blend = self.geometry.blend_after
-        if blend is None or self.geometry.kind not in _NEEDS_A_CYCLE:
-            return
-        travel = timing.velocity * self.model.control_cycle
-        if blend.radius < travel:
-            raise InvalidGoal(
-                segment_field(self.geometry.index, 'blend_radius'),
-                f'is {1e3 * blend.radius:g} mm, less than the {1e3 * travel:.3g} mm that the '
-                f'robot moves in one control cycle at {timing.velocity:.3g} {self._speed_unit}: '
-                'it would stop at the point',
-                'enlarge it, move slower, or set it to 0 to stop there',
-            )
-
-    # -- speeds ----------------------------------------------------------------------------------
-
-    def _by_speed(self) -> SpeedRequest:
-        """Return what a segment without a time asks for."""
-        geometry, limits = self.geometry, self._limits
-        bound, name, unit = limits.speed, limits.name, self._speed_unit
-        if self._turn_leads_line and translates(geometry):
-            bound, name, unit = self._options.max_tool_speed or inf, 'max_tool_speed', 'm/s'
-        wanted, source = self._wanted_speed()
-        velocity = min(wanted, bound)
-        remark = ''
-        if velocity < wanted:
-            remark = (
-                f'point {geometry.index}: slowed from {wanted:.3g} to {velocity:.3g} {unit} '
-                f'by {name}'
-            )
-        acceleration = geometry.segment.acceleration or self._default_acceleration()
-        if not is_optimized(geometry.kind):
-            acceleration = min(acceleration, limits.acceleration)
-        if self._turn_leads_line:
-            return self._turning_line(velocity, acceleration, source, remark)
-        acceleration *= self._acceleration_unit
-        return SpeedRequest(
-            speed=velocity,
-            acceleration=acceleration,
-            max_acceleration=acceleration,
-            rate=velocity / self._length,
-            source=source,
-            remark=remark,
-        )
-
-    def _wanted_speed(self) -> tuple[float, str]:
-        """Return the speed that the goal asks for, and where it comes from."""
-        geometry, options = self.geometry, self._options
-        if geometry.segment.velocity > 0.0:
-            return geometry.segment.velocity, f'speed from segments[{geometry.index}].velocity'
-        if is_optimized(geometry.kind):
-            return options.optimized_velocity, 'speed from optimized_velocity'
-        if geometry.kind == SegmentType.JOINT:
-            return options.joint_velocity, 'speed from joint_velocity'
-        twist = geometry.waypoint.twist
-        speed = hypot(*twist[:3]) if translates(geometry) else hypot(*twist[3:])
-        if speed > 0.0:
-            return speed, f'speed from points[{geometry.index}].twist'
-        if not translates(geometry):
-            return options.angular_velocity, 'speed from angular_velocity'
-        if self._unit == 'rad' and geometry.kind != SegmentType.LINEAR:
-            # One number for both: the turn may be faster [rad/s], but no faster than the tool
-            # [m/s].
-            fastest = options.max_tool_speed or options.angular_velocity
-            return (
-                max(options.linear_velocity, min(options.angular_velocity, fastest)),
-                'speed from linear_velocity and angular_velocity, as the turn leads',
-            )
-        return options.linear_velocity, 'speed from linear_velocity'
-
-    def _default_acceleration(self) -> float:
-        options = self._options
-        if is_optimized(self.geometry.kind):
-            return options.optimized_acceleration
-        if self.geometry.kind == SegmentType.JOINT:
-            return options.joint_acceleration
-        if translates(self.geometry):
-            return options.linear_acceleration
-        return options.angular_acceleration
-
-    def _turning_line(
-        self, velocity: float, acceleration: float, source: str, remark: str
-    ) -> SpeedRequest:
-        """
-        Return what a line asks for on which the turn leads.
-
-        The robot may turn the tool as slowly as it moves it, or several times as fast: a time is
-        sent instead, in which the tool keeps its speed [m/s] and turns no faster than the default
-        (without a way: than was asked for), whichever it is.
-        """
-        options, limits, peak = self._options, self._limits, self._peak
-        turn = velocity, acceleration
-        line_time = 0.0
-        if translates(self.geometry):
-            line_time = min_duration(self.geometry.curve.length, velocity, acceleration, peak)
-            turn = options.angular_velocity, options.angular_acceleration
-            source = f'{source}, turn within angular_velocity'
-        turn_rate = min(turn[1], limits.acceleration)
-        time, wanted = (
-            max(line_time, min_duration(self._length, turn_speed, turn_rate, peak))
-            for turn_speed in (min(turn[0], limits.speed), turn[0])
-        )
-        if time > wanted * _NOTICEABLY:
-            slowed = (
-                f'point {self.geometry.index}: turns in {time:.3f} s instead of {wanted:.3f} s, '
-                f'because of {limits.name}'
-            )
-            remark = f'{remark}; {slowed}' if remark else slowed
-        counted, timed, peak = self._counted, self.takes_time, self._peak
-        # Without a time on the wire: a third each of speeding up, cruising and braking.
-        speed = self._length / time * (peak if timed else _PEAK)
-        acceleration = turn_rate if timed else 4.5 * self._length / time**2
-        return SpeedRequest(
-            speed=speed * counted,
-            acceleration=acceleration * counted,
-            max_acceleration=acceleration * counted,
-            rate=1.0 / time if timed else speed / self._length,
-            has_wire_time=timed,
-            source=source,
-            remark=remark,
-        )
-
-    # -- times -----------------------------------------------------------------------------------
-
-    def _by_time(self) -> SpeedRequest:
-        """Return what a segment with a time asks for."""
-        geometry, limits = self.geometry, self._limits
-        assert geometry.time is not None
-        length = self._length * geometry.unblended_fraction
-        mean = length / geometry.time
-        most = self._max_acceleration()
-        least = most
-        if not self.takes_time:
-            least = self._own_acceleration() or max(
-                self._default_acceleration(),
-                # A third each of speeding up, cruising and braking; and no braking before a blend.
-                4.5 * length / geometry.time**2,
-                mean**2 / (self._length * (1.0 - geometry.u_leave))
-                if geometry.blend_after and geometry.kind != SegmentType.PROCESS
-                else 0.0,
-            )
-        counted = self._counted
-        return SpeedRequest(
-            speed=limits.speed * counted,
-            acceleration=min(least, most) * counted,
-            max_acceleration=most * counted,
-            rate=1.0 / geometry.time,
-            has_wire_time=self.takes_time,
-            source=f'time from points[{geometry.index}].time_from_start',
-            time=geometry.time,
-            # A move with a time is planned to rest at its waypoint, also where it is blended.
-            min_time=min_duration(self._length, limits.speed, limits.acceleration, self._peak)
-            if self.takes_time
-            else 0.0,
-        )
-
-    def _too_fast(self, min_time: float, limit_name: str) -> str:
-        """
-        Return the remark on a time that is too short.
-
-        :raises TooFast: it is refused.
-        """
-        time, limits, unit = self.geometry.time, self._limits, self._speed_unit
-        assert time is not None
-        where = point_field(self.geometry.index, 'time_from_start')
-        if min_time > self._options.max_segment_time:
-            raise TooFast(
-                where,
-                f'gives the segment {time:.3f} s, but because of {limit_name} it takes '
-                f'{min_time:.0f} s, more than max_segment_time = '
-                f'{self._options.max_segment_time:.0f} s',
-                'move the path away from there, or use a JOINT segment',
-            )
-        if self._options.on_too_fast == 'slow':
-            return (
-                f'point {self.geometry.index}: takes {min_time:.3f} s instead of {time:.3f} s, '
-                f'because of {limit_name}'
-            )
-        speed, acceleration = self._peak * self._length / time, 4.5 * self._length / time**2
+    :raises TooFast: it is refused.
+    """
+    time, limits, unit = timer.geometry.time, timer.limits, timer.speed_unit
+    assert time is not None
+    where = point_field(timer.geometry.index, 'time_from_start')
+    if min_time > timer.options.max_segment_time:
         raise TooFast(
             where,
-            f'gives the segment {time:.3f} s for {self._length:.3f} {self._unit}, which needs up '
-            f'to {speed:.3f} {unit} and {acceleration:.3f} {unit}^2; '
-            f'allowed are {limits.speed:.3f} {unit} ({limit_name}) and '
-            f'{self._max_acceleration():.3f} {unit}^2',
-            f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
+            f'gives the segment {time:.3f} s, but because of {limit_name} it takes '
+            f'{min_time:.0f} s, more than max_segment_time = '
+            f'{timer.options.max_segment_time:.0f} s',
+            'move the path away from there, or use a JOINT segment',
         )
-
-    def _own_acceleration(self) -> float:
-        """Return the acceleration that the goal gives a timed segment; 0 = none."""
-        timed = self.geometry.kind in _TIMED_ON_WIRE
-        return 0.0 if timed else self.geometry.segment.acceleration
-
-    def _max_acceleration(self) -> float:
-        """Return the maximum acceleration that may follow from a time."""
-        return min(self._own_acceleration() or inf, self._limits.acceleration)
+    if timer.options.on_too_fast == 'slow':
+        return (
+            f'point {timer.geometry.index}: takes {min_time:.3f} s instead of {time:.3f} s, '
+            f'because of {limit_name}'
+        )
+    speed, acceleration = timer.peak * timer.length / time, 4.5 * timer.length / time**2
+    raise TooFast(
+        where,
+        f'gives the segment {time:.3f} s for {timer.length:.3f} {timer.unit}, which needs up '
+        f'to {speed:.3f} {unit} and {acceleration:.3f} {unit}^2; '
+        f'allowed are {limits.speed:.3f} {unit} ({limit_name}) and '
+        f'{timer.max_acceleration():.3f} {unit}^2',
+        f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
+    )
