@@ -174,7 +174,7 @@ def _last_output_delay(rows: PlannedRows) -> float:
 def _blend_lead_times(rows: PlannedRows) -> Floats:
     """Return upper bounds of the times from the start of a blend to the end of its motion [s]."""
     radii = blend_radii(rows.primitives)
-    # The tool is slower in the segment than in its blend, except in the blend that it comes from.
+    # The tool is slower in the segment than in its blend, unless it brakes before that.
     share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
-    times: Floats = rows.durations * share
+    times: Floats = np.maximum(rows.durations * share, rows.blend_entries[:, -1])
     return times
