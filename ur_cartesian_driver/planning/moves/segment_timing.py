@@ -136,8 +136,9 @@ class _Timetable:
         #: What slows a segment where it is not a limit of its own.
         self._limit_names: dict[int, str] = {}
         self._moves = Moves.of([timer.move() for timer in timers])
+        # No time on the wire is less than the robot needs from rest to rest, however it blends.
         self._max_rate = np.where(
-            np.isnan(self._time), self._rate, self._speed / self._moves.length
+            np.isnan(self._time), self._rate, 1.0 / np.maximum(min_time, 1e-9)
         )
         self._allow_acceleration()
         self._rate = np.minimum(self._rate, self._max_rate)
@@ -165,16 +166,24 @@ class _Timetable:
         Where a slow move is blended into a fast one they share the speed in the blend.
         """
         moves = self._moves
+        if not late.any():
+            return False
         alone = shortest_duration(moves.length, self._speed, self._most, 2.0)
-        rows = np.flatnonzero(
-            (late[1:] > 0.0)
-            & (self._wanted[1:] > alone[1:])
-            & (moves.tail[:-1] > 0.0)
-            & (self._rate[:-1] < self._max_rate[:-1])
-            & (self._ahead[:-1] + late[1:] < 0.5 * self._wanted[:-1])
+        late = np.where(self._timed | (self._wanted > alone), late, 0.0)
+        # By how much moves can take less time, so that their own points are passed early.
+        spare = np.where(
+            self._timed,
+            1.0 / self._rate - 1.0 / self._max_rate,
+            np.maximum(self._wanted - alone, 0.0),
         )
-        self._ahead[rows] += late[rows + 1]
-        return len(rows) > 0
+        blended, most = moves.tail > 0.0, 0.7 * self._wanted - self._ahead
+        more = np.zeros(len(late))
+        for k in range(len(late) - 1, 0, -1):
+            needed = late[k] + max(more[k] - spare[k], 0.0)
+            if 0.0 < needed < most[k - 1] and blended[k - 1]:
+                more[k - 1] = needed
+        self._ahead += more
+        return bool(more.any())
 
     def timings(self) -> list[SegmentTiming]:
         """
@@ -358,11 +367,9 @@ def _timing(
         greatest_time=greatest,
     )
     if wire_time > 0.0:
-        # A third each of speeding up, cruising and braking, as far as the speed is allowed.
+        # A third each of speeding up, cruising and braking.
         timing.velocity = timer.length / wire_time / (1.0 - RAMP_SHARE)
-        if not timer.turn_leads_line:
-            timing.velocity = min(timing.velocity, max(timer.limits.speed, MIN_SPEED))
-        timing.acceleration = 2.0 * timing.velocity**2 / timer.length
+        timing.acceleration = timing.velocity / (RAMP_SHARE * wire_time)
     _check_wire(timer, timing)
     _check_blend(timer, timing)
     return timing

@@ -41,6 +41,8 @@ _UNMEASURED_TURNS = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
 #: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
+#: Of a segment without any motion no acceleration is too much.
+_UNLIMITED = 1e9
 #: A time that is longer by less than this factor is not remarked.
 _NOTICEABLY = 1.001
 
@@ -284,7 +286,7 @@ class SegmentTimer:
         assert geometry.time is not None
         length = self.length * geometry.unblended_fraction
         mean = length / geometry.time
-        most = self.max_acceleration()
+        most = min(self.max_acceleration(), _UNLIMITED)
         least = most
         if not self.takes_time:
             least = self._own_acceleration() or max(
