@@ -36,15 +36,16 @@ from ur_cartesian_driver.planning.moves.speed_requests import (
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_field
 
-#: A time that is longer by less than this factor is kept.
-_NEARLY = 1.0 + 1e-5
+#: Times that differ by less than this factor are the same. One that comes out longer by less than
+#: the second is kept.
+_NEARLY, _KEPT = 1.0 + 1e-5, 1.002
 #: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
 #: Motions whose blends the robot leaves out if it passes their radius within a control cycle.
 _NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
 #: What exceeds a limit by less than this factor keeps to it. Faster moves are slowed so often.
 _WITHIN = 1.0 + 1e-6
-_MAX_ROUNDS = 12
+_MAX_ROUNDS = 40
 #: A point that is passed no earlier than this is in time [s].
 _EARLY = 0.001
 
@@ -157,7 +158,7 @@ class _Timetable:
             late[~((late > wanted * (_NEARLY - 1.0)) & (self._rate >= self._max_rate))] = 0.0
             if not self._slow_down() and not self._go_ahead(late):
                 break
-        self._wanted += late
+        self._wanted += np.where(late > self._wanted * (_KEPT - 1.0), late, 0.0)
 
     def _go_ahead(self, late: Floats) -> bool:
         """
@@ -168,7 +169,11 @@ class _Timetable:
         moves = self._moves
         if not late.any():
             return False
+        # What cannot be passed as early as that is not: its time at rest has changed since.
+        back = np.minimum(late, self._ahead)
+        self._ahead -= back
         alone = shortest_duration(moves.length, self._speed, self._most, 2.0)
+        late = late - back
         late = np.where(self._timed | (self._wanted > alone), late, 0.0)
         # By how much moves can take less time, so that their own points are passed early.
         spare = np.where(
@@ -183,7 +188,7 @@ class _Timetable:
             if 0.0 < needed < most[k - 1] and blended[k - 1]:
                 more[k - 1] = needed
         self._ahead += more
-        return bool(more.any())
+        return bool((more + back).max() > _EARLY * (_NEARLY - 1.0))
 
     def timings(self) -> list[SegmentTiming]:
         """
@@ -350,12 +355,11 @@ def _timing(
             f'point {geometry.index}: slowed from {request.speed:.3g} to {speed:.3g} '
             f'{timer.speed_unit} by {limit_name}'
         )
-    if ahead > _EARLY:
-        early = (
+    elif ahead > _EARLY:
+        remark = (
             f'point {geometry.index}: passed {ahead:.3f} s before its time, because the next '
             'segment could not make good the time in the blend'
         )
-        remark = f'{remark}; {early}' if remark else early
     timing = SegmentTiming(
         speed,
         acceleration / timer.acceleration_unit,
