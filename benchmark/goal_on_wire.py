@@ -14,7 +14,7 @@ import time
 
 from figures import Figure, median, percentile, seconds
 import paths
-from processes import Child, node, simulator
+from processes import Child, node, peak_memory, simulator
 from ros_client import goal_message, TimedClient
 from wire_tap import marks_until_first_point, wire_tap
 
@@ -24,14 +24,17 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
+from ur_cartesian_driver.ros.client import in_flat_arrays
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.tf.known_frames import Frames
 
 POINTS = 1_000
+#: The most that a goal may have.
+MANY = 100_000
 #: How long each goal moves before it is cancelled [s].
 MOVING = 0.3
-TIMEOUT = 10.0
+TIMEOUT = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,13 +53,24 @@ def run(quick: bool) -> Iterator[Figure]:
     with (
         simulator() as robot,
         wire_tap() as (tap, parameters),
-        node(robot, **parameters),
+        node(robot, **parameters) as driver,
         TimedClient() as client,
     ):
-        message = goal_message(POINTS)
-        goals = [_one_goal(client, tap, message) for _ in range(4 if quick else 12)]
+        plain = goal_message(POINTS)
+        count = 4 if quick else 12
+        goals = [_one_goal(client, tap, plain) for _ in range(count)]
+        packed = [_one_goal(client, tap, in_flat_arrays(plain)) for _ in range(count)]
+        huge = [
+            _one_goal(client, tap, in_flat_arrays(goal_message(MANY)))
+            for _ in range(1 if quick else 5)
+        ]
+        peak = peak_memory(driver)
     # The first goal finds everything cold (imports, caches): reported separately.
     yield from _goal_figures(goals)
+    yield from _whole_way(goals[1:], packed, huge)
+    yield Figure(
+        benchmark='node', name=f'peak memory, up to {MANY:,} points', value=peak, unit='MB'
+    )
     yield from _breakdown([_ms(g.accepted, g.first_point) for g in goals[1:]])
     yield from _cancel_figures(goals)
 
@@ -103,6 +117,27 @@ def _goal_figures(goals: Sequence[Times]) -> Iterator[Figure]:
     )
 
 
+def _whole_way(
+    plain: Sequence[Times], packed: Sequence[Times], huge: Sequence[Times]
+) -> Iterator[Figure]:
+    """Report the time from the client's call to the first point, of both forms."""
+    before = median([_ms(g.sent, g.first_point) for g in plain])
+    for points, form, goals in (
+        (POINTS, 'plain', plain),
+        (POINTS, 'packed', packed),
+        (MANY, 'packed', huge),
+    ):
+        yield Figure(
+            benchmark=f'goal of {points:,} points',
+            name=f'client call -> first point on the wire, {form}, p50',
+            value=median([_ms(g.sent, g.first_point) for g in goals]),
+            unit='ms',
+            baseline=before,
+            than=f'{POINTS:,} points, plain',
+            note=f'{len(goals)} goals',
+        )
+
+
 def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
     """Time the steps of the same goal here; what is left is threads, pipe and network."""
     name, total = 'its parts, timed one by one', median(totals)
@@ -111,7 +146,7 @@ def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
     state, options = paths.at_home(arm), PlanningOptions()
     goal = goal_from_message(message, frames, now=0)
     planned = plan(goal, state, arm, options)
-    points = encode_points(s.primitive for s in planned.segments)
+    points = encode_rows(planned.rows)
 
     def handed_over() -> object:
         request = channel.StartMotion(motion=1, job=job_from_plan(planned), points=points)
@@ -121,7 +156,7 @@ def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
     for part, step in (
         ('conversion', lambda: goal_from_message(message, frames, now=0)),
         ('planning', lambda: plan(goal, state, arm, options)),
-        ('encoding', lambda: encode_points(s.primitive for s in planned.segments)),
+        ('encoding', lambda: encode_rows(planned.rows)),
         ('packing and unpacking for the other process', handed_over),
     ):
         taken = 1e3 * seconds(step, repeat=5)

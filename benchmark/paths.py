@@ -12,6 +12,7 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import Vector6
@@ -46,12 +47,14 @@ def meander(points: int) -> Iterator[Pose]:
         )
 
 
-def goal(points: int, blend_radius: float = 0.0) -> Goal:
+def goal(points: int, blend_radius: float = 0.0) -> GoalTable:
     """Return a goal through the meander, to a stop at its end; the speeds are the driver's own."""
     segments = [Segment(blend_radius=blend_radius)] * (points - 1) + [Segment()]
-    return Goal(
-        waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)),
-        segments=tuple(segments) if blend_radius > 0.0 else (),
+    return goal_table(
+        Goal(
+            waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)),
+            segments=tuple(segments) if blend_radius > 0.0 else (),
+        )
     )
 
 

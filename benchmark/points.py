@@ -20,16 +20,19 @@ import threading
 import time
 
 from figures import Figure, seconds
+import numpy as np
 import paths
 from processes import answer_calls, Child, child, HOST
 
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
-from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.plan import Plan, PlannedRows
+from ur_cartesian_driver.motion.pose import pose_rows
 from ur_cartesian_driver.motion.primitive import MoveL
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.registers import POINTS_BEGUN
 from ur_cartesian_driver.protocol.program.trajectory_points import (
-    encode_points,
+    encode_rows,
     POINT_FIELDS,
     POINT_SIZE,
 )
@@ -50,14 +53,33 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _encoding(points: int) -> Figure:
-    primitives = [MoveL(target=pose, blend_radius=0.002) for pose in paths.meander(points)]
+    rows = PlannedRows(
+        waypoints=np.arange(points, dtype=np.int32),
+        lengths=np.full(points, paths.STEP),
+        angles=np.zeros(points),
+        durations=np.ones(points),
+        blend_entries=np.zeros((points, 5)),
+        joints=np.zeros((points, 6)),
+        primitives=MoveRows(
+            kinds=np.full(points, MOVES.index(MoveL)),
+            targets=pose_rows(paths.meander(points)),
+            q_near=np.zeros((points, 6)),
+            has_q_near=np.zeros(points, dtype=np.bool_),
+            velocities=np.full(points, 0.1),
+            accelerations=np.ones(points),
+            durations=np.zeros(points),
+            blend_radii=np.full(points, 0.002),
+            others={},
+        ),
+        report_lines=('',) * points,
+    )
     packer = struct.Struct(f'>{POINT_FIELDS}i')
     words = tuple(range(POINT_FIELDS))
     return Figure(
         benchmark=NAME,
         name='encoded',
         unit='1/s',
-        value=points / seconds(lambda: encode_points(primitives), repeat=3),
+        value=points / seconds(lambda: encode_rows(rows), repeat=3),
         baseline=points / seconds(lambda: [packer.pack(*words) for _ in range(points)], repeat=3),
         than='struct.pack of the words alone',
         note=f'{points:,} points',

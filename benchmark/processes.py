@@ -249,6 +249,14 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
+def peak_memory(pid: int) -> float:
+    """Return the most memory that a process has had [MB]."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('VmHWM:'):
+            return int(line.split()[1]) / 1024.0
+    raise ValueError(f'the system does not tell the memory of process {pid}')
+
+
 def children_of(pid: int) -> list[int]:
     """Return the ids of the children of a process."""
     found = []
