@@ -29,8 +29,12 @@ OVER = 0.02
 REACH = 5e-6
 #: So near is a line or an arc followed [m], [rad].
 PATH, PATH_TURN = 2e-5, 3e-4
-#: So far from a point may be all packets of an optimized move that stops there and goes on [m].
-OPTIMIZED_TURN = 1e-4
+#: A move that stops at a point and goes on may do so between two packets: with what it brakes and
+#: speeds up at most, also if it is optimized [m/s^2], and how near it counts as there [m].
+TURNING, OPTIMIZED_TURNING = 5.0, 12.0
+NEARBY = 0.002
+#: Longest gap between two packets [s]: three in a row are lost.
+MAX_GAP = 0.032
 #: An arc with FIXED orientation may arrive this far off [rad].
 FIXED_TURN = 0.006
 #: Spline: the tolerance of its joints [m].
@@ -108,6 +112,8 @@ class _Passage:
     arrive: int
     depart: int
     q: np.ndarray
+    #: Whether one of these rows is at the point, or it was between two packets.
+    seen: bool
 
 
 @dataclass
@@ -301,8 +307,10 @@ class Judge:
             distance, turn = poses_apart(self.tool[row:], target)
             d = distance if radius > 0.0 or fixed else distance + ARM * turn
             reach = 2.0 * REACH + radius
-            if self._has_optimized(i + 2):
-                reach += OPTIMIZED_TURN
+            if len(around := np.flatnonzero(d < NEARBY)) > 1:
+                gap = float(np.diff(self.t[row + around]).max())
+                braking = OPTIMIZED_TURNING if self._has_optimized(i + 2) else TURNING
+                reach += 0.5 * braking * (0.5 * min(gap, MAX_GAP)) ** 2
             least = np.minimum.accumulate(d)
             passed = np.flatnonzero((least <= reach) & (d > least + 1.5e-6))
             if i == last or not len(passed):
@@ -316,7 +324,8 @@ class Judge:
             near = np.flatnonzero(d[: passed[0] + 1] <= best + 1e-6)
             arrive, depart = row + int(near[0]), row + int(near[-1])
             q, _ = self.run.arm.solve(target, self.q[arrive])
-            found.append(_Passage(arrive, depart, self.q[arrive] if fixed else q[0]))
+            seen = bool(best <= 2.0 * REACH + radius)
+            found.append(_Passage(arrive, depart, self.q[arrive] if fixed else q[0], seen))
             row = arrive if radius > 0.0 else depart
         return found
 
@@ -347,7 +356,7 @@ class Judge:
 
     def _paths(self, passages: list[_Passage]) -> None:
         goal, start, q = self.run.goal, self.start, np.array(self.run.q)
-        row, radius_before = self.begin, 0.0
+        row, radius_before, turn_before = self.begin, 0.0, 0.0
         for i, passage in enumerate(passages):
             kind = goal.segments[i].type if goal.segments else SegmentType.LINEAR
             radius = self.run.promise.radii[i]
@@ -357,20 +366,26 @@ class Judge:
                 if is_joint
                 else straight_curve(goal, i, start)
             )
-            poses = self.tool[row : passage.depart + 1]
+            poses = self.tool[row : passage.depart + passage.seen]
             outside = np.ones(len(poses), dtype=bool)
             for point, size in ((start, radius_before), (self.targets[i], radius)):
                 if size > 0.0:
                     apart = np.linalg.norm(poses[:, :3, 3] - point[:3, 3], axis=1)
                     outside &= apart > size + PATH
             if outside.any():
-                self._path(i, curve, row + np.flatnonzero(outside))
+                self._path(i, curve, row + np.flatnonzero(outside), turn_before)
             start = curve.end if isinstance(curve, Arc) else self.targets[i]
-            row, radius_before, q = passage.arrive, radius, passage.q
+            turn_before = FIXED_TURN if isinstance(curve, Arc) and curve.fixed else 0.0
+            row, radius_before, q = passage.arrive + (not passage.seen), radius, passage.q
 
-    def _path(self, i: int, curve: Any, rows: np.ndarray) -> None:
+    def _path(self, i: int, curve: Any, rows: np.ndarray, turn_before: float) -> None:
+        """
+        Compare rows with the path to a point.
+
+        :param turn_before: how far off the orientation may be with which it begins [rad].
+        """
         poses = self.tool[rows]
-        bound, turn_bound = PATH, PATH_TURN
+        bound, turn_bound = PATH, PATH_TURN + turn_before
         if isinstance(curve, JointLine):
             way = curve.q_end - curve.q_start
             u = np.clip((self.q[rows] - curve.q_start) @ way / max(way @ way, 1e-18), 0.0, 1.0)
