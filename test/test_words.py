@@ -25,12 +25,12 @@ GENERATED = ('action', 'msg', 'srv')
 GONE = {
     # goals and plans
     'TcpKinematics': 'Reach',
-    'SegmentDraft, SegmentDraftBuilder': 'Draft Drafts',
+    'SegmentDrafts': 'Draft Drafts',
     'SegmentGeometry, MovePath': 'Leg',
     'SegmentTiming': 'Timing',
     'JointPathPlanner': 'Route',
     'PathMargins, TightestMargin': 'Survey Surveyed survey Nearest nearest_of nearest_in',
-    'Blend, BlendInput, BlendPath': 'Corner JointCorner ToolCorner Meeting meetings round_ones',
+    'Blend, BlendedPath, BlendPath': 'Corner JointCorner ToolCorner Meeting meetings round_ones',
     'blend_tolerance, slack': '_rooms',
     'JointSpeedBound, SpeedCheck': 'Pace _Pace pace paces knows_pace _wrong_pace',
     'JointPath, solve_joint_path': 'Followed followed',

@@ -28,10 +28,10 @@ from ur_cartesian_driver.motion.errors import (
     Unreachable,
 )
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import MoveJ, MoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
 from ur_cartesian_driver.planning.geometry.curves import (
     ArcCurve,
     JointLineCurve,
@@ -39,7 +39,7 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SegmentCurve,
 )
 from ur_cartesian_driver.planning.geometry.samples import (
-    CurvePiece,
+    CurvePieces,
     sample_poses,
     STEP_ANGLE,
     STEP_LENGTH,
@@ -356,6 +356,20 @@ def test_a_peak_of_the_joints_between_coarse_places_counts(make_cell):
 
 # -- places ---------------------------------------------------------------------------------------
 
+
+def path_of(curves, radius=0.0, fillet=False):
+    """Return the path of two curves, with a blend between them if there is a radius."""
+    start, end = (pose_rows([getattr(curve, at) for curve in curves]) for at in ('start', 'end'))
+    path = BlendedPath(CurveRows(start, end, dict(enumerate(curves))))
+    if radius > 0.0:
+        path.make_blends(np.array([0]), np.array([radius]), np.array([fillet]))
+    return path
+
+
+def pieces_of(path, number, begin, end):
+    return CurvePieces.of(path, 0, np.array(number), np.array(begin), np.array(end))
+
+
 spots = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 
 
@@ -366,19 +380,16 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
     second = LineCurve.between(first.end, cell.pose(*b[:3], turn=b[3:]))
     if min(first.length, second.length) <= 2.5 * radius:
         return
-    (blend,) = blends([BlendInput(first, second, radius, fillet)])
-    pieces = [
-        CurvePiece.part(0, first, 0.0, blend.leave),
-        CurvePiece.blend(0, blend),
-        CurvePiece.part(1, second, blend.join, 1.0),
-    ]
+    path = path_of([first, second], radius, fillet)
+    leave, join = path.u_leave[0], path.u_join[1]
+    pieces = pieces_of(path, [0, 1, 2], [0.0, 0.0, join], [leave, 1.0, 1.0])
     samples = sample_poses(pieces)
     rows = np.concatenate([[cell.home.row()], samples.poses])
     assert np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1).max() <= 2.0 * STEP_LENGTH + 1e-9
     dots = np.abs(np.einsum('ij,ij->i', rows[1:, 3:], rows[:-1, 3:]))
     assert 2.0 * np.arccos(np.minimum(1.0, dots)).max() <= 2.5 * STEP_ANGLE
     for k, t, pose in zip(samples.piece, samples.t, samples.poses, strict=True):
-        one = pieces[k].pose(float(t))
+        one = pieces.curve(k).pose(float(t))
         assert np.allclose(one.row(), pose, atol=1e-9) or np.allclose(
             one.row()[3:], -pose[3:], atol=1e-9
         )
@@ -395,7 +406,7 @@ def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b)
         )
     except ValueError:
         paths.append(LineCurve.between(middle, end))
-    pieces = [CurvePiece.part(k, path, 0.0, 1.0) for k, path in enumerate(paths)]
+    pieces = pieces_of(path_of(paths), [0, 2], [0.0, 0.0], [1.0, 1.0])
     found = solve_joint_path(
         TcpKinematics(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q
     )
@@ -403,7 +414,7 @@ def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b)
         return
     q, back = cell.state.actual_q, cell.T_flange_tcp.inverse()
     for k, t, row in zip(found.piece, found.t, found.q, strict=True):
-        q = nearest(cell.arm, pieces[k].pose(float(t)) @ back, q)
+        q = nearest(cell.arm, pieces.curve(k).pose(float(t)) @ back, q)
         assert np.abs(np.array(q) - row).max() < 1e-6
 
 
@@ -416,7 +427,7 @@ def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
         tuple(q + 0.3),
         tuple(q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))),
     )
-    (blend,) = blends([BlendInput(way, back, 0.02, False)])
+    blend = path_of([way, back], 0.02).blend(0)
     rows = blend.joint_rows(np.array((0.0, 1.0)))
     assert rows[0] == pytest.approx(way.joints(blend.leave))
     assert rows[1] == pytest.approx(back.joints(blend.join))

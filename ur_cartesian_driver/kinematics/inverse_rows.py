@@ -15,6 +15,7 @@ Poses are rows (n, 7), x y z [m] and the unit quaternion x y z w; joints rows (n
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from math import tau
 
 import numpy as np
@@ -145,9 +146,9 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     found = np.full((len(poses), 6), np.nan)
     certain = np.zeros(len(poses), dtype=np.bool_)
     numbers = branch_measures(arm, q_near).branch
-    for number in np.unique(numbers):
+    for number in np.flatnonzero(np.bincount(numbers)).tolist():
         rows = np.flatnonzero(numbers == number)
-        q, max_step = _on_branch(arm, TargetPoses.of(poses[rows]), BRANCHES[int(number)])
+        q, max_step = _on_branch(arm, TargetPoses.of(poses[rows]), BRANCHES[number])
         q = q - tau * np.rint((q - q_near[rows]) / tau)
         found[rows], certain[rows] = _within_limits(arm, q, q_near[rows], max_step)
     for row in np.flatnonzero(~certain):
@@ -183,7 +184,7 @@ def _within_limits(arm: Arm, q: Floats, q_near: Floats, max_step: Floats) -> tup
 
 
 def _max_joint_change(changes: Floats) -> Floats:
-    largest: Floats = np.abs(changes).max(axis=1, initial=0.0)
+    largest: Floats = reduce(np.maximum, np.abs(changes).T)  # many times faster than max(axis=1)
     return largest
 
 

@@ -85,6 +85,20 @@ class Rows(Sequence[T]):
             },
         )
 
+    def with_first(self: R, first: Any) -> R:
+        """Return the rows with another object in the first one."""
+        other, rest = type(self).of([first]), self.take(slice(1, len(self)))  # type: ignore[attr-defined]
+        columns = zip(other._columns(), rest._columns(), strict=True)
+        return replace(  # type: ignore[type-var]
+            self,
+            **{
+                name: {**a, **{row + 1: value for row, value in b.items()}}
+                if isinstance(a, Mapping)
+                else np.concatenate([a, b])
+                for (name, a), (_, b) in columns
+            },
+        )
+
     @overload
     def __getitem__(self, index: int) -> T: ...
 

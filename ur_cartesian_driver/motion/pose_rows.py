@@ -50,6 +50,13 @@ def conjugate_rows(a: Floats) -> Floats:
     return inverse
 
 
+def distance_rows(a: Floats, b: Floats) -> Floats:
+    """Return the distances of positions (n, 3 or more) [m], also of absurd ones."""
+    x, y, z = (b[:, :3] - a[:, :3]).T
+    distances: Floats = np.hypot(np.hypot(x, y), z)
+    return distances
+
+
 def angle_rows(a: Floats, b: Floats) -> Floats:
     """Return the angles between orientations (n, 4) [rad], within [0, pi]."""
     turn = multiply_rows(conjugate_rows(a), b)
@@ -125,6 +132,9 @@ def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     """
     f = fraction[:, None]
     rows = a + f * (b - a)
+    if (a[:, 3:] == b[:, 3:]).all():
+        rows[:, 3:] = a[:, 3:]
+        return rows
     dot = np.einsum('ij,ij->i', a[:, 3:], b[:, 3:])
     angle = np.arccos(np.minimum(1.0, np.abs(dot)))
     sine = np.sin(angle)

@@ -19,8 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
-from itertools import pairwise
-from math import inf
+from math import inf, nan
 from pkgutil import resolve_name
 from typing import TypeAlias
 
@@ -61,7 +60,8 @@ from ur_cartesian_driver.planning.moves.plan_report import (
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
-from ur_cartesian_driver.planning.moves.segment_draft import JOINT_SPACE_TYPES
+from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import schedule
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
@@ -157,7 +157,8 @@ def _plan(
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are joined by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
-    geometries = planner.geometries()
+    table = planner.geometries()
+    geometries = list(table)
     samples = planner.samples
     lines = clearance_lines(
         arm,
@@ -173,7 +174,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         geometries, options, arm.model, margins.blend_samples, planner.running
     )
     entries = chain.blend_entries
-    reference = reference_path(state.actual_tcp_pose, geometries, chain.times)
+    reference = reference_path(state.actual_tcp_pose, table.path, geometries, chain.times)
     segments = place_outputs(
         planner.segments(geometries, timings, entries),
         reference,
@@ -244,7 +245,7 @@ class GoalPlanner:
             )
         self.remarks += self._static_error_remarks()
         self.joint_path_planner = JointPathPlanner(
-            goal, self.targets, self.kinematics, options, self.remarks, self.reasons
+            goal, self.targets.rows, self.kinematics, options, self.remarks, self.reasons
         )
         #: The whole joint path, sampled; set by :meth:`geometries`.
         self.samples: PathSamples
@@ -280,11 +281,12 @@ class GoalPlanner:
         self.remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
         return 1
 
-    def geometries(self) -> list[SegmentGeometry]:
+    def geometries(self) -> SegmentGeometries:
         """Return the curve of every segment and the configuration in which it arrives."""
         first = self.first_target()
-        stops = [0.0, *self.goal.waypoints.times.tolist()][first:]
-        times = [after - before if self.timed else None for before, after in pairwise(stops)]
+        times = np.diff(self.goal.waypoints.times, prepend=0.0)[first:]
+        if not self.timed:
+            times = np.full(len(times), nan)
         geometries = self.joint_path_planner.geometries(
             first, self.state.actual_tcp_pose, self.state.actual_q, times
         )

@@ -5,12 +5,13 @@ The curves of the robot's motions: lines, arcs and joint lines.
 
 A curve maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
 the leading quantity of the motion (length of a line or an arc, travel of the joints). It runs from
-waypoint to waypoint; :mod:`~.blend` rounds the transitions.
+waypoint to waypoint. :mod:`~.blended_path` has the curves of a goal in columns, and rounds the
+transitions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import asin, atan2, ceil, degrees, hypot, pi, sqrt
 from typing import ClassVar, Protocol, TypeAlias
 
@@ -70,10 +71,6 @@ class Curve(Protocol):
         """Turn of the tool [rad]."""
 
     @property
-    def joint_travel(self) -> float:
-        """Travel of the leading joint [rad]; 0 where the tool's path defines the curve."""
-
-    @property
     def can_start_at_rest(self) -> bool:
         """Whether the arm may be at rest where the curve starts."""
 
@@ -84,9 +81,6 @@ class Curve(Protocol):
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
 
-    def rows(self, u: Floats) -> Floats:
-        """Return the poses (n, 7) at many ``u`` (n,)."""
-
 
 @dataclass(frozen=True, slots=True)
 class LineCurve:
@@ -96,21 +90,13 @@ class LineCurve:
     end: Pose
     length: float
     angle: float
-    #: (2, 7) both ends, ready to be stacked into one array with those of thousands of lines.
-    ends: Floats = field(compare=False, repr=False)
     joint_travel: ClassVar[float] = 0.0
     can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> LineCurve:
         """Return the line from one pose to another."""
-        return cls(
-            start,
-            end,
-            start.distance_to(end),
-            start.angle_to(end),
-            np.array((start.row(), end.row())),
-        )
+        return cls(start, end, start.distance_to(end), start.angle_to(end))
 
     @property
     def samples(self) -> int:
@@ -123,7 +109,7 @@ class LineCurve:
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
-        return interpolate_rows(self.ends[:1], self.ends[1:], u)
+        return interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
 
     def trim(self, radius: float) -> float:
         """Return the ``u`` at which the line has left a ball of that radius around its start."""
@@ -320,6 +306,11 @@ def trim_end(path: SegmentCurve, radius: float) -> float:
     if isinstance(path, JointLineCurve):
         return 1.0 - path.reversed().trim(radius)
     return 1.0 - path.trim(radius)
+
+
+def pose_at(curve: Curve, u: float) -> Pose:
+    """Return the pose at ``u``, exactly the end at 1."""
+    return curve.end if u == 1.0 else curve.pose(u)
 
 
 def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:

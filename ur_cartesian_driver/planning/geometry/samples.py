@@ -13,19 +13,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, pi
+from math import pi
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.blend import Blend, crossfade, curve_rows
-from ur_cartesian_driver.planning.geometry.curves import Curve, JointLineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.blended_path import (
+    BlendedPath,
+    Flags,
+    Integers,
+    Path,
+)
+from ur_cartesian_driver.planning.geometry.curves import Curve
 
 Ints = NDArray[np.int32]
+T = TypeVar('T', bound=np.generic)
 
 #: Maximum distance of two samples [m], [rad].
 STEP_LENGTH = 0.002
@@ -34,6 +40,33 @@ STEP_ANGLE = pi / 180.0
 #: divided by this.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
+
+
+def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
+    """Return arrays as one; a single one is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+def group_begins(segments: Ints) -> Integers:
+    """Return the first row of each segment; ``segments`` (n,) must not decrease."""
+    return np.flatnonzero(np.diff(segments, prepend=segments[0] - 1))
+
+
+def first_least(values: Floats, segments: Ints) -> Integers:
+    """
+    Return the row of the least value of each segment, the first one if there are several.
+
+    :param segments: (n,) that of each value, not decreasing.
+    """
+    begins = group_begins(segments)
+    sizes = np.diff(begins, append=len(segments))
+    rows = np.flatnonzero(values == np.repeat(np.minimum.reduceat(values, begins), sizes))
+    return rows[group_begins(segments[rows])]
+
+
+def last_greatest(values: Floats, segments: Ints) -> Integers:
+    """Return the row of the greatest value of each segment; see :func:`first_least`."""
+    return len(values) - 1 - first_least(-values[::-1], -segments[::-1])[::-1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,62 +89,65 @@ class PathSamples:
         return vector6(self.q[row].tolist())
 
 
-@dataclass(frozen=True, slots=True)
-class CurvePiece:
-    """A part of the curve of one segment, or a whole blend."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurvePieces:
+    """Parts of the curves of a path, one after the other; columns (n,)."""
 
+    path: Path
+    #: Index of the waypoint at the end of the path's first segment.
+    first: int
+    #: The number of the curve, and its range: ``u`` of a segment's curve, ``s`` of a blend.
+    number: Integers
+    begin: Floats
+    end: Floats
+    sample_count: Integers
     #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
-    index: int
-    curve: Curve
-    #: Its range: the curve's ``u``, the blend's ``s``.
-    begin: float
-    end: float
-    sample_count: int
+    index: Ints
+    is_blend: Flags
 
     @classmethod
-    def part(cls, index: int, path: SegmentCurve, begin: float, end: float) -> CurvePiece:
-        """Return a part of a segment's curve."""
-        part, turn = end - begin, path.joint_travel or path.angle
-        return cls(index, path, begin, end, _sample_count(path.length * part, turn * part))
-
-    @classmethod
-    def blend(cls, index: int, blend: Blend) -> CurvePiece:
-        """Return a blend; it has samples on both sides of its waypoint."""
-        turn = max(blend.angle, blend.joint_travel)
-        return cls(index, blend, 0.0, 1.0, max(2, _sample_count(blend.length, turn)))
-
-    @property
-    def is_blend(self) -> bool:
-        """Whether it is a blend."""
-        return isinstance(self.curve, Blend)
-
-    @property
-    def is_in_joint_space(self) -> bool:
-        """Whether joint positions, and not poses, define it."""
-        return isinstance(self.curve, JointLineCurve) or (
-            isinstance(self.curve, Blend) and self.curve.in_joint_space
+    def of(
+        cls, path: BlendedPath, first: int, number: Integers, begin: Floats, end: Floats
+    ) -> CurvePieces:
+        """Return parts of segments' curves, and whole blends, of a path with both."""
+        length, turn = path.extents(number)
+        part, is_blend = end - begin, number % 2 == 1
+        steps = np.maximum(length * part / STEP_LENGTH, turn * part / STEP_ANGLE)
+        count = np.maximum(
+            np.maximum(1.0 + is_blend, np.ceil(steps)),  # on both sides of a blend's waypoint
+            np.minimum(MIN_SAMPLES, np.ceil(_MIN_REFINEMENT * steps)),
+        )
+        return cls(
+            path=path,
+            first=first,
+            number=number,
+            begin=begin,
+            end=end,
+            sample_count=count.astype(np.intp),
+            index=(first + number // 2).astype(np.int32),
+            is_blend=is_blend,
         )
 
-    def pose(self, t: float) -> Pose:
-        """Return the pose at a parameter."""
-        return self.curve.end if t == 1.0 else self.curve.pose(t)
+    def __len__(self) -> int:
+        return len(self.number)
 
-    def joint_rows(self, t: Floats) -> Floats:
-        """Return the joint positions (n, 6) [rad] at parameters (n,) of a piece in joint space."""
-        assert isinstance(self.curve, JointLineCurve | Blend)
-        return self.curve.joint_rows(t)
+    def curve(self, k: int) -> Curve:
+        """Return the whole curve of a piece."""
+        return self.path[int(self.number[k])]
 
-    def on_segment(self, t: float) -> tuple[int, float]:
-        """Return the segment and the fraction of it at a parameter."""
-        if not isinstance(self.curve, Blend):
-            return self.index, t
-        after, fraction = self.curve.locate(t)
-        return self.index + after, fraction
+    def rows(self, piece: Integers, t: Floats) -> Floats:
+        """Return poses (n, 7) on pieces (n,), which must not decrease."""
+        return self.path.rows(self.number[piece], t)
 
+    def locate(self, piece: Integers, t: Floats) -> tuple[Ints, Floats]:
+        """Return the segments (n,) to which places on pieces count, and the fractions of them."""
+        row, fraction = self.path.locate(self.number[piece], t)
+        return (self.first + row).astype(np.int32), fraction
 
-def _sample_count(length: float, angle: float) -> int:
-    steps = max(length / STEP_LENGTH, angle / STEP_ANGLE)
-    return max(1, ceil(steps), min(MIN_SAMPLES, ceil(_MIN_REFINEMENT * steps)))
+    def locate_one(self, k: int, t: float) -> tuple[int, float]:
+        """Return the segment to which a place on a piece counts, and the fraction of it."""
+        segment, fraction = self.locate(np.array([k]), np.array([t]))
+        return int(segment[0]), float(fraction[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,43 +155,24 @@ class PoseSamples:
     """Rows of samples on pieces: the number of the piece, the parameter, and the pose."""
 
     #: (n,) not decreasing.
-    piece: NDArray[np.intp]
+    piece: Integers
     #: (n,) the ``u`` or ``s``.
     t: Floats
     #: (n, 7) the TCP in base.
     poses: Floats
 
 
-def sample_poses(pieces: Sequence[CurvePiece]) -> PoseSamples:
+def sample_poses(pieces: CurvePieces) -> PoseSamples:
     """Return the samples on Cartesian pieces; the start of a piece belongs to the one before."""
     piece, t = sample_parameters(pieces)
-    return PoseSamples(piece, t, curve_rows([p.curve for p in pieces], piece, t))
+    return PoseSamples(piece, t, pieces.rows(piece, t))
 
 
-def sample_parameters(pieces: Sequence[CurvePiece]) -> tuple[NDArray[np.intp], Floats]:
+def sample_parameters(pieces: CurvePieces) -> tuple[Integers, Floats]:
     """Return the piece (n,) and the parameter (n,) of each sample."""
-    n = np.array([p.sample_count for p in pieces], dtype=np.intp)
-    begin, end = np.array([(p.begin, p.end) for p in pieces]).reshape(-1, 2).T
-    piece = np.repeat(np.arange(len(pieces)), n)
+    n = pieces.sample_count
+    piece = np.repeat(np.arange(len(n)), n)
     k = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(n) - n, n)
     part = k / n[piece]
-    t = np.where(part == 1.0, end[piece], begin[piece] + (end - begin)[piece] * part)
-    return piece, t
-
-
-def segments_of(
-    pieces: Sequence[CurvePiece], piece: NDArray[np.intp], t: Floats
-) -> tuple[Ints, Floats]:
-    """Return the segment (n,) of each sample and the fraction (n,) of it; see ``on_segment``."""
-    index = np.array([p.index for p in pieces], dtype=np.int32)[piece]
-    ends = np.array(
-        [
-            (p.curve.leave, p.curve.join) if isinstance(p.curve, Blend) else (-1.0, 0.0)
-            for p in pieces
-        ]
-    )[piece]
-    leave, join = ends.T
-    first, second = crossfade(leave, join, t)
-    on_blend, after_waypoint = leave >= 0.0, t > 0.5
-    fraction = np.where(on_blend, np.where(after_waypoint, second, first), t)
-    return index + (on_blend & after_waypoint), fraction
+    begin, end = pieces.begin[piece], pieces.end[piece]
+    return piece, np.where(part == 1.0, end, begin + (end - begin) * part)

@@ -155,19 +155,39 @@ class ToolCurve:
     #: Length [m] and turn [rad].
     length: float
     angle: float
-    joint_travel: ClassVar[float] = 0.0
     can_start_at_rest: ClassVar[bool] = False
-
-    def rows(self, u: Floats) -> Floats:
-        """Return the poses (n, 7) at many ``u`` (n,)."""
-        begin, end = self.spline.times[self.piece : self.piece + 2]
-        return self.spline.poses(np.full(len(u), self.piece), u * (end - begin))
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
-        return pose_from_row(self.rows(np.array([u]))[0])
+        begin, end = self.spline.times[self.piece : self.piece + 2]
+        return pose_from_row(
+            self.spline.poses(np.array([self.piece]), np.array([u * (end - begin)]))[0]
+        )
 
     @property
     def end(self) -> Pose:
         """The pose at its end."""
         return self.pose(1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolSplinePath:
+    """The pieces of a spline as a :class:`~.blended_path.Path`, each a segment."""
+
+    spline: ToolSpline
+    #: (n,) [m], [rad]
+    lengths: Floats
+    angles: Floats
+
+    def __getitem__(self, number: int) -> ToolCurve:
+        return ToolCurve(
+            self.spline, number, float(self.lengths[number]), float(self.angles[number])
+        )
+
+    def rows(self, number: Ints, t: Floats) -> Floats:
+        """Return poses (n, 7) on many pieces."""
+        return self.spline.poses(number, t * np.diff(self.spline.times)[number])
+
+    def locate(self, number: Ints, t: Floats) -> tuple[Ints, Floats]:
+        """Return each place as it is."""
+        return number, t

@@ -11,7 +11,6 @@ the configuration in which the run arrives. So does a line that has to become a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,33 +24,23 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Segment, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, NO_POSTURE
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.goal import Posture, Segment, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
-from ur_cartesian_driver.planning.geometry.curves import (
-    is_same_pose,
-    JointLineCurve,
-    SAME_POSITION,
-    trim_end,
-)
-from ur_cartesian_driver.planning.geometry.samples import CurvePiece
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.planning.geometry.blended_path import Blend, Flags
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
+from ur_cartesian_driver.planning.geometry.samples import CurvePieces
 from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
-from ur_cartesian_driver.planning.moves.segment_draft import (
-    can_blend,
-    JOINT_SPACE_TYPES,
-    SegmentDraft,
-    SegmentDraftBuilder,
-)
+from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
     max_path_length,
-    sample_joint_moves,
+    sample_joint_move,
     solve_joint_path,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
@@ -78,7 +67,7 @@ _MAX_LINE_OFFSET = 0.05
 #: Segments of the first run where lines may become joint moves; each later one doubles.
 _FIRST_RUN = 8
 
-_JOINT = SegmentType.JOINT
+_JOINT, _PROCESS = SegmentType.JOINT, SegmentType.PROCESS
 #: The refusals of a line or an arc for which a joint move may replace it.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
@@ -87,7 +76,7 @@ class JointPathPlanner:
     """
     Plans the segments of one goal, one after the other, from the pose of the robot.
 
-    :param targets: the poses of all waypoints in base.
+    :param targets: the poses of all waypoints in base (n, 7).
     :param remarks: on what is changed or ignored; added to.
     :param reasons: by waypoint, for a primitive other than the plain one; added to.
     """
@@ -95,7 +84,7 @@ class JointPathPlanner:
     def __init__(
         self,
         goal: GoalTable,
-        targets: Sequence[Pose],
+        targets: Floats,
         kinematics: TcpKinematics,
         options: PlanningOptions,
         remarks: list[str],
@@ -105,26 +94,29 @@ class JointPathPlanner:
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
         self.path_margins = PathMargins(kinematics.arm)
-        self._draft_builder = SegmentDraftBuilder(goal, targets, options, remarks)
         self._max_path_length = max_path_length(kinematics)
         self._replaces = options.on_posture_change == 'movej'
 
     def geometries(
-        self, begin: int, T_base_tcp: Pose, q: Joints, times: Sequence[float | None]
-    ) -> list[SegmentGeometry]:
+        self, begin: int, T_base_tcp: Pose, q: Joints, times: Floats
+    ) -> SegmentGeometries:
         """
         Return every segment with its curve, its blends and the configuration at its end.
 
         :param begin: index of the first waypoint with a motion.
         :param T_base_tcp: pose of the tool at the start, ``q`` the joint positions [rad].
-        :param times: of each segment [s]; None = by speed.
+        :param times: of each segment [s]; NaN = by speed.
         :raises GoalRefused: the arm cannot go there.
         """
         self._q_start = self._q = q
-        self._drafts = self._draft_builder.build_all(begin, T_base_tcp)
-        k, limit = 0, _FIRST_RUN if self._replaces else len(self._drafts)
-        while k < len(self._drafts):
-            if self._drafts[k].kind in JOINT_SPACE_TYPES:
+        self._drafts = SegmentDrafts(
+            self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
+        )
+        self._path = self._drafts.path
+        n = len(self._drafts)
+        k, limit = 0, _FIRST_RUN if self._replaces else n
+        while k < n:
+            if self._drafts.is_joint_move[k]:
                 self._joint_move(k)
                 k += 1
                 continue
@@ -133,39 +125,40 @@ class JointPathPlanner:
             limit = 2 * limit if resume_at == stop else _FIRST_RUN
             k = resume_at
         self._remark_stops()
-        return list(self._geometries(times))
+        return self._geometries(times)
 
     # -- runs ------------------------------------------------------------------------------------
 
     def _end_of_run(self, k: int, limit: int) -> int:
-        stop = min(k + limit, len(self._drafts))
-        joint_moves = (n for n in range(k, stop) if self._drafts[n].kind in JOINT_SPACE_TYPES)
-        return next(joint_moves, stop)
+        is_joint_move = self._drafts.is_joint_move[k : k + limit]
+        end = int(is_joint_move.argmax())
+        return k + (end or len(is_joint_move))
 
     def _run(self, k: int, stop: int) -> int:
         """
-        Solve the segments from k to stop; return the index to continue with.
+        Solve the segments from k to stop; return the row to continue with.
 
         That is k again if one of them has become a joint move.
         """
+        drafts = self._drafts
         self._make_blends(k, stop)
         joint_path = solve_joint_path(self.kinematics, self._pieces(k, stop), self._q)
         measures = singularity_distance_rows(self.kinematics.arm, joint_path.q)
         refusal, index = first_refusal(joint_path, measures, self.options)
-        drafts = self._drafts[k:stop]
-        arrivals = self._arrivals(drafts, joint_path)
-        for draft, joints in zip(drafts, arrivals, strict=True):
-            if refusal is not None and draft.index >= index:
+        joints = self._arrivals(k, stop, joint_path)
+        postures = self.goal.waypoints.postures
+        for row in range(k, stop) if postures else ():
+            point = drafts.begin + row
+            if refusal is not None and point >= index:
                 break
-            if (wrong := self._posture_refusal(draft, joints)) is not None:
-                refusal, index = wrong, draft.index
-                break
+            q = vector6(joints[row - k].tolist())
+            if point in postures and (wrong := self._posture_refusal(row, postures[point], q)):
+                refusal, index = wrong, point
         if refusal is not None:
-            self._replace(max(k, index - self._drafts[0].index), refusal)
+            self._replace(max(k, index - drafts.begin), refusal)
             return k
-        for draft, joints in zip(drafts, arrivals, strict=True):
-            draft.joints = joints
-        drafts[-1].checked_until = self._end(stop - 1)
+        drafts.joints[k:stop] = joints
+        drafts.solved_until[stop - 1] = self._path.u_leave[stop - 1]
         self._add(joint_path, measures)
         return stop
 
@@ -176,122 +169,99 @@ class JointPathPlanner:
             self._q = vector6(joint_path.q[-1].tolist())
 
     def _make_blends(self, k: int, stop: int) -> None:
-        """Make the blends of a run, including the one into it."""
-        drafts = self._drafts
-        inputs: list[BlendInput] = []
-        indices: list[int] = []
-        for n in range(k, stop):
-            drafts[n].blend_before = None
-            if n > 0:
-                drafts[n - 1].blend_after = None
-                if self._is_blended(n - 1):
-                    first, second = drafts[n - 1], drafts[n]
-                    fillet = first.kind == second.kind == SegmentType.PROCESS
-                    inputs.append(
-                        BlendInput(first.known_curve, second.known_curve, first.radius, fillet)
-                    )
-                    indices.append(n)
-        for n, blend in zip(indices, blends(inputs), strict=True):
-            drafts[n - 1].blend_after = drafts[n].blend_before = blend
-        for n in range(max(k - 1, 0), stop):
-            self._check_overlap(n)
+        """Make the blends of a run, including the one into it; leave room for that after it."""
+        drafts, path, first = self._drafts, self._path, max(k - 1, 0)
+        path.remove_blends(first, stop)
+        rows = first + np.flatnonzero(drafts.is_blended[first:stop])
+        path.leave(rows, drafts.radii[rows])
+        made = rows[rows < stop - 1]
+        fillet = (drafts.kinds[made] == _PROCESS) & (drafts.kinds[made + 1] == _PROCESS)
+        path.make_blends(made, drafts.radii[made], fillet)
+        for row in rows_where(path.u_join[first:stop] > path.u_leave[first:stop]):
+            u_join, u_leave = path.u_join[first + row], path.u_leave[first + row]
+            check_blend_parameters(drafts.begin + first + row, float(u_join), float(u_leave))
 
-    def _pieces(self, k: int, stop: int) -> list[CurvePiece]:
+    def _pieces(self, k: int, stop: int) -> CurvePieces:
         """Return the pieces from where the path is solved to where the last segment is left."""
-        pieces: list[CurvePiece] = []
-        for n in range(k, stop):
-            draft = self._drafts[n]
-            pieces += self._entry(n)
-            begin, end = draft.u_join, self._end(n)
-            max_step = self._max_path_length / max(draft.known_curve.length, 1e-300)
-            if end > begin or not (draft.blend_before or draft.blend_after):
-                pieces.append(
-                    CurvePiece.part(
-                        draft.index, draft.known_curve, begin, min(end, begin + max_step)
-                    )
-                )
-        return pieces
+        path, rows = self._path, np.arange(k, stop)
+        begin, end = path.u_join[rows], path.u_leave[rows]
+        after_blend, before_blend = path.has_blend_before[rows], path.has_blend_after[rows]
+        is_used = np.stack([after_blend, (end > begin) | ~(after_blend | before_blend)], axis=1)
+        is_used[0, 0] = False  # the entry
+        end = np.minimum(
+            end, begin + self._max_path_length / np.maximum(path.curves.length[rows], 1e-300)
+        )
+        blends = np.stack([2.0 * rows - 1.0, np.zeros(len(rows)), np.ones(len(rows))], axis=1)
+        curves = np.stack([2.0 * rows, begin, end], axis=1)
+        return self._curve_pieces(
+            np.concatenate([self._entry(k), np.stack([blends, curves], axis=1)[is_used]])
+        )
 
-    def _entry(self, n: int) -> list[CurvePiece]:
+    def _entry(self, k: int) -> Floats:
         """Return the piece into a segment: the blend, or the rest of the segment before."""
-        if n == 0:
-            return []
-        before = self._drafts[n - 1]
-        if before.blend_after is not None:
-            return [CurvePiece.blend(before.index, before.blend_after)]
-        if before.checked_until < 1.0:
-            return [CurvePiece.part(before.index, before.known_curve, before.checked_until, 1.0)]
-        return []
+        if k > 0 and self._path.radius[k - 1] > 0.0:
+            return np.array([(2.0 * k - 1.0, 0.0, 1.0)])
+        if k > 0 and self._drafts.solved_until[k - 1] < 1.0:
+            return np.array([(2.0 * k - 2.0, self._drafts.solved_until[k - 1], 1.0)])
+        return np.empty((0, 3))
 
-    def _end(self, n: int) -> float:
-        """Return the ``u`` where a segment is left, also where its blend is not made yet."""
-        draft = self._drafts[n]
-        if draft.blend_after is not None:
-            return draft.blend_after.leave
-        return trim_end(draft.known_curve, draft.radius) if self._is_blended(n) else 1.0
+    def _curve_pieces(self, pieces: Floats) -> CurvePieces:
+        """Return pieces, of which each row has the number of the curve, begin and end."""
+        number, begin, end = pieces.T
+        return CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
 
-    def _arrivals(self, drafts: list[SegmentDraft], joint_path: JointPath) -> list[Joints]:
-        """Return the configuration at the waypoint of each segment, as far as solved."""
-        indices = [draft.index for draft in drafts]
-        last = np.searchsorted(joint_path.segments, indices, side='right') - 1
+    def _arrivals(self, k: int, stop: int, joint_path: JointPath) -> Floats:
+        """Return the configurations (n, 6) at the waypoints of segments, as far as solved."""
         if not len(joint_path.q):
-            return [self._q for _ in drafts]
+            return np.tile(self._q, (stop - k, 1))
+        indices = self._drafts.begin + np.arange(k, stop)
+        last = np.searchsorted(joint_path.segments, indices, side='right') - 1
         q = joint_path.q[np.maximum(last, 0)]
-        rounded = [
-            n
-            for n, draft in enumerate(drafts)
-            if self._end(draft.index - self._drafts[0].index) < 1.0
-        ]
-        if rounded:
+        rounded = np.flatnonzero(self._path.u_leave[k:stop] < 1.0)
+        if len(rounded):
             # The arm does not reach it, but the report and joint moves from there need it.
-            ends = pose_rows(drafts[n].known_curve.end for n in rounded)
+            ends = self._path.curves.end[k + rounded]
             there = nearest_rows(
                 self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
             )
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
-        return [(a, b, c, d, e, f) for a, b, c, d, e, f in q.tolist()]
+        return q
 
-    def _posture_refusal(self, draft: SegmentDraft, q: Joints) -> InvalidPosture | None:
+    def _posture_refusal(self, row: int, posture: Posture, q: Joints) -> InvalidPosture | None:
         """Return the refusal of a line or an arc that misses its posture."""
+        point = self._drafts.begin + row
         clause = self.kinematics.explain_missed_posture(
-            draft.known_curve.end,
-            self.goal.waypoints.postures.get(draft.index, NO_POSTURE),
-            q,
-            draft.index,
-            self.options.tf_prefix,
+            self._path.curves[row].end, posture, q, point, self.options.tf_prefix
         )
         if not clause:
             return None
         return InvalidPosture(
-            f'{point_field(draft.index, "posture")} cannot be reached by a straight or circular '
+            f'{point_field(point, "posture")} cannot be reached by a straight or circular '
             f'move: {clause}; use a JOINT segment, or set on_posture_change to movej.'
         )
 
-    def _replace(self, n: int, refusal: GoalRefused) -> None:
+    def _replace(self, row: int, refusal: GoalRefused) -> None:
         """Make a segment a joint move, or refuse the goal."""
-        draft = self._drafts[n]
+        point = self._drafts.begin + row
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
         self.remarks.append(
-            f'point {draft.index}: JOINT instead of {draft.kind.name} '
+            f'point {point}: JOINT instead of {_name(self._drafts.kinds[row])} '
             f'(on_posture_change = movej), which would be refused: {refusal}'
         )
-        self.reasons.setdefault(draft.index, []).append(
+        self.reasons.setdefault(point, []).append(
             'the posture needs a joint move'
             if isinstance(refusal, InvalidPosture)
             else 'there is no straight path'
         )
-        draft.kind, draft.curve, draft.blend_before = _JOINT, None, None
-        if n + 1 < len(self._drafts) and self._drafts[n + 1].curve is not None:
-            after = self._drafts[n + 1]
-            after.curve = self._draft_builder.line_or_arc(after, self.targets[draft.index])
+        self._drafts.make_joint_move(row)
 
     # -- joint moves -----------------------------------------------------------------------------
 
     def _joint_move(self, k: int) -> None:
-        draft, i = self._drafts[k], self._drafts[k].index
+        drafts, i = self._drafts, self._drafts.begin + k
         q = self._start_joints(k)
-        target, posture = self.targets[i], self.goal.waypoints.postures.get(i)
+        target, posture = drafts.target(k), self.goal.waypoints.postures.get(i)
         where = point_field(i, 'pose')
         if posture:
             named = named_joints(posture, self.options.tf_prefix)
@@ -299,141 +269,125 @@ class JointPathPlanner:
         else:
             chosen = self.kinematics.nearest(target, q, where)
         line = JointLineCurve.between(self.kinematics.arm, self.kinematics.T_flange_tcp, q, chosen)
-        if i == 0 and max(line.travel) <= SAME_SOLUTION:
-            draft.radius = 0.0
-        draft.curve, draft.joints = line, chosen
+        if i == 0 and line.joint_travel <= SAME_SOLUTION:
+            drafts.stop_at(k)
+        self._path.curves.put(k, line)
+        drafts.joints[k] = chosen
         self._make_blends(k, k + 1)
-        self._solve_entry(k)
-        self._add_joint_move([CurvePiece.part(i, line, draft.u_join, self._end(k))])
-        draft.checked_until = self._end(k)
+        self._solve_entry(k, line)
+        begin, end = float(self._path.u_join[k]), float(self._path.u_leave[k])
+        self._add_joint_move(np.array([(2.0 * k, begin, end)]), line)
+        drafts.solved_until[k] = end
 
     def _start_joints(self, k: int) -> Joints:
         """Return the configuration in which a joint move begins: that at the waypoint before."""
         if k == 0:
             return self._q_start
-        before = self._drafts[k - 1]
-        if before.checked_until == 1.0 or isinstance(before.known_curve, JointLineCurve):
-            return before.known_joints
+        solved_until = self._drafts.solved_until[k - 1]
+        if solved_until == 1.0 or self._path.curves.is_joint_line[k - 1]:
+            return vector6(self._drafts.joints[k - 1].tolist())
         # A blended waypoint may be out of reach, but not one at which a joint line begins: the
         # robot needs the joints in which the rest of the segment would arrive.
-        rest = solve_joint_path(
-            self.kinematics,
-            [CurvePiece.part(before.index, before.known_curve, before.checked_until, 1.0)],
-            self._q,
-        )
-        if rest.refusal is not None:
-            raise rest.refusal
-        return vector6(rest.q[-1].tolist())
+        rest = self._curve_pieces(np.array([(2.0 * k - 2.0, solved_until, 1.0)]))
+        joint_path = solve_joint_path(self.kinematics, rest, self._q)
+        if joint_path.refusal is not None:
+            raise joint_path.refusal
+        return vector6(joint_path.q[-1].tolist())
 
-    def _solve_entry(self, k: int) -> None:
+    def _solve_entry(self, k: int, line: JointLineCurve) -> None:
         """Solve what leads into a joint move."""
-        pieces = self._entry(k)
-        if not pieces:
+        entry = self._entry(k)
+        if not len(entry):
             return
-        if pieces[0].is_in_joint_space:
-            self._add_joint_move(pieces)
+        before = self._path[int(entry[0, 0])]
+        if isinstance(before, JointLineCurve) or (
+            isinstance(before, Blend) and before.in_joint_space
+        ):
+            self._add_joint_move(entry, before)
             return
-        joint_path = solve_joint_path(self.kinematics, pieces, self._q)
+        joint_path = solve_joint_path(self.kinematics, self._curve_pieces(entry), self._q)
         if joint_path.refusal is not None:
             raise joint_path.refusal
         measures = singularity_distance_rows(self.kinematics.arm, joint_path.q)
-        measures[joint_path.segments == self._drafts[k].index] = np.inf
+        measures[joint_path.segments == self._drafts.begin + k] = np.inf
         near = near_singularity_refusal(joint_path, measures, self.options)
         if near is not None:
             raise near[0]
         self._add(joint_path, measures)
-        line = self._drafts[k].known_curve
-        assert isinstance(line, JointLineCurve)
-        joins = line.joints(self._drafts[k].u_join)
+        u_join = float(self._path.u_join[k])
+        joins = line.joints(u_join)
         if max_joint_change(self._q, joins) > _MAX_LINE_OFFSET:
             raise self.kinematics.discontinuity_error(
-                line.pose(self._drafts[k].u_join),
+                line.pose(u_join),
                 self._q,
                 joins,
-                f'{segment_field(self._drafts[k - 1].index, "blend_radius")}',
+                f'{segment_field(self._drafts.begin + k - 1, "blend_radius")}',
             )
 
-    def _add_joint_move(self, pieces: list[CurvePiece]) -> None:
-        joint_path = sample_joint_moves(self.kinematics, pieces)
+    def _add_joint_move(self, piece: Floats, curve: JointLineCurve | Blend) -> None:
+        joint_path = sample_joint_move(self.kinematics, self._curve_pieces(piece), curve)
         # Singularities do not matter here.
         self._add(joint_path, np.full((len(joint_path.t), 3), np.inf))
 
-    # -- blends ----------------------------------------------------------------------------------
-
-    def _is_blended(self, n: int) -> bool:
-        """Tell whether a segment is blended into the next one."""
-        if n + 1 >= len(self._drafts) or self._drafts[n].radius <= SAME_POSITION:
-            return False  # the wire rounds such a radius to 0
-        return can_blend(self._drafts[n], self._drafts[n + 1])
-
-    def _check_overlap(self, n: int) -> None:
-        draft = self._drafts[n]
-        if draft.curve is not None:
-            check_blend_parameters(draft.index, draft.u_join, self._end(n))
-
     def _remark_stops(self) -> None:
-        for n, draft in enumerate(self._drafts[:-1]):
-            after = self._drafts[n + 1]
-            if draft.radius > SAME_POSITION and not can_blend(draft, after):
-                self.remarks.append(
-                    f'point {draft.index}: stops instead of blending, because the robot cannot '
-                    f'blend from {draft.kind.name} into {after.kind.name}'
-                )
+        kinds = self._drafts.kinds
+        for row in rows_where(self._drafts.stops_instead):
+            self.remarks.append(
+                f'point {self._drafts.begin + row}: stops instead of blending, because the robot '
+                f'cannot blend from {_name(kinds[row])} into {_name(kinds[row + 1])}'
+            )
 
     # -- segments --------------------------------------------------------------------------------
 
-    def _geometries(self, times: Sequence[float | None]) -> Iterator[SegmentGeometry]:
-        speed_bounds = self.path_margins.joint_speed_bounds()
-        margins = self.path_margins.tightest_margin()
-        points = self.goal.waypoints[self._drafts[0].index :]
-        for draft, point, time in zip(self._drafts, points, times, strict=True):
-            i = draft.index
-            geometry = SegmentGeometry(
-                index=i,
-                kind=draft.kind,
-                waypoint=point,
-                segment=draft.segment,
-                curve=draft.known_curve,
-                joints=draft.known_joints,
-                time=time,
-                speed_bound=speed_bounds[i],
-                tightest_margin=margins[i],
-                blend_before=draft.blend_before,
-                blend_after=draft.blend_after,
-                u_join=draft.u_join,
-                u_leave=draft.u_leave,
-                unblended_fraction=max(draft.u_leave - draft.u_join, 1e-9),
-            )
-            yield self._at_first_point(geometry) if self._has_no_motion(geometry) else geometry
+    def _geometries(self, times: Floats) -> SegmentGeometries:
+        drafts = self._drafts
+        geometries = SegmentGeometries(
+            begin=drafts.begin,
+            kinds=drafts.kinds,
+            waypoints=self.goal.waypoints[drafts.begin :],
+            segments=drafts.segments,
+            path=self._path,
+            joints=drafts.joints,
+            times=times,
+            speed_bounds=self.path_margins.joint_speed_bounds(),
+            tightest_margins=self.path_margins.tightest_margins(),
+        )
+        for row in rows_where(self._has_no_motion()):
+            if drafts.begin + row > 0:
+                raise duplicate_point_error(self.goal, drafts.begin + row)
+            geometries = self._at_first_point(geometries)
+        return geometries
 
-    def _has_no_motion(self, geometry: SegmentGeometry) -> bool:
-        if geometry.curve.length > SAME_POSITION:
-            return False
-        if isinstance(geometry.curve, JointLineCurve):
-            return max(geometry.curve.travel) <= SAME_SOLUTION
-        return is_same_pose(geometry.curve.start, geometry.curve.end)
+    def _has_no_motion(self) -> Flags:
+        """Tell which segments neither move nor turn the tool, nor the joints (n,)."""
+        curves = self._path.curves
+        turn = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
+        return (curves.length <= SAME_POSITION) & (turn <= SAME_ANGLE)
 
-    def _at_first_point(self, geometry: SegmentGeometry) -> SegmentGeometry:
-        """Return the segment to a first point where the robot already is; refuse others."""
-        i = geometry.index
-        if i > 0:
-            raise duplicate_point_error(self.goal, i)
-        waits = bool(geometry.time)
-        wait_clause = f', and waits {geometry.time:g} s' if waits else ''
+    def _at_first_point(self, geometries: SegmentGeometries) -> SegmentGeometries:
+        """Return the segments of which the first leads to where the robot already is."""
+        time = float(geometries.times[0])
+        waits = time > 0.0
+        wait_clause = f', and waits {time:g} s' if waits else ''
         if waits and self.options.dialect.is_coarse:
             raise NotAvailable(
-                point_field(i, 'time_from_start'),
-                f'is {geometry.time:g} s, but the robot is already there and cannot wait, because '
+                point_field(0, 'time_from_start'),
+                f'is {time:g} s, but the robot is already there and cannot wait, because '
                 f'no times are sent in wire dialect {self.options.dialect.name}',
                 'set it to 0, and the later times accordingly',
             )
         self.remarks.append(f'point 0: the robot is already there{wait_clause}')
         self.reasons[0] = [f'the robot is already there{wait_clause}']
-        kind = geometry.kind if geometry.kind == _JOINT else SegmentType.LINEAR
+        geometries.kinds[0] = _JOINT if geometries.kinds[0] == _JOINT else SegmentType.LINEAR
+        waypoint, segment = geometries.waypoints[0], geometries.segments[0]
         return replace(
-            geometry,
-            kind=kind,
-            segment=Segment(type=geometry.segment.type),
-            waypoint=replace(geometry.waypoint, twist=(0.0,) * 6),
+            geometries,
+            waypoints=geometries.waypoints.with_first(replace(waypoint, twist=ZERO6)),
+            segments=geometries.segments.with_first(Segment(type=segment.type)),
             waits=waits,
         )
+
+
+def _name(kind: int) -> str:
+    """Return the name of a segment type."""
+    return SegmentType(kind).name

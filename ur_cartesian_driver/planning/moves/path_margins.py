@@ -13,12 +13,19 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.samples import Ints, PathSamples
-from ur_cartesian_driver.planning.moves.segment_data import BlendSamples, JointSpeedBound
+from ur_cartesian_driver.planning.geometry.samples import (
+    group_begins,
+    Ints,
+    joined,
+    last_greatest,
+    PathSamples,
+)
+from ur_cartesian_driver.planning.moves.segment_data import BlendSamples
+from ur_cartesian_driver.planning.moves.segment_geometries import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
-    margins_by_segment,
-    TightestMargin,
+    tightest_margins,
+    TightestMargins,
 )
 
 # Samples whose parameters differ by less say nothing about a speed.
@@ -52,55 +59,45 @@ class PathMargins:
 
     def samples(self) -> PathSamples:
         """Return all samples."""
+        paths = [solved.joint_path for solved in self._solved]
         return PathSamples(
-            segment=np.concatenate([solved.joint_path.segments for solved in self._solved]),
-            fraction=np.concatenate([solved.joint_path.fractions for solved in self._solved]),
-            q=np.concatenate([solved.joint_path.q for solved in self._solved]),
-            poses=np.concatenate([solved.joint_path.poses for solved in self._solved]),
+            segment=joined([path.segments for path in paths]),
+            fraction=joined([path.fractions for path in paths]),
+            q=joined([path.q for path in paths]),
+            poses=joined([path.poses for path in paths]),
         )
 
-    def tightest_margin(self) -> dict[int, TightestMargin]:
-        """Return the tightest margin by segment."""
+    def tightest_margins(self) -> TightestMargins:
+        """Return the tightest margin of each segment."""
         samples = self.samples()
-        measures = np.concatenate([solved.measures for solved in self._solved])
-        return margins_by_segment(
-            self._arm, samples.q, measures, samples.segment, samples.fraction
-        )
+        measures = joined([solved.measures for solved in self._solved])
+        return tightest_margins(self._arm, samples.q, measures, samples.segment, samples.fraction)
 
-    def joint_speed_bounds(self) -> dict[int, JointSpeedBound]:
-        """Return the time that the joints need for the whole segment, by segment."""
+    def joint_speed_bounds(self) -> JointSpeedBounds:
+        """Return the time that the joints need for each whole segment."""
         limits = np.array(self._arm.model.max_joint_speed)
         blends, parts = zip(
             *(_speed_samples(solved, limits) for solved in self._solved), strict=True
         )
         self.blend_samples = BlendSamples(
             **{
-                field.name: np.concatenate([getattr(found, field.name) for found in blends])
+                field.name: joined([getattr(found, field.name) for found in blends])
                 for field in fields(BlendSamples)
             }
         )
         segment, time, joint, fraction, joint_time, local_time = (
-            np.concatenate(column) for column in zip(*parts, strict=True)
+            joined(column) for column in zip(*parts, strict=True)
         )
-        order = np.lexsort((time, segment))
-        bounds = np.flatnonzero(np.diff(segment[order], append=segment[order[-1]] + 1))
-        last = order[bounds]
-        shortest_time = np.minimum.reduceat(
-            local_time[order], np.concatenate([[0], bounds[:-1] + 1])
+        order = np.argsort(segment, kind='stable')  # a few sorted runs
+        last = order[last_greatest(time[order], segment[order])]
+        shortest_time = np.minimum.reduceat(local_time[order], group_begins(segment[order]))
+        return JointSpeedBounds(
+            times=time[last],
+            joints=joint[last],
+            fractions=fraction[last],
+            shortest_times=np.minimum(shortest_time, time[last]),
+            times_at_limits=np.bincount(segment, joint_time)[segment[last]],
         )
-        columns = (
-            time[last],
-            joint[last],
-            fraction[last],
-            np.minimum(shortest_time, time[last]),
-            np.bincount(segment, joint_time)[segment[last]],
-        )
-        return {
-            index: JointSpeedBound(*row)
-            for index, *row in zip(
-                segment[last].tolist(), *(column.tolist() for column in columns), strict=True
-            )
-        }
 
 
 class _SpeedSamples(NamedTuple):
@@ -120,7 +117,7 @@ class _SpeedSamples(NamedTuple):
 def _speed_samples(solved: SolvedPieces, limits: Floats) -> tuple[BlendSamples, _SpeedSamples]:
     """Return the samples in blends, and how fast a segment may be at each sample."""
     joint_path, pieces = solved.joint_path, solved.joint_path.pieces
-    begin = np.array([piece.begin for piece in pieces])[joint_path.piece]
+    begin = pieces.begin[joint_path.piece]
     before = np.concatenate([[0.0], joint_path.t[:-1]])
     is_first = np.diff(joint_path.piece, prepend=-1) != 0
     step = joint_path.t - np.where(is_first, begin, before)
@@ -130,8 +127,8 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> tuple[BlendSamples, 
     joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
     rate = np.where(step > _MIN_STEP, joint_time / np.maximum(step, _MIN_STEP), 0.0)
     local_time = np.where(step > _MIN_STEP, rate, np.inf)
-    index = np.array([p.index for p in pieces], dtype=np.int32)[joint_path.piece]
-    on_blend = np.flatnonzero(np.array([p.is_blend for p in pieces])[joint_path.piece])
+    index = pieces.index[joint_path.piece]
+    on_blend = np.flatnonzero(pieces.is_blend[joint_path.piece])
     places = joint_path.poses[:, :3]
     distance = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1)
     blend_samples = BlendSamples(

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
-from ur_cartesian_driver.planning.geometry.blend import Blend, curve_rows
-from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
 
@@ -24,7 +24,7 @@ _MIN_JOINT_SAMPLES = 8
 
 
 def reference_path(
-    start: Pose, geometries: Sequence[SegmentGeometry], times: MoveTimes
+    start: Pose, path: BlendedPath, geometries: Sequence[SegmentGeometry], times: MoveTimes
 ) -> ReferencePath:
     """
     Return the path that the robot is expected to follow, blends included.
@@ -33,28 +33,24 @@ def reference_path(
     their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); no two rows
     differ by more than 10 degrees.
     """
-    curves: list[SegmentCurve | Blend] = []
+    numbers: list[int] = []
     parameters: list[list[float]] = []
     knots = (times.knots / np.maximum(times.length - times.tail, 1e-300)[:, None]).tolist()
-    for geometry, own_knots in zip(geometries, knots, strict=True):
-        curves.append(geometry.curve)
+    for k, (geometry, own_knots) in enumerate(zip(geometries, knots, strict=True)):
+        numbers.append(2 * k)
         parameters.append(_row_parameters(geometry, own_knots))
         if (blend := geometry.blend_after) is not None:
-            curves.append(blend)
+            numbers.append(2 * k + 1)
             n = blend.samples + blend.samples % 2  # one of them at the point
             parameters.append([k / n for k in range(1, n + 1)])
-    of = np.repeat(np.arange(len(curves)), [len(at) for at in parameters])
+    number = np.repeat(numbers, [len(at) for at in parameters])
     at = np.fromiter(chain.from_iterable(parameters), dtype=np.float64)
-    is_blend = np.array([isinstance(curve, Blend) for curve in curves])
-    # The number of the segment of each row: blends have that of the one behind them.
-    number = np.cumsum(~is_blend)[of] - 1 + is_blend[of]
-    points = geometries[0].index + number - is_blend[of] + (is_blend[of] & (at > 0.5))
-    blend_tolerance = np.array(
-        [curve.blend_tolerance if isinstance(curve, Blend) else (0.0, 0.0) for curve in curves]
-    )[of]
-    poses = np.concatenate([[start.row()], curve_rows(curves, of, at)])
+    row, is_blend = number // 2, number % 2 == 1
+    points = geometries[0].index + row + (is_blend & (at > 0.5))
+    blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
+    poses = np.concatenate([[start.row()], path.rows(number, at)])
     keep_hemisphere(poses)
-    time = _times(geometries, times, number, is_blend[of], at)
+    time = _times(path, times, row + is_blend, is_blend, at)
     return ReferencePath(
         poses=poses,
         point=np.concatenate([[geometries[0].index], points]).astype(np.int32),
@@ -64,14 +60,18 @@ def reference_path(
 
 
 def _times(
-    geometries: Sequence[SegmentGeometry],
+    path: BlendedPath,
     times: MoveTimes,
     number: NDArray[np.intp],
     on_blend: NDArray[np.bool_],
     at: Floats,
 ) -> Floats:
-    """Return when each row is expected (n,) [s]."""
-    u_join, span = np.array([(g.u_join, max(g.u_leave - g.u_join, 1e-300)) for g in geometries]).T
+    """
+    Return when each row is expected (n,) [s].
+
+    :param number: (n,) that of its segment; rows in a blend have that of the one behind it.
+    """
+    u_join, span = path.u_join, np.maximum(path.u_leave - path.u_join, 1e-300)
     begins = times.begins
     found = begins[number]
     rows = np.flatnonzero(~on_blend)

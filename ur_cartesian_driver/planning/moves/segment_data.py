@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.geometry.blended_path import Blend
 from ur_cartesian_driver.planning.geometry.curves import SegmentCurve
 from ur_cartesian_driver.planning.geometry.samples import Ints
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargin

@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.geometry.blended_path import Blend
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
 from ur_cartesian_driver.planning.moves.speed_limits import (
     leading_quantity,

@@ -12,7 +12,6 @@ jump that remains is real.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, pi
 
@@ -25,14 +24,15 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.blended_path import Blend
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, pose_at, tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
-    CurvePiece,
+    CurvePieces,
     Ints,
+    joined,
     PoseSamples,
     sample_parameters,
     sample_poses,
-    segments_of,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -56,7 +56,7 @@ _GROWTH = 8
 class JointPath:
     """The samples on consecutive pieces that the arm reaches, with their joint positions."""
 
-    pieces: Sequence[CurvePiece]
+    pieces: CurvePieces
     #: (n,) number of the piece, not decreasing; (n,); (n, 7); (n, 6).
     piece: NDArray[np.intp]
     t: Floats
@@ -71,7 +71,7 @@ class JointPath:
 
     def __post_init__(self) -> None:
         """Find the segments."""
-        segments, fractions = segments_of(self.pieces, self.piece, self.t)
+        segments, fractions = self.pieces.locate(self.piece, self.t)
         object.__setattr__(self, 'segments', segments)
         object.__setattr__(self, 'fractions', fractions)
 
@@ -79,18 +79,17 @@ class JointPath:
 class _JointPathBuilder:
     """Collects solved samples in blocks."""
 
-    def __init__(self, pieces: Sequence[CurvePiece]) -> None:
+    def __init__(self, pieces: CurvePieces) -> None:
         self._pieces = pieces
-        #: Piece, parameter, pose and joints; the first block has none, as the path may have none.
-        self._blocks = [
-            (np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 7)), np.empty((0, 6)))
-        ]
+        #: Piece, parameter, pose and joints.
+        self._blocks: list[tuple[NDArray[np.intp], Floats, Floats, Floats]] = []
 
     def append(self, samples: PoseSamples, rows: slice, q: Floats) -> None:
         self._blocks.append((samples.piece[rows], samples.t[rows], samples.poses[rows], q))
 
     def build(self, refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:
-        piece, t, poses, q = (np.concatenate(column) for column in zip(*self._blocks, strict=True))
+        none = np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 7)), np.empty((0, 6))
+        piece, t, poses, q = map(joined, zip(*(self._blocks or [none]), strict=True))
         return JointPath(self._pieces, piece, t, poses, q, refusal, segment)
 
 
@@ -106,16 +105,18 @@ class _Refinement:
     jump: Joints | None = None
 
 
-def sample_joint_moves(kinematics: TcpKinematics, pieces: Sequence[CurvePiece]) -> JointPath:
-    """Return the samples on pieces in joint space."""
+def sample_joint_move(
+    kinematics: TcpKinematics, pieces: CurvePieces, curve: JointLineCurve | Blend
+) -> JointPath:
+    """Return the samples on the one piece of a curve in joint space."""
     piece, t = sample_parameters(pieces)
-    q = np.concatenate([p.joint_rows(t[piece == k]) for k, p in enumerate(pieces)])
+    q = curve.joint_rows(t)
     return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
 
 
 def solve_joint_path(
     kinematics: TcpKinematics,
-    pieces: Sequence[CurvePiece],
+    pieces: CurvePieces,
     q_start: Joints,
     samples: PoseSamples | None = None,
 ) -> JointPath:
@@ -145,7 +146,7 @@ def solve_joint_path(
                 found.append(_as_samples(k, refinement), slice(None), np.array(refinement.q))
                 q = refinement.q[-1]
             if refinement.stop is not None:
-                return found.build(*_refusal_at(kinematics, pieces[k], refinement, q))
+                return found.build(*_refusal_at(kinematics, pieces, k, refinement, q))
             row += 1
             if not np.abs(solved[index] - q).max() < _SAME:  # NaN if there was none
                 block = _FIRST_BLOCK
@@ -158,11 +159,8 @@ def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[F
     path = solve_path(
         kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), q, skip_gaps=False
     )
-    rows = np.concatenate([np.array([q]), path.q])
-    measures = branch_measures(kinematics.arm, rows)
-    branch = measures.branch
-    bad = (np.abs(np.diff(rows, axis=0)).max(axis=1) > _MAX_STEP) | (np.diff(branch) != 0)
-    bad |= ~path.found
+    branch = branch_measures(kinematics.arm, np.concatenate([[q], path.q])).branch
+    bad = (path.step > _MAX_STEP) | (np.diff(branch) != 0) | ~path.found
     lost = np.flatnonzero(~path.found)
     if len(lost):  # the next block continues there
         stop = int(lost[0]) + 1
@@ -172,22 +170,24 @@ def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[F
 
 def _refine(
     kinematics: TcpKinematics,
-    pieces: Sequence[CurvePiece],
+    pieces: CurvePieces,
     samples: PoseSamples,
     row: int,
     q: Joints,
 ) -> _Refinement:
     """Return the samples from the row before to a row, as dense as the joints need them."""
-    piece = pieces[int(samples.piece[row])]
-    is_first = row == 0 or samples.piece[row - 1] != samples.piece[row]
-    t = piece.begin if is_first else float(samples.t[row - 1])
-    length, angle = piece.curve.length, piece.curve.angle
-    min_step = min(1.0, _MIN_LENGTH / max(length, 1e-300), _MIN_ANGLE / max(angle, 1e-300))
+    k = int(samples.piece[row])
+    curve = pieces.curve(k)
+    is_first = row == 0 or samples.piece[row - 1] != k
+    t = float(pieces.begin[k]) if is_first else float(samples.t[row - 1])
+    min_step = min(
+        1.0, _MIN_LENGTH / max(curve.length, 1e-300), _MIN_ANGLE / max(curve.angle, 1e-300)
+    )
     found = _Refinement([], [], [])
     ends = [float(samples.t[row])]
     while ends:
         end = ends[-1]
-        pose = piece.pose(end)
+        pose = pose_at(curve, end)
         q_next = kinematics.solution(pose, q)
         if end - t > min_step and (q_next is None or _may_leave_line(kinematics, q, q_next)):
             ends.append(0.5 * (t + end))
@@ -211,24 +211,25 @@ def _as_samples(piece: int, refinement: _Refinement) -> PoseSamples:
 
 
 def _refusal_at(
-    kinematics: TcpKinematics, piece: CurvePiece, refinement: _Refinement, q: Joints
+    kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
     """Return why the arm cannot continue from a configuration, and on which segment."""
-    assert refinement.stop is not None
-    index, fraction = piece.on_segment(refinement.stop)
-    pose = piece.pose(refinement.stop)
+    stop, curve = refinement.stop, pieces.curve(k)
+    assert stop is not None
+    index, fraction = pieces.locate_one(k, stop)
+    pose = pose_at(curve, stop)
     where = describe_location(index, fraction)
     if refinement.jump is not None:
         poses_beyond = (
-            piece.pose(t)
-            for t in np.linspace(refinement.stop, piece.end, _SAMPLES_BEYOND).tolist()
+            pose_at(curve, t)
+            for t in np.linspace(stop, float(pieces.end[k]), _SAMPLES_BEYOND).tolist()
         )
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
-    if not piece.is_blend and fraction < 1.0:
+    if not pieces.is_blend[k] and fraction < 1.0:
         # Here the value is just beyond its bound; the one at the point says how far beyond.
-        at_end = kinematics.no_solution_error(piece.curve.end, where, 'at the point ')
-        if type(at_end) is type(refusal) and kinematics.solution(piece.curve.end, q) is None:
+        at_end = kinematics.no_solution_error(curve.end, where, 'at the point ')
+        if type(at_end) is type(refusal) and kinematics.solution(curve.end, q) is None:
             refusal = at_end
     return refusal, index
 

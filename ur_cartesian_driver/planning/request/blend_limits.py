@@ -62,13 +62,13 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
         )
 
 
-def round_blend_radius(radius: float, index: int, dialect: Dialect, remarks: list[str]) -> float:
-    """Return the blend radius [m] that the wire carries, with a remark where it is smaller."""
+def round_blend_radius(radius: float, index: int, dialect: Dialect) -> tuple[float, str]:
+    """Return the blend radius [m] that the wire carries, and a remark where it is smaller."""
     rounded = dialect.round_down_radius(radius)
-    if rounded < radius - 1e-6:
-        remarks.append(
-            f'point {index}: blend of {1e3 * rounded:g} mm instead of {1e3 * radius:g} mm, '
-            f'because wire dialect {dialect.name} counts in steps of '
-            f'{1e3 / dialect.time_scale:g} mm'
-        )
-    return rounded
+    if rounded >= radius - 1e-6:
+        return rounded, ''
+    return rounded, (
+        f'point {index}: blend of {1e3 * rounded:g} mm instead of {1e3 * radius:g} mm, '
+        f'because wire dialect {dialect.name} counts in steps of '
+        f'{1e3 / dialect.time_scale:g} mm'
+    )

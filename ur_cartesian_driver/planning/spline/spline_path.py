@@ -30,13 +30,13 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.samples import (
-    CurvePiece,
+    CurvePieces,
     MIN_SAMPLES,
     PoseSamples,
     STEP_ANGLE,
     STEP_LENGTH,
 )
-from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve, ToolSpline
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline, ToolSplinePath
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import (
     JointPath,
@@ -47,8 +47,8 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     first_refusal,
     is_leaving_rows,
-    margins_by_segment,
     singularity_distance_rows,
+    tightest_margins,
     TightestMargin,
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -129,6 +129,9 @@ def solve_spline_path(
     measures = singularity_distance_rows(kinematics.arm, joint_path.q)
     leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
     _check_path(kinematics, joint_path, np.where(leaving, np.inf, measures), postures, options)
+    margins = tightest_margins(
+        kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
+    )
     return SplinePath(
         spline=spline,
         first=first,
@@ -138,9 +141,7 @@ def solve_spline_path(
         u=np.concatenate([[0.0], joint_path.t]),
         length=length,
         angle=angle,
-        tightest_margin=margins_by_segment(
-            kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
-        ),
+        tightest_margin=dict(zip(margins.segments.tolist(), margins, strict=True)),
     )
 
 
@@ -154,16 +155,16 @@ def _check_path(
     """Raise the first reason why the arm cannot follow."""
     refusal, index = first_refusal(joint_path, measures, options)
     for k, posture in postures.items():
-        piece = joint_path.pieces[k]
-        if refusal is not None and piece.index >= index:
+        point = int(joint_path.pieces.index[k])
+        if refusal is not None and point >= index:
             break
         row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
         q = vector6(joint_path.q[row].tolist())
         if clause := kinematics.explain_missed_posture(
-            piece.pose(1.0), posture, q, piece.index, options.tf_prefix
+            joint_path.pieces.curve(k).end, posture, q, point, options.tf_prefix
         ):
             raise InvalidPosture(
-                f'{point_field(piece.index, "posture")} cannot be reached along the spline: '
+                f'{point_field(point, "posture")} cannot be reached along the spline: '
                 f'{clause}; start in that configuration, or use PRIMITIVES with a JOINT segment.'
             )
     if refusal is not None:
@@ -256,24 +257,26 @@ def _pose_samples(
     return PoseSamples(piece, u, spline.poses(piece, u * h[piece]))
 
 
-def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> list[CurvePiece]:
+def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> CurvePieces:
     """Return the pieces, with lengths measured along chords."""
     n = len(spline.positions)
     starts = spline.poses(np.arange(n), np.zeros(n))
     begins = np.searchsorted(samples.piece, np.arange(n))
     before = np.concatenate([samples.poses[:1], samples.poses[:-1]])
     before[begins] = starts
-    lengths = np.bincount(
-        samples.piece, np.linalg.norm(samples.poses[:, :3] - before[:, :3], axis=1)
+    distances = np.linalg.norm(samples.poses[:, :3] - before[:, :3], axis=1)
+    turns = angle_rows(before[:, 3:], samples.poses[:, 3:])
+    lengths, angles = (np.add.reduceat(column, begins) for column in (distances, turns))
+    return CurvePieces(
+        path=ToolSplinePath(spline, lengths, angles),
+        first=first,
+        number=np.arange(n),
+        begin=np.zeros(n),
+        end=np.ones(n),
+        sample_count=np.bincount(samples.piece),
+        index=np.arange(first, first + n, dtype=np.int32),
+        is_blend=np.zeros(n, dtype=np.bool_),
     )
-    angles = np.bincount(samples.piece, angle_rows(before[:, 3:], samples.poses[:, 3:]))
-    counts = np.bincount(samples.piece)
-    return [
-        CurvePiece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
-        for k, (length, angle, count) in enumerate(
-            zip(lengths.tolist(), angles.tolist(), counts.tolist(), strict=True)
-        )
-    ]
 
 
 def _cumulative(steps: Floats) -> Floats:

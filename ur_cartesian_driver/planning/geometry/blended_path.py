@@ -1,0 +1,371 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The path of a goal in columns: the curve of each segment, and the blends between them.
+
+Goals have up to 100,000 segments, and nearly all of them are lines. So lines and blends are rows.
+The other curves (arcs, joint lines) stand beside the rows as objects. Any of them is also made an
+object when somebody asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import (
+    angle_rows,
+    distance_rows,
+    Floats,
+    interpolate_rows,
+)
+from ur_cartesian_driver.planning.geometry.blend_shapes import (
+    BlendShapes,
+    crossfade,
+    crossfade_rows,
+    fillet_rows,
+)
+from ur_cartesian_driver.planning.geometry.curves import (
+    Curve,
+    JointLineCurve,
+    LineCurve,
+    MAX_TURN_PER_SAMPLE,
+    SegmentCurve,
+    tcp_rows,
+    trim_end,
+)
+
+Integers = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+# Chords that measure the length of a blend without a formula.
+_CHORDS = 16
+
+
+class Path(Protocol):
+    """Consecutive curves, by their numbers, as the checks along a path need them."""
+
+    def __getitem__(self, number: int) -> Curve:
+        """Return one of the curves."""
+
+    def rows(self, number: Integers, t: Floats) -> Floats:
+        """
+        Return poses (n, 7) on many curves.
+
+        :param number: (n,) of the curve of each row, not decreasing.
+        :param t: (n,) in [0, 1].
+        """
+
+    def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
+        """Return the segments (n,) that places count to, and the fractions (n,) of them."""
+
+
+class CurveRows:
+    """
+    The curves of consecutive segments, a row for each.
+
+    :param start: (n, 7) the pose where each begins, ``end`` (n, 7) where it ends.
+    :param others: those that are no lines, by row.
+    """
+
+    def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
+        """Measure the lines."""
+        self.start, self.end = start, end
+        #: (n,) length [m] and turn of the tool [rad], and travel of the leading joint [rad].
+        self.length = distance_rows(start, end)
+        self.angle = angle_rows(start[:, 3:], end[:, 3:])
+        self.joint_travel = np.zeros(len(start))
+        self.is_line = np.ones(len(start), dtype=np.bool_)
+        self.is_joint_line = ~self.is_line
+        self.others: dict[int, SegmentCurve] = {}
+        for row, curve in others.items():
+            self.put(row, curve)
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    def __getitem__(self, row: int) -> SegmentCurve:
+        if row in self.others:
+            return self.others[row]
+        return LineCurve(
+            pose_from_row(self.start[row].tolist()),
+            pose_from_row(self.end[row].tolist()),
+            float(self.length[row]),
+            float(self.angle[row]),
+        )
+
+    def put(self, row: int, curve: SegmentCurve) -> None:
+        """Replace a curve."""
+        self.start[row], self.end[row] = curve.start.row(), curve.end.row()
+        self.length[row], self.angle[row] = curve.length, curve.angle
+        self.joint_travel[row] = curve.joint_travel
+        self.is_line[row] = isinstance(curve, LineCurve)
+        self.is_joint_line[row] = isinstance(curve, JointLineCurve)
+        self.others.pop(row, None)
+        if not self.is_line[row]:
+            self.others[row] = curve
+
+    @property
+    def samples(self) -> Integers:
+        """(n,) into how many pieces to cut each so that chords follow it."""
+        samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
+        for row, curve in self.others.items():
+            samples[row] = curve.samples
+        return samples
+
+    def rows(self, row: Integers, u: Floats) -> Floats:
+        """Return poses (n, 7) on many curves; ``row`` must not decrease."""
+        on_line = self.is_line[row]
+        if on_line.all():
+            return interpolate_rows(self.start[row], self.end[row], u)
+        rows = np.empty((len(u), 7))
+        lines = row[on_line]
+        rows[on_line] = interpolate_rows(self.start[lines], self.end[lines], u[on_line])
+        for k in np.unique(row[~on_line]).tolist():
+            first, last = np.searchsorted(row, (k, k + 1))
+            rows[first:last] = self.others[k].rows(u[first:last])
+        return rows
+
+    def trim(self, row: Integers, radius: Floats) -> Floats:
+        """Return the ``u`` (n,) at which curves have left balls around their starts."""
+        u = self._line_trim(row, radius)
+        for k in np.flatnonzero(~self.is_line[row]).tolist():
+            u[k] = self.others[int(row[k])].trim(float(radius[k]))
+        return u
+
+    def trim_end(self, row: Integers, radius: Floats) -> Floats:
+        """Return the ``u`` (n,) at which curves come into balls around their ends."""
+        u = 1.0 - self._line_trim(row, radius)
+        for k in np.flatnonzero(~self.is_line[row]).tolist():
+            u[k] = trim_end(self.others[int(row[k])], float(radius[k]))
+        return u
+
+    def _line_trim(self, row: Integers, radius: Floats) -> Floats:
+        length = self.length[row]
+        u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
+        return u
+
+
+class BlendedPath:
+    """
+    The curves of consecutive segments with the blends between them; columns (n,).
+
+    As a :class:`Path` the curve of row k has the number 2k, and the blend after it 2k + 1.
+    """
+
+    def __init__(self, curves: CurveRows) -> None:
+        """Begin without blends."""
+        n = len(curves)
+        self.curves = curves
+        #: The ``u`` where each curve is joined after the blend before, and left for the one after.
+        self.u_join, self.u_leave = np.zeros(n), np.ones(n)
+        #: Of the blend after each curve: distance from the waypoint at which both curves are left
+        #: [m], 0 = none; whether it is a circular arc (``movep``), between lines.
+        self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        #: Its length [m] and turn of the tool [rad], and the number of chords that follow it.
+        self.blend_length, self.blend_angle = np.zeros((2, n))
+        self.blend_samples = np.zeros(n, dtype=np.intp)
+        #: (n, 2) how far the robot's own blend may lie beside it [m], [rad]. It may come as close
+        #: to the waypoint as it likes, or cut across straight: this one is half-way between. The
+        #: turn of the tool may run ahead of its position, or behind it.
+        self.blend_tolerance = np.zeros((n, 2))
+
+    def __getitem__(self, number: int) -> SegmentCurve | Blend:
+        row, is_blend = divmod(number, 2)
+        return Blend(self, row) if is_blend else self.curves[row]
+
+    def blend(self, row: int) -> Blend | None:
+        """Return the blend after a curve, None if there is none."""
+        return Blend(self, row) if 0 <= row < len(self.radius) and self.radius[row] else None
+
+    @property
+    def has_blend_after(self) -> Flags:
+        """Whether there is a blend after each curve."""
+        return self.radius > 0.0
+
+    @property
+    def has_blend_before(self) -> Flags:
+        """Whether there is a blend before each curve."""
+        return np.append(False, self.has_blend_after[:-1])
+
+    def remove_blends(self, first: int, stop: int) -> None:
+        """Remove the blends after the curves of some rows; these then end at their waypoints."""
+        self.radius[first:stop], self.u_leave[first:stop] = 0.0, 1.0
+        self.u_join[first + 1 : stop + 1] = 0.0
+
+    def leave(self, row: Integers, radius: Floats) -> None:
+        """Leave curves where blends will begin, the second curves of which are not known yet."""
+        self.u_leave[row] = self.curves.trim_end(row, radius)
+
+    def make_blends(self, row: Integers, radius: Floats, fillet: Flags) -> None:
+        """Make the blends after curves."""
+        if not len(row):
+            return
+        curves, after = self.curves, row + 1
+        self.leave(row, radius)
+        self.u_join[after] = curves.trim(after, radius)
+        self.radius[row], self.fillet[row] = radius, fillet
+        shapes = BlendShapes(
+            curves.rows(row, self.u_leave[row]),
+            curves.start[after],
+            curves.rows(after, self.u_join[after]),
+            radius,
+            fillet,
+        )
+        self.blend_length[row], self.blend_angle[row] = shapes.lengths(), shapes.turns
+        self.blend_samples[row] = shapes.samples()
+        self.blend_tolerance[row] = shapes.tolerances()
+        for k in row[~(curves.is_line[row] & curves.is_line[after])].tolist():
+            positions = Blend(self, k).rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
+            self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+
+    def extents(self, number: Integers) -> tuple[Floats, Floats]:
+        """Return the lengths (n,) [m], and the turns (n,) of tool or leading joint [rad]."""
+        row, is_blend = number // 2, number % 2 == 1
+        travel, own = self.curves.joint_travel, self.curves.joint_travel[row]
+        length, turn = self.curves.length[row], np.where(own > 0.0, own, self.curves.angle[row])
+        blends, after = row[is_blend], row[is_blend] + 1
+        length[is_blend] = self.blend_length[blends]
+        turn[is_blend] = np.maximum(
+            self.blend_angle[blends],
+            np.maximum(
+                (1.0 - self.u_leave[blends]) * travel[blends], self.u_join[after] * travel[after]
+            ),
+        )
+        return length, turn
+
+    def rows(self, number: Integers, t: Floats) -> Floats:
+        """See :class:`Path`."""
+        row, on_blend = number // 2, number % 2 == 1
+        if not on_blend.any():
+            return self.curves.rows(row, t)
+        rows = np.empty((len(t), 7))
+        rows[~on_blend] = self.curves.rows(row[~on_blend], t[~on_blend])
+        rows[on_blend] = self.blend_rows(row[on_blend], t[on_blend])
+        return rows
+
+    def blend_rows(self, row: Integers, s: Floats) -> Floats:
+        """Return poses (n, 7) in the blends after curves; ``row`` must not decrease."""
+        in_joint_space = self.curves.is_joint_line[row] & self.curves.is_joint_line[row + 1]
+        if not in_joint_space.any():
+            return self._crossfaded(row, s)
+        rows = np.empty((len(s), 7))
+        rows[~in_joint_space] = self._crossfaded(row[~in_joint_space], s[~in_joint_space])
+        for k in np.unique(row[in_joint_space]).tolist():
+            first, last = np.searchsorted(row, (k, k + 1))
+            rows[first:last] = Blend(self, k).rows(s[first:last])
+        return rows
+
+    def _crossfaded(self, row: Integers, s: Floats) -> Floats:
+        """Return poses in blends that crossfade poses."""
+        curves, after = self.curves, row + 1
+        a, b = crossfade(self.u_leave[row], self.u_join[after], s)
+        waypoint = curves.start[after]
+        rows = crossfade_rows(curves.rows(row, a), waypoint, curves.rows(after, b))
+        filleted = np.flatnonzero(self.fillet[row])
+        if len(filleted):
+            of = row[filleted]
+            rows[filleted, :3] = fillet_rows(
+                curves.rows(of, self.u_leave[of])[:, :3],
+                waypoint[filleted, :3],
+                curves.rows(of + 1, self.u_join[of + 1])[:, :3],
+                self.radius[of],
+                s[filleted],
+            )
+        return rows
+
+    def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
+        """See :class:`Path`; the second half of a blend counts to the segment after it."""
+        row, on_blend = number // 2, number % 2 == 1
+        after = on_blend & (t > 0.5)
+        first, second = crossfade(self.u_leave[row], self.u_join[row + on_blend], t)
+        return row + after, np.where(on_blend, np.where(after, second, first), t)
+
+
+@dataclass(frozen=True, slots=True)
+class Blend:
+    """The blend after a curve of a path, over ``s`` in [0, 1]."""
+
+    path: BlendedPath
+    row: int
+    can_start_at_rest: ClassVar[bool] = False
+
+    @property
+    def first(self) -> SegmentCurve:
+        """The curve that it leaves."""
+        return self.path.curves[self.row]
+
+    @property
+    def second(self) -> SegmentCurve:
+        """The curve that it joins."""
+        return self.path.curves[self.row + 1]
+
+    @property
+    def radius(self) -> float:
+        """Distance from the waypoint at which both curves are left [m]."""
+        return float(self.path.radius[self.row])
+
+    @property
+    def fillet(self) -> bool:
+        """Whether it is a circular arc (``movep``)."""
+        return bool(self.path.fillet[self.row])
+
+    @property
+    def leave(self) -> float:
+        """The ``u`` where it leaves the first curve."""
+        return float(self.path.u_leave[self.row])
+
+    @property
+    def join(self) -> float:
+        """The ``u`` where it joins the second curve."""
+        return float(self.path.u_join[self.row + 1])
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return float(self.path.blend_length[self.row])
+
+    @property
+    def angle(self) -> float:
+        """Turn of the tool [rad]."""
+        return float(self.path.blend_angle[self.row])
+
+    @property
+    def samples(self) -> int:
+        """Number of chords that follow it closely enough."""
+        return int(self.path.blend_samples[self.row])
+
+    @property
+    def end(self) -> Pose:
+        """The pose at which it joins the second curve."""
+        return self.pose(1.0)
+
+    def pose(self, s: float) -> Pose:
+        """Return the pose at ``s``."""
+        return pose_from_row(self.rows(np.array([s]))[0])
+
+    @property
+    def in_joint_space(self) -> bool:
+        """Whether it crossfades joint positions instead of tool poses."""
+        return isinstance(self.first, JointLineCurve) and isinstance(self.second, JointLineCurve)
+
+    def joint_rows(self, s: Floats) -> Floats:
+        """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a blend in joint space."""
+        first, second = self.first, self.second
+        assert isinstance(first, JointLineCurve)
+        assert isinstance(second, JointLineCurve)
+        a, b = crossfade(np.array(self.leave), np.array(self.join), s)
+        rows: Floats = first.joint_rows(a) + second.joint_rows(b) - np.array(second.q_start)
+        return rows
+
+    def rows(self, s: Floats) -> Floats:
+        """Return the poses (n, 7) at ``s`` (n,) in [0, 1]."""
+        first = self.first
+        if isinstance(first, JointLineCurve) and self.in_joint_space:
+            return tcp_rows(first.arm, first.T_flange_tcp, self.joint_rows(s))
+        return self.path.blend_rows(np.full(len(s), self.row), s)

@@ -1,0 +1,227 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Segment drafts: the segments as the goal alone defines them, before the kinematics is known.
+
+Lines and arcs follow from the points; joint moves do not, because they begin in the configuration
+in which the path before them arrives.
+"""
+
+from __future__ import annotations
+
+from math import degrees, dist, pi
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import distance_rows, Floats
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows, Flags
+from ur_cartesian_driver.planning.geometry.curves import (
+    HALF_TURN,
+    is_same_pose,
+    LineCurve,
+    SAME_POSITION,
+    SegmentCurve,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
+from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.validate import arc_through_via
+
+_LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
+_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+#: Motions on straight lines in joint space.
+JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+#: What is left of a segment between blends that touch, or that reach its end [m]: more than the
+#: rounding of two poses and two radii to micrometres.
+_MIN_BLEND_GAP = 5e-6
+#: Motions that only some others can be blended into; all others stop before them.
+_BLENDS_FROM = {
+    SegmentType.JOINT: (_LINEAR, _JOINT),
+    SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
+    SegmentType.OPTIMIZED_JOINT: (_LINEAR, _JOINT, *_OPTIMIZED),
+}
+#: By the types of two segments, whether the robot can blend from the one into the other.
+_CAN_BLEND = np.array(
+    [
+        [first in _BLENDS_FROM.get(second, SegmentType) for second in SegmentType]
+        for first in SegmentType
+    ]
+)
+
+
+class SegmentDrafts:
+    """
+    The segments from a waypoint on, a row for each, while their curves and joints are being found.
+
+    :param targets: poses of all waypoints in base (n, 7).
+    :param begin: index of the first waypoint with a motion.
+    :param start: pose of the tool in base.
+    :param remarks: on what is ignored or changed; added to.
+    :raises InvalidGoal: the points define no line or arc, or the first blend is too large.
+    """
+
+    def __init__(
+        self,
+        goal: GoalTable,
+        targets: Floats,
+        begin: int,
+        start: Pose,
+        options: PlanningOptions,
+        remarks: list[str],
+    ) -> None:
+        """Draw lines and arcs."""
+        self._goal, self._options, self._remarks = goal, options, remarks
+        self.begin, self.targets = begin, targets[begin:]
+        self.segments = goal.motions[begin:]
+        types = self.segments.types
+        #: (n,) numbers of types: AUTO resolved, JOINT where that replaces a line or an arc.
+        self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
+        #: (n,) which are straight lines in joint space.
+        self.is_joint_move: Flags = np.isin(self.kinds, JOINT_SPACE_TYPES)
+        # By row, so that they can be put in order.
+        found: list[tuple[int, str]] = []
+        #: (n,) [m]
+        self.radii = self._radii(found)
+        self.path = BlendedPath(self._curves(start, found))
+        remarks += [text for _, text in sorted(found, key=lambda remark: remark[0])]
+        self._check_first_blend(start)
+        self._part_touching_blends(start)
+        self._find_blends()
+        #: (n, 6) the configuration at each waypoint [rad].
+        self.joints = np.zeros((len(self), 6))
+        #: (n,) the ``u`` up to which each curve is solved.
+        self.solved_until = np.ones(len(self))
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def target(self, row: int) -> Pose:
+        """Return the pose of a waypoint in base."""
+        return pose_from_row(self.targets[row].tolist())
+
+    def _find_blends(self) -> None:
+        can_blend = np.append(_CAN_BLEND[self.kinds[:-1], self.kinds[1:]], True)
+        wants_blend = self.radii > SAME_POSITION  # the wire rounds such a radius to 0
+        #: (n,) which are blended into the next one, and which stop because the robot cannot.
+        self.is_blended, self.stops_instead = wants_blend & can_blend, wants_blend & ~can_blend
+
+    def stop_at(self, row: int) -> None:
+        """Do not blend a segment into the next one."""
+        self.radii[row] = 0.0
+        self._find_blends()
+
+    def make_joint_move(self, row: int) -> None:
+        """Replace a line or an arc by a joint move; what follows then begins at its waypoint."""
+        self.kinds[row], self.is_joint_move[row] = _JOINT, True
+        self._find_blends()
+        after = row + 1
+        if after < len(self) and not self.is_joint_move[after]:
+            curve, remark = self._line_or_arc(after, self.target(row))
+            self.path.curves.put(after, curve)
+            self._remarks += [remark] if remark else []
+
+    # -- curves ----------------------------------------------------------------------------------
+
+    def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
+        """Return the lines and arcs; rows of joint moves have no meaning."""
+        starts = np.concatenate([[start.row()], self.targets[:-1]])
+        arcs: dict[int, SegmentCurve] = {}
+        refusal, end = None, len(self)
+        for row in rows_where(self.kinds == SegmentType.CIRCULAR):
+            try:
+                arc, remark = self._line_or_arc(row, pose_from_row(starts[row].tolist()))
+            except InvalidGoal as error:
+                refusal, end = error, row
+                break
+            arcs[row] = arc
+            if row + 1 < len(self):
+                starts[row + 1] = arc.end.row()
+            if remark:
+                remarks.append((row, remark))
+        curves = CurveRows(starts, self.targets.copy(), arcs)
+        is_line = ~self.is_joint_move & curves.is_line
+        for row in rows_where((curves.angle > pi - 2.0 * HALF_TURN)[:end] & is_line[:end]):
+            self._check_turn(row, pose_from_row(starts[row].tolist()))
+        if refusal is not None:
+            raise refusal
+        return curves
+
+    def _line_or_arc(self, row: int, start: Pose) -> tuple[SegmentCurve, str]:
+        """Return the line or the arc of a segment from a pose, and a remark on it or ''."""
+        segments, index, target = self.segments, self.begin + row, self.target(row)
+        if self.kinds[row] != SegmentType.CIRCULAR:
+            self._check_turn(row, start)
+            return LineCurve.between(start, target), ''
+        mode = ArcMode(int(segments.arc_modes[row]))
+        if mode != ArcMode.FIXED:
+            self._check_turn(row, start)
+        via = segments.via(row)
+        assert via is not None
+        arc = arc_through_via(index, start, self._goal.T_base_frame @ via, target, mode)
+        off = arc.end.angle_to(target)
+        if off <= self._options.start_tolerance_angle:
+            return arc, ''
+        return arc, (
+            f'point {index}: the orientation is ignored, because arc_mode FIXED turns the tool '
+            f'with the arc; it arrives {degrees(off):.1f} degrees off'
+        )
+
+    def _check_turn(self, row: int, start: Pose) -> None:
+        """Refuse a turn whose direction is ambiguous."""
+        turn = start.angle_to(self.target(row))
+        if turn > pi - HALF_TURN:
+            raise InvalidGoal(
+                point_field(self.begin + row, 'pose.orientation'),
+                f'turns the tool by {degrees(turn):.2f} degrees, so that the direction of the '
+                'rotation is ambiguous',
+                'add a point in between, or use a JOINT segment',
+            )
+
+    # -- radii -----------------------------------------------------------------------------------
+
+    def _radii(self, remarks: list[tuple[int, str]]) -> Floats:
+        """Return the blend radii that the wire carries (n,) [m]."""
+        radii = self.segments.blend_radii.copy()
+        radii[-1] = 0.0
+        if self._options.dialect.is_coarse:
+            for row in rows_where(radii > 0.0):
+                radii[row], remark = round_blend_radius(
+                    float(radii[row]), self.begin + row, self._options.dialect
+                )
+                if remark:
+                    remarks.append((row, remark))
+        return radii
+
+    def _check_first_blend(self, start: Pose) -> None:
+        if self.radii[0] <= 0.0:
+            return
+        target = self.target(0)
+        if is_same_pose(start, target) and self.begin not in self._goal.waypoints.postures:
+            self.radii[0] = 0.0  # the robot is already there, as the report says
+            return
+        check_blends_fit(self.begin, start.distance_to(target), 0.0, float(self.radii[0]))
+
+    def _part_touching_blends(self, start: Pose) -> None:
+        """
+        Shorten blends that touch each other or the end of a segment.
+
+        Rounded to micrometres they would overlap on the wire, and the robot would skip a point.
+        """
+        radii = self.radii
+        positions = np.concatenate([[start.position], self.targets[:, :3]])
+        lengths = distance_rows(positions[:-1], positions[1:])
+        both = radii + np.append(0.0, radii[:-1])
+        for row in rows_where((both > lengths - 2.0 * _MIN_BLEND_GAP) & (both > 0.0)):
+            before, after = float(radii[row - 1]) if row else 0.0, float(radii[row])
+            # Which of two equal blends is shortened must not depend on rounding.
+            length = dist(positions[row].tolist(), positions[row + 1].tolist())
+            excess = before + after - (length - _MIN_BLEND_GAP)
+            if excess > 0.0 and before + after > 0.0:
+                shortened, radius = (row, after) if after >= before else (row - 1, before)
+                radii[shortened] = self._options.dialect.round_down_radius(
+                    max(radius - excess, 0.0)
+                )
