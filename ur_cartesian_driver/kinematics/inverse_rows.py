@@ -226,12 +226,11 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
 
 def _newton(frames: ChainFramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
     """Return (J'J + square I)^-1 J' error (n, 6), with a bounded largest joint step."""
-    jacobian = jacobian_at(frames, frames.position)
-    transposed = jacobian.transpose(0, 2, 1)
-    normal = transposed @ jacobian
-    normal[:, range(6), range(6)] += np.maximum(squares, MIN_DAMPING)[:, None]
-    gradient = transposed @ errors.T[:, :, None]
-    change: Floats = np.linalg.solve(normal, gradient)[:, :, 0].astype(np.float64)
+    columns = jacobian_at(frames, frames.position).T  # by joint, in one piece of memory
+    normal = np.einsum('ikn,jkn->ijn', columns, columns)
+    normal[range(6), range(6)] += np.maximum(squares, MIN_DAMPING)
+    gradient = np.einsum('ikn,kn->in', columns, errors)
+    change: Floats = np.linalg.solve(normal.T, gradient.T[:, :, None])[:, :, 0].astype(np.float64)
     change *= np.minimum(1.0, _MAX_JOINT_STEP / np.maximum(_max_joint_change(change), 1e-300))[
         :, None
     ]
