@@ -234,5 +234,5 @@ def pose_rows(poses: Iterable[Pose]) -> NDArray[np.float64]:
 
 def pose_from_row(row: Sequence[float] | NDArray[np.float64]) -> Pose:
     """Return the pose of one row ``x y z qx qy qz qw``."""
-    x, y, z, qx, qy, qz, qw = (float(v) for v in row)
+    x, y, z, qx, qy, qz, qw = row.tolist() if isinstance(row, np.ndarray) else row
     return Pose((x, y, z), (qx, qy, qz, qw))

@@ -10,7 +10,7 @@ object when somebody asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -90,14 +90,17 @@ class CurveRows:
         return len(self.length)
 
     def __getitem__(self, row: int) -> SegmentCurve:
-        if row in self.others:
-            return self.others[row]
-        return LineCurve(
-            pose_from_row(self.start[row].tolist()),
-            pose_from_row(self.end[row].tolist()),
-            float(self.length[row]),
-            float(self.angle[row]),
-        )
+        return next(self.objects(slice(row, row + 1)))
+
+    def objects(self, rows: slice) -> Iterator[SegmentCurve]:
+        """Make the curves of some rows."""
+        columns = (self.start, self.end, self.length, self.angle)
+        for row, start, end, length, angle in zip(
+            range(len(self))[rows], *(column[rows].tolist() for column in columns), strict=True
+        ):
+            yield self.others.get(row) or LineCurve(
+                pose_from_row(start), pose_from_row(end), length, angle
+            )
 
     def put(self, row: int, curve: SegmentCurve) -> None:
         """Replace a curve."""

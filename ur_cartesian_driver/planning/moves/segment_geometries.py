@@ -100,8 +100,9 @@ class SegmentGeometries(Sequence[SegmentGeometry]):
 
     def _objects(self, rows: slice) -> Iterator[SegmentGeometry]:
         path = self.path
-        for row, kind, waypoint, segment, joints, time, bound, margin, fraction in zip(
+        for row, curve, kind, waypoint, segment, joints, time, bound, margin, fraction in zip(
             range(len(self))[rows],
+            path.curves.objects(rows),
             self.kinds[rows].tolist(),
             self.waypoints[rows],
             self.segments[rows],
@@ -117,7 +118,7 @@ class SegmentGeometries(Sequence[SegmentGeometry]):
                 kind=_KINDS[kind],
                 waypoint=waypoint,
                 segment=segment,
-                curve=path.curves[row],
+                curve=curve,
                 joints=vector6(joints),
                 time=time if time == time else None,
                 speed_bound=bound,
