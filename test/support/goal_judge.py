@@ -33,8 +33,8 @@ PATH, PATH_TURN = 2e-5, 3e-4
 #: speeds up at most, also if it is optimized [m/s^2], and how near it counts as there [m].
 TURNING, OPTIMIZED_TURNING = 5.0, 12.0
 NEARBY = 0.002
-#: Longest gap between two packets [s]: three in a row are lost.
-MAX_GAP = 0.032
+#: No joint turns farther [rad].
+FULL_TURN = 6.2832
 #: An arc with FIXED orientation may arrive this far off [rad].
 FIXED_TURN = 0.006
 #: Spline: the tolerance of its joints [m].
@@ -246,6 +246,8 @@ class Judge:
         posture = goal.waypoints[last].posture
         if goal.segments and goal.segments[last].arc_mode == ArcMode.FIXED:
             return  # which does not arrive at the pose of the point, unless by chance
+        if max(map(abs, posture.values), default=0.0) > FULL_TURN:
+            return  # no such solution: another one is the nearest
         for name, value in zip(posture.names, posture.values, strict=True):
             if abs(self.q[-1][JOINT_NAMES.index(name)] - value) > 0.01:
                 self.say('posture', f'{name} {self.q[-1][JOINT_NAMES.index(name)]:.3f}')
@@ -307,10 +309,8 @@ class Judge:
             distance, turn = poses_apart(self.tool[row:], target)
             d = distance if radius > 0.0 or fixed else distance + ARM * turn
             reach = 2.0 * REACH + radius
-            if len(around := np.flatnonzero(d < NEARBY)) > 1:
-                gap = float(np.diff(self.t[row + around]).max())
-                braking = OPTIMIZED_TURNING if self._has_optimized(i + 2) else TURNING
-                reach += 0.5 * braking * (0.5 * min(gap, MAX_GAP)) ** 2
+            if radius <= 0.0:
+                reach += self._between_packets(i, row, d)
             least = np.minimum.accumulate(d)
             passed = np.flatnonzero((least <= reach) & (d > least + 1.5e-6))
             if i == last or not len(passed):
@@ -328,6 +328,13 @@ class Judge:
             found.append(_Passage(arrive, depart, self.q[arrive] if fixed else q[0], seen))
             row = arrive if radius > 0.0 else depart
         return found
+
+    def _between_packets(self, i: int, row: int, d: np.ndarray) -> float:
+        """Return how far from a point at which it stops the nearest packets may be [m]."""
+        near = d < NEARBY
+        gaps = np.diff(self.t[row:])[near[1:] & near[:-1]]
+        braking = OPTIMIZED_TURNING if self._has_optimized(i + 2) else TURNING
+        return float(0.5 * braking * (0.5 * gaps.max(initial=0.0)) ** 2)
 
     def _times(self, passages: list[_Passage]) -> None:
         run, in_blends = self.run, self._times_in_blends(passages)
