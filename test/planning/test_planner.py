@@ -95,7 +95,10 @@ def test_a_plain_square_becomes_timed_straight_lines_to_its_poses(cell):
     assert made.remarks[-1] == (
         'tightest margin: 0.369 m to the shoulder singularity at 67 % of the segment to point 1'
     )
-    assert len(made.remarks) == 2  # the other is about clearance
+    assert made.remarks[-2] == (
+        'points 0, 1, 2, 3: the arm stops there, because there is no blend (blend_radius)'
+    )
+    assert len(made.remarks) == 3  # the other is about clearance
 
 
 def test_poses_are_taken_from_the_goals_frame_and_normalised(cell):

@@ -56,6 +56,7 @@ from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlann
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
     segment_lines,
+    stop_remarks,
     tightest_remark,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
@@ -186,6 +187,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         *(timing.remark for timing in timings if timing.remark),
         *blend_remarks(goal, geometries, timings),
         *lines,
+        *stop_remarks(geometries),
         tightest_remark(geometries),
     ]
     return planner.plan(goal, segments, reference, remarks)

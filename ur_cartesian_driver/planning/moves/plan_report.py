@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primit
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
 from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
+from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
 
 def segment_line(
@@ -60,6 +61,14 @@ def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
     """Return the remark about the tightest margin of the goal."""
     geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.normalized)
     return f'tightest margin: {geometry.tightest_margin} of the segment to point {geometry.index}'
+
+
+def stop_remarks(geometries: Sequence[SegmentGeometry]) -> list[str]:
+    """Return at which inner points the arm stops."""
+    lines: list[str] = []
+    stops = [geometry.index for geometry in geometries[:-1] if geometry.blend_after is None]
+    add_remark(lines, stops, 'the arm stops there, because there is no blend (blend_radius)')
+    return lines
 
 
 def blend_remarks(
