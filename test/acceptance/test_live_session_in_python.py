@@ -34,6 +34,10 @@ def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
     for _ in range(30):
         motion = driver.send_live_target(target)
         sleep(0.02)
+    # servoj creeps to its last set-point; on a busy computer in less simulated time than passes.
+    while ur_sim.state().T_base_tcp.angle_to(target) > 5e-6:
+        driver.send_live_target(target)
+        sleep(0.02)
     with pytest.raises(RobotNotReady, match='A motion is running'):
         driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=here, time=1.0),))))
     with pytest.raises(InvalidGoal, match='max_approach_distance'):

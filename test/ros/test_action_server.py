@@ -198,3 +198,14 @@ def test_callbacks_go_on_while_a_goal_runs(single_cell):
     assert answer.values[0].string_value == 'ur5e'
     assert moving(cell)
     assert cell.result(handle)[0] == SUCCEEDED
+
+
+def test_an_executor_that_is_shut_down_first_stops_the_arm_without_a_traceback(single_cell):
+    cell = single_cell
+    cell.send(far_away(cell))
+    cell.spin_until(lambda: moving(cell))
+    cell.executor.shutdown()
+    cell.node.destroy_node()  # an exception in the goal's thread fails the test
+    deadline = monotonic() + 5.0
+    while moving(cell):
+        assert monotonic() < deadline, 'the arm goes on'

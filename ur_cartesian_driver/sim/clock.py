@@ -21,7 +21,7 @@ _LOOP_GRAIN = 0.001
 #: A clock that is late by more than this [s] (suspended process, overloaded machine) starts anew
 #: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and while cycles race
 #: no client could answer in time.
-_MAX_LAG = 0.1
+MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 
 
@@ -58,14 +58,16 @@ class VirtualClock:
 class RealClock:
     """Absolute deadlines, one cycle apart on the monotonic clock."""
 
-    def __init__(self, cycle: float, rate: float = 1.0) -> None:
+    def __init__(self, cycle: float, rate: float = 1.0, max_lag: float = MAX_LAG) -> None:
         """
         Begin with the first deadline one cycle from the first call.
 
         :param cycle: [s] of simulated time.
         :param rate: seconds of simulated time per second.
+        :param max_lag: how late a cycle may be [s] before the clock starts anew; `math.inf` = it
+            catches up however late it is, for who measures motions and answers no program.
         """
-        self._period, self._rate = cycle / rate, rate
+        self._period, self._rate, self._max_lag = cycle / rate, rate, max_lag
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
@@ -85,7 +87,7 @@ class RealClock:
             time.sleep(rest)  # noqa: ASYNC251
         late = max(0.0, time.monotonic() - deadline)
         self._late.append(late)
-        if late > _MAX_LAG:
+        if late > self._max_lag:
             self._start, self._count, self.slips = time.monotonic(), 0, self.slips + 1
             self.skipped += late * self._rate
 

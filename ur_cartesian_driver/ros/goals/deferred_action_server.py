@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 import gc
 from typing import Any, TypeAlias
 
 from rclpy.action.server import ActionServer
+from rclpy.exceptions import InvalidHandle
 
 GoalHandle: TypeAlias = Any
 
@@ -47,7 +49,10 @@ class DeferredActionServer(ActionServer):
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
         """Have the executor call back for the result and send it; from any thread."""
         executor = self._node.executor
-        if executor is not None:  # None: the node is being destroyed
+        if executor is None:  # the node is being destroyed
+            return
+        # An executor that has been shut down has no guard condition any more, or an invalid one.
+        with contextlib.suppress(AttributeError, InvalidHandle):
             # A plain function, because a coroutine that no executor runs any more would warn.
             executor.create_task(self._hand_over, goal_handle, callback)
 
