@@ -36,6 +36,11 @@ def pytest_addoption(parser):
         action='store_true',
         help='let every other worker of -n run tests that compute while the others wait',
     )
+    parser.addoption(
+        '--no-computing',
+        action='store_true',
+        help='leave out the tests that only compute; what waits, for clocks and sockets, runs',
+    )
 
 
 def pytest_configure(config):
@@ -44,6 +49,14 @@ def pytest_configure(config):
 
         if is_for_computing(config.workerinput['workerid']):
             os.nice(LOW_PRIORITY)
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption('--no-computing'):
+        from overlap import rank
+
+        config.hook.pytest_deselected(items=[item for item in items if rank(item.nodeid) >= 0])
+        items[:] = [item for item in items if rank(item.nodeid) < 0]
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -43,6 +43,11 @@ def is_for_computing(worker: str) -> bool:
     return int(worker.removeprefix('gw')) % 2 == 1
 
 
+def rank(test: str) -> int:
+    """Return the place of a test's path among those that compute; -1: it waits."""
+    return next((i for i, path in enumerate(COMPUTING) if test.startswith(path)), -1)
+
+
 class Overlap(LoadScheduling):
     """Gives each worker tests of its kind."""
 
@@ -76,6 +81,4 @@ class Overlap(LoadScheduling):
             node.send_runtest_some(tests)
 
     def _rank(self, test):
-        """Return the place of a test's folder among those that compute; -1: it waits."""
-        name = self.collection[test]
-        return next((i for i, path in enumerate(COMPUTING) if name.startswith(path)), -1)
+        return rank(self.collection[test])
