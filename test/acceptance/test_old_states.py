@@ -21,8 +21,12 @@ REACTION = 0.6
 
 @pytest.fixture
 def driver(make_driver):
-    """A driver whose loop shares no interpreter with the robot, with a long bound."""
-    made = make_driver(robot_loop='process', max_state_age=0.5)
+    """
+    A driver whose loop shares no interpreter with the robot, with a long bound.
+
+    The robot program waits for longer than any pause of a busy computer.
+    """
+    made = make_driver(robot_loop='process', max_state_age=0.5, robot_receive_timeout=4.0)
     try:
         made.wait_ready(30.0)
     except RobotNotReady:  # on a busy computer the loop was started again, and its program ended
@@ -74,7 +78,7 @@ def test_a_congested_link_makes_no_reaction_late(ur_sim, driver, motion):
 
 
 def test_a_loop_that_was_given_no_time_stops_the_arm(ur_sim, driver, motion):
-    """The robot program waits for longer here; what the loop then reads is too old."""
+    """The robot program waits for longer; what the loop then reads is too old."""
     loop = driver._loop.host.pid
     os.kill(loop, signal.SIGSTOP)
     sleep(0.8)

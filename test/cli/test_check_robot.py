@@ -24,11 +24,6 @@ pytestmark = pytest.mark.slow
 FOREIGN = 'def foreign():\n  while True:\n    sync()\n  end\nend\n'
 
 
-def closed_port():
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        return server.getsockname()[1]
-
-
 @pytest.fixture
 def check(ur_sim, tmp_path, capsys):
     """Run the command; returns its status, what it printed, and the report's findings by name."""
@@ -119,8 +114,8 @@ def test_software_that_is_too_old_is_a_problem(check):
         ('dashboard', 'remote_control', 0, 'services below ~/dashboard/ will not work'),
     ],
 )
-def test_a_closed_port_is_one_sentence(check, interface, finding, status, words):
-    code, printed, findings = check(**{interface: closed_port()})
+def test_a_closed_port_is_one_sentence(check, closed_port, interface, finding, status, words):
+    code, printed, findings = check(**{interface: closed_port})
     assert code == status
     assert words in findings[finding]['text']
     assert findings[finding]['text'].count('.') <= 5  # those of the address
@@ -128,14 +123,14 @@ def test_a_closed_port_is_one_sentence(check, interface, finding, status, words)
 
 
 @pytest.mark.ur_sim(polyscope='10.14')
-def test_a_closed_robot_api_is_one_sentence(check):
-    code, _, findings = check(**{'robot-api': closed_port()})
+def test_a_closed_robot_api_is_one_sentence(check, closed_port):
+    code, _, findings = check(**{'robot-api': closed_port})
     assert code == 0
     assert '(Robot API): connection refused' in findings['remote_control']['text']
 
 
-def test_nobody_at_the_address_has_a_status_of_its_own(check):
-    code, _, findings = check(rtde=closed_port(), primary=closed_port())
+def test_nobody_at_the_address_has_a_status_of_its_own(check, closed_port):
+    code, _, findings = check(rtde=closed_port, primary=closed_port)
     assert code == 3
     assert set(findings) == {'rtde', 'primary', 'other_ports'}
 

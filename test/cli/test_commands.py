@@ -137,18 +137,9 @@ def test_where_prints_a_point_that_can_be_pasted_into_a_goal(ur_sim, capsys):
     assert (position.x, position.y, position.z) == pytest.approx(expected, abs=1e-6)
 
 
-def test_where_nobody_is_says_so(capsys, unused_port):
-    assert main(['where', '--rtde-port', str(unused_port)]) == 1
-    assert f'port {unused_port}' in capsys.readouterr().err
-
-
-@pytest.fixture
-def unused_port():
-    import socket
-
-    with socket.socket() as s:
-        s.bind(('127.0.0.1', 0))
-        yield s.getsockname()[1]
+def test_where_nobody_is_says_so(capsys, closed_port):
+    assert main(['where', '--rtde-port', str(closed_port)]) == 1
+    assert f'port {closed_port}' in capsys.readouterr().err
 
 
 def test_an_arm_that_is_said_to_stand_somewhere_stands_there():
