@@ -18,7 +18,8 @@ pytestmark = [
     pytest.mark.ur_sim(frequency=125.0, geometry=random_calibration(robot_model('ur5e'), 7)),
 ]
 
-OPTIONS = {'live_target_timeout': 0.3}
+#: servoj creeps to the last target; on a busy computer in less simulated time than passes.
+OPTIONS = {'live_target_timeout': 1.0}
 
 
 def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
@@ -33,10 +34,6 @@ def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
     target = type(here)((x + 0.02, y + 0.03, z), turned)
     for _ in range(30):
         motion = driver.send_live_target(target)
-        sleep(0.02)
-    # servoj creeps to its last set-point; on a busy computer in less simulated time than passes.
-    while ur_sim.state().T_base_tcp.angle_to(target) > 5e-6:
-        driver.send_live_target(target)
         sleep(0.02)
     with pytest.raises(RobotNotReady, match='A motion is running'):
         driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=here, time=1.0),))))

@@ -46,7 +46,7 @@ class Cell:
         while monotonic() < end:
             self.executor.spin_once(timeout_sec=0.01)
 
-    def until(self, condition, bound=10.0):
+    def until(self, condition, bound=60.0):
         end = monotonic() + bound
         while not condition():
             assert monotonic() < end, 'it did not happen in time'

@@ -93,7 +93,7 @@ class Cell:
         self.executor.shutdown()
         rclpy.shutdown(context=self.context)
 
-    def spin_until(self, condition, timeout=10.0):
+    def spin_until(self, condition, timeout=60.0):
         deadline = monotonic() + timeout
         while not (value := condition()):
             assert monotonic() < deadline, 'it did not happen in time'
@@ -104,7 +104,7 @@ class Cell:
         self.spin_until(lambda: self.node.driver.status.state is ConnectionState.READY)
         self.spin_until(self.client.server_is_ready)
 
-    def await_(self, future, timeout=20.0):
+    def await_(self, future, timeout=60.0):
         self.spin_until(future.done, timeout)
         return future.result()
 

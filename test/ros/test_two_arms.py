@@ -69,7 +69,7 @@ class Cell:
             self.executor.add_node(node)
         stack.callback(self.executor.shutdown)
 
-    def spin_until(self, condition, timeout=10.0):
+    def spin_until(self, condition, timeout=60.0):
         deadline = monotonic() + timeout
         while not condition():
             assert monotonic() < deadline, 'it did not happen in time'

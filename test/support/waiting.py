@@ -5,7 +5,7 @@
 from time import monotonic, sleep
 
 
-def wait_for(condition, timeout=5.0, describe=lambda: ''):
+def wait_for(condition, timeout=30.0, describe=lambda: ''):
     """Return when the condition holds, fail when it does not within the timeout [s]."""
     end = monotonic() + timeout
     while not condition():
