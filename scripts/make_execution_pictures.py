@@ -49,10 +49,10 @@ def a_goal(
         from ur_cartesian_driver.kinematics.chain import Arm
         from ur_cartesian_driver.kinematics.robot_models import robot_model
         from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+        from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
         from ur_cartesian_driver.planning import plan, PlanningOptions
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-        from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
         from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 
         state = cell.memory.read()

@@ -133,10 +133,10 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
     from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.motion.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-    from ur_cartesian_driver.ros.tf.known_frames import Frames
     from ur_cartesian_driver.sim import HOME
 
     arm = Arm(robot_model('ur5e'))
@@ -150,10 +150,10 @@ def test_plain_goal_passes_planning_from_home():
     from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.motion.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-    from ur_cartesian_driver.ros.tf.known_frames import Frames
     from ur_cartesian_driver.sim import HOME
 
     (body,) = blocks(CHECKOUT / 'doc' / 'goals.md', 'yaml')

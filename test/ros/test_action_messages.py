@@ -11,6 +11,7 @@ import pytest
 from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_error
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
@@ -25,7 +26,6 @@ from ur_cartesian_driver.ros.messages.state_messages import (
     status_message,
     tcp_pose_message,
 )
-from ur_cartesian_driver.ros.tf.known_frames import Frames
 
 STAMP = Time(sec=5, nanosec=6)
 NAMES = tuple('abcdef')

@@ -8,13 +8,13 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import check, plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 FOLDER = share_path() / 'config' / 'examples'
 NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))

@@ -18,6 +18,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SafeOutput, SegmentType
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.msg import (
     CartesianPosture,
@@ -32,7 +33,6 @@ from ur_cartesian_driver.ros.messages.goal_conversion import (
     goal_from_message,
     resolve_frames,
 )
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 
 NOW = 1_800_000_000_123_456_789

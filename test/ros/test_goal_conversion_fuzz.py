@@ -22,6 +22,7 @@ from rosidl_parser.definition import (
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
@@ -30,7 +31,6 @@ from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.parameters.node_parameters import defaults, settings_from
 from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterError
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 ARM = Arm(robot_model('ur5e'))

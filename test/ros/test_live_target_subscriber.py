@@ -15,6 +15,7 @@ from ur_cartesian_driver.driver.live_session import check_target
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames, StaticFrame
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoActivity, ServoReport
@@ -24,7 +25,6 @@ from ur_cartesian_driver.ros.live.live_target_subscriber import (
     TargetInhibitor,
 )
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames, StaticFrame
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 HERE = Arm(robot_model('ur5e')).forward(HOME)

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.ros.client import GoalFileError, load_goal
+from ur_cartesian_driver.goal_files import GoalFileError
+from ur_cartesian_driver.ros.client import load_goal
 
 
 def test_a_goal_reads_as_in_ros2_action_send_goal():

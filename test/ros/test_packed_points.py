@@ -14,6 +14,7 @@ import pytest
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused, InvalidGoal
 from ur_cartesian_driver.motion.goal import Posture, SegmentType
+from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTrajectoryPoint,
@@ -26,7 +27,6 @@ from ur_cartesian_driver.ros.messages.goal_conversion import (
     appended_points_from_message,
     goal_from_message,
 )
-from ur_cartesian_driver.ros.tf.known_frames import Frames
 from ur_cartesian_driver.srv import AppendPoints
 
 TYPES = (MotionSegment.LINEAR, MotionSegment.JOINT, MotionSegment.CIRCULAR, MotionSegment.PROCESS)

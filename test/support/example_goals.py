@@ -5,12 +5,12 @@
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 
 def example_goal(name: str, state: RobotState) -> Goal:

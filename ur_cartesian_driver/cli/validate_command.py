@@ -27,11 +27,11 @@ from ur_cartesian_driver.sim import SimulatorConfig
 
 def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from the given joint positions, and print the plan or the refusal."""
+    from ur_cartesian_driver.motion.known_frames import ArmSnapshot
     from ur_cartesian_driver.planning import plan
     from ur_cartesian_driver.preview import postures, table
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
-    from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot
 
     settings = read_settings(arguments.params_file, arguments.param)
     model = robot_model(arguments.ur_type or settings.driver.ur_type)

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
-from importlib import import_module
 import os
-from pathlib import Path
 import signal
 import threading
 from time import monotonic
@@ -26,20 +24,14 @@ from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rosidl_parser.definition import (
-    AbstractSequence,
-    AbstractString,
-    Array,
-    BasicType,
-    NamespacedType,
-)
-import yaml
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.goal_files.goal_file import read_goal_file
+from ur_cartesian_driver.goal_files.goal_reading import is_packed, point_rows, segment_rows
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.msg import CartesianTrajectory, DriverStatus
-from ur_cartesian_driver.ros.messages.goal_conversion import point_rows, segment_rows
-from ur_cartesian_driver.ros.messages.packed_points import is_packed, packed_points
+from ur_cartesian_driver.ros.messages.goal_messages import message_of
+from ur_cartesian_driver.ros.messages.packed_points import packed_points
 
 Message: TypeAlias = Any
 
@@ -54,16 +46,6 @@ SERVER_TIMEOUT = 3.0
 #: From so many points on a goal is sent in flat arrays.
 MANY_POINTS = 200
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_INTEGERS = {
-    f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
-    for sign in ('', 'u')
-    for bits in (8, 16, 32, 64)
-}
-_FLOATS = ('float', 'double', 'long double')
-
-
-class GoalFileError(ValueError):
-    """A text is not a goal; the sentence names the key."""
 
 
 # ---- reading ----------------------------------------------------------------------------------
@@ -77,19 +59,7 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
     :raises GoalFileError: the text is not YAML, or a key or value does not fit the action.
     :raises OSError: the file cannot be read.
     """
-    text = source if isinstance(source, str) else Path(source).read_text(encoding='utf-8')
-    name = '' if isinstance(source, str) else f'{os.fspath(source)}: '
-    try:
-        values = yaml.safe_load(text)
-        goal = FollowCartesianTrajectory.Goal()
-        _fill(goal, {} if values is None else values, '')
-    except yaml.YAMLError as error:
-        raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
-    except RecursionError:
-        raise GoalFileError(f'{name}the goal is nested too deeply to be one.') from None
-    except ValueError as error:  # PyYAML's, of a date that does not exist, say
-        raise GoalFileError(f'{name}{str(error).rstrip(".")}.') from None
-    return goal
+    return message_of(read_goal_file(source), FollowCartesianTrajectory.Goal)
 
 
 def add_tf_prefix(
@@ -110,57 +80,6 @@ def add_tf_prefix(
 
 def _prefixed(tf_prefix: str, name: str) -> str:
     return tf_prefix + name if name else ''
-
-
-def _fill(message: Message, values: object, key: str) -> None:
-    """Set the named fields of a message; the others keep their defaults."""
-    if not isinstance(values, dict):
-        raise GoalFileError(f'{key or "the goal"} is {values!r}, but must be a mapping of fields.')
-    types = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
-    for name, value in values.items():
-        path = f'{key}.{name}' if key else str(name)
-        if name not in types:
-            raise GoalFileError(
-                f'{path} is not a field; {key or "a goal"} has {", ".join(types)}.'
-            )
-        setattr(message, name, _value(types[name], value, path))
-
-
-def _value(kind: Any, value: object, key: str) -> Any:
-    """Return a value as the type of its field."""
-    if isinstance(kind, NamespacedType):
-        message = getattr(import_module('.'.join(kind.namespaces)), kind.name)()
-        _fill(message, value, key)
-        return message
-    if isinstance(kind, (AbstractSequence, Array)):
-        if not isinstance(value, list):
-            raise GoalFileError(f'{key} is {value!r}, but must be a list.')
-        return [_value(kind.value_type, item, f'{key}[{i}]') for i, item in enumerate(value)]
-    if isinstance(kind, AbstractString):
-        if not isinstance(value, str):
-            raise GoalFileError(f'{key} is {value!r}, but must be a text; put it in quotes.')
-        return value
-    assert isinstance(kind, BasicType), kind
-    return _number(kind.typename, value, key)
-
-
-def _number(typename: str, value: object, key: str) -> bool | int | float:
-    if typename == 'boolean':
-        if not isinstance(value, bool):
-            raise GoalFileError(f'{key} is {value!r}, but must be true or false.')
-        return value
-    if typename in _FLOATS:
-        # YAML reads 1e-3 as a text; its own form is 1.0e-3.
-        with contextlib.suppress(ValueError):
-            if isinstance(value, (int, float, str)) and not isinstance(value, bool):
-                return float(value)
-        raise GoalFileError(f'{key} is {value!r}, but must be a number.')
-    low, high = _INTEGERS[typename]
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise GoalFileError(
-            f'{key} is {value!r}, but must be a whole number from {low} to {high}.'
-        )
-    return value
 
 
 def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:

@@ -25,12 +25,12 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
 from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalContext, GoalHandle, GoalRun
 from ur_cartesian_driver.ros.messages.action_messages import result_message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
-from ur_cartesian_driver.ros.tf.known_frames import Frames
 from ur_cartesian_driver.ros.tf.tf_lookup import listen_to_tf
 
 #: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.

@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
@@ -37,7 +38,6 @@ from ur_cartesian_driver.ros.message_fields import nanoseconds
 from ur_cartesian_driver.ros.messages.action_messages import feedback_message, FeedbackFrame
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message, resolve_frames
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 GoalHandle: TypeAlias = Any
 

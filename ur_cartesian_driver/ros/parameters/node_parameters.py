@@ -21,13 +21,13 @@ from rclpy.parameter import Parameter
 
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     DECLARATIONS,
     ParameterError,
     ParameterValue,
 )
-from ur_cartesian_driver.ros.tf.known_frames import Frames, StaticFrame
 
 #: Fields that the driver detects; they are no parameters.
 _DETECTED_OPTIONS = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')

@@ -19,13 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, sqrt
+from typing import Protocol, TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
+
+G = TypeVar('G', bound=Goal)
 
 #: ``base_link`` in ``base``.
 T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
@@ -89,6 +92,16 @@ class ArmSnapshot:
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
 
+class FrameLookup(Protocol):
+    """Where frames of others are looked up: ``ros.tf.tf_lookup`` does, in tf2."""
+
+    def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
+        """Return the pose of the source frame in the target frame at a time [ns], 0 = now."""
+
+    def T_static(self, field: str, target: str, source: str) -> Pose:
+        """Return the pose of a frame that is fixed to the target frame."""
+
+
 class Frames:
     """The frames of this driver, with ``tf_prefix`` in the names of the robot's own."""
 
@@ -102,7 +115,7 @@ class Frames:
         self.base = tf_prefix + BASE
         self.tcp = tf_prefix + TCP
         self.tool0 = tf_prefix + TOOL0
-        self._transforms: TransformLookup | None = None
+        self._transforms: FrameLookup | None = None
         resolved = _resolve_static_frames(
             {
                 self.base: (self.base, IDENTITY),
@@ -118,11 +131,36 @@ class Frames:
             for of in (self.base, self.tool0, self.tcp)
         )
 
-    def with_transforms(self, transforms: TransformLookup | None) -> Frames:
+    def with_transforms(self, transforms: FrameLookup | None) -> Frames:
         """Return these frames with those of tf2."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames
+
+    def resolve(
+        self,
+        goal: G,
+        frame_id: str,
+        controlled_frame: str,
+        snapshot: ArmSnapshot | None = None,
+        at: int = 0,
+    ) -> G:
+        """
+        Return a goal with the present poses of its frame and of its controlled frame.
+
+        :param snapshot: for frames that move with the arm; None if the arm's pose is not known.
+        :param at: time of tf2 transforms [ns]; 0 = the newest.
+        :raises InvalidGoal: a frame is unknown.
+        :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
+        """
+        T_flange_controlled = self.T_flange_frame(controlled_frame, snapshot)
+        return replace(
+            goal,
+            T_base_frame=self.T_base_frame(frame_id, snapshot, at=at),
+            T_flange_controlled=T_flange_controlled,
+            # Empty for the active TCP, also if it was given by name.
+            controlled_frame='' if T_flange_controlled is None else controlled_frame,
+        )
 
     def T_base_frame(self, name: str, snapshot: ArmSnapshot | None = None, at: int = 0) -> Pose:
         """
