@@ -26,8 +26,8 @@ GONE = {
     # goals and plans
     'TcpKinematics': 'Reach',
     'SegmentDrafts': 'Draft Drafts',
-    'SegmentGeometry, MovePath': 'Leg',
-    'SegmentTiming': 'Timing',
+    'SegmentGeometries, MovePath': 'Leg',
+    'SegmentTimings': 'Timing',
     'JointPathPlanner': 'Route',
     'PathMargins, TightestMargin': 'Survey Surveyed survey Nearest nearest_of nearest_in',
     'Blend, BlendedPath, BlendPath': 'Corner JointCorner ToolCorner Meeting meetings round_ones',

@@ -427,7 +427,7 @@ def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
         tuple(q + 0.3),
         tuple(q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))),
     )
-    blend = path_of([way, back], 0.02).blend(0)
+    blend = path_of([way, back], 0.02)[1]
     rows = blend.joint_rows(np.array((0.0, 1.0)))
     assert rows[0] == pytest.approx(way.joints(blend.leave))
     assert rows[1] == pytest.approx(back.joints(blend.join))

@@ -15,7 +15,7 @@ path and report. The first reason for a refusal is raised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
@@ -31,11 +31,12 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     RobotNotReady,
 )
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, SegmentType
+from ur_cartesian_driver.motion.goal_table import NO_POSTURE, rows_where
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import Floats, PoseRows, transform_rows
+from ur_cartesian_driver.motion.pose_rows import PoseRows, transform_rows
 from ur_cartesian_driver.motion.primitive import (
     Joints,
     MoveC,
@@ -49,8 +50,8 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import ZERO6
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import (
@@ -60,10 +61,9 @@ from ur_cartesian_driver.planning.moves.plan_report import (
     tightest_remark,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
-from ur_cartesian_driver.planning.moves.segment_timing import schedule
+from ur_cartesian_driver.planning.moves.segment_timing import schedule, SegmentTimings
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
@@ -106,16 +106,14 @@ CB3_STATIC_ERROR = 3e-4
 MAX_MISMATCH_POSITION = 0.015
 MAX_MISMATCH_ANGLE = 0.05
 
-#: The kind of the primitive's row, by type; that of an arc has no meaning.
-_KINDS = {
-    SegmentType.JOINT: MOVES.index(MoveJ),
-    SegmentType.LINEAR: MOVES.index(MoveL),
-    SegmentType.CIRCULAR: MOVES.index(MoveL),
-    SegmentType.PROCESS: MOVES.index(MoveP),
-    SegmentType.OPTIMIZED_JOINT: MOVES.index(OptimoveJ),
-    SegmentType.OPTIMIZED_LINEAR: MOVES.index(OptimoveL),
+_CLASSES = {
+    SegmentType.JOINT: MoveJ,
+    SegmentType.PROCESS: MoveP,
+    SegmentType.OPTIMIZED_JOINT: OptimoveJ,
+    SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
-
+#: The kind of the primitive's row, by type; that of an arc has no meaning.
+_MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
 
 #: A planner in the registry of execution modes.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
@@ -158,8 +156,7 @@ def _plan(
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are joined by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
-    table = planner.geometries()
-    geometries = list(table)
+    geometries = planner.geometries()
     samples = planner.samples
     lines = clearance_lines(
         arm,
@@ -170,21 +167,18 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         samples.segment,
         samples.fraction,
     )
-    margins = planner.joint_path_planner.path_margins
-    timings, chain = schedule(
-        geometries, options, arm.model, margins.blend_samples, planner.running
+    blend_samples = planner.joint_path_planner.path_margins.blend_samples
+    timings = schedule(geometries, options, arm.model, blend_samples, planner.running)
+    reference = reference_path(
+        state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
-    entries = chain.blend_entries
-    reference = reference_path(state.actual_tcp_pose, table.path, geometries, chain.times)
+    segments = planner.segments(geometries, timings)
     segments = place_outputs(
-        planner.segments(geometries, timings, entries),
-        reference,
-        goal.io_commands,
-        blend_halves=entries[:, -1],
+        segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
     )
     remarks = [
         *ignored_remarks(goal),
-        *(timing.remark for timing in timings if timing.remark),
+        *(remark for _, remark in sorted(timings.remarks.items())),
         *blend_remarks(goal, geometries, timings),
         *lines,
         *stop_remarks(geometries),
@@ -315,61 +309,43 @@ class GoalPlanner:
             execution=self.mode,
         )
 
-    def segments(
-        self,
-        geometries: Sequence[SegmentGeometry],
-        timings: Sequence[SegmentTiming],
-        blend_entries: Floats,
-    ) -> PlannedRows:
-        """
-        Return the primitive of each segment and what is expected of it.
-
-        :param blend_entries: (n, 5) as in the rows.
-        """
-        n = len(geometries)
-        joints = np.array([geometry.joints for geometry in geometries])
-        kinds = np.array([_KINDS[geometry.kind] for geometry in geometries])
+    def segments(self, geometries: SegmentGeometries, timings: SegmentTimings) -> PlannedRows:
+        """Return the primitive of each segment and what is expected of it."""
+        kinds, curves = geometries.kinds, geometries.path.curves
         moves = MoveRows(
-            kinds=kinds,
-            targets=self.targets[geometries[0].index :].rows,
-            q_near=joints,
-            has_q_near=np.array([geometry.kind in JOINT_SPACE_TYPES for geometry in geometries]),
-            velocities=np.array([timing.velocity for timing in timings]),
-            accelerations=np.array([timing.acceleration for timing in timings]),
-            durations=np.array([timing.wire_time for timing in timings]),
-            blend_radii=np.array(
-                [
-                    geometry.blend_after.radius if geometry.blend_after else 0.0
-                    for geometry in geometries
-                ]
-            ),
+            kinds=_MOVE_OF[kinds],
+            targets=self.targets.rows[geometries.begin :],
+            q_near=geometries.joints,
+            has_q_near=np.isin(kinds, JOINT_SPACE_TYPES),
+            velocities=timings.velocities,
+            accelerations=timings.accelerations,
+            durations=timings.wire_times,
+            blend_radii=geometries.path.radius,
             others={},
         )
         others = {
-            row: self._special(geometry, moves, row)
-            for row, geometry in enumerate(geometries)
-            if self._is_special(geometry)
+            row: self._special(geometries, moves, row) for row in self._special_rows(geometries)
         }
         moves = replace(moves, others=others)
+        indices = np.arange(geometries.begin, geometries.begin + len(geometries), dtype=np.int32)
         return PlannedRows(
-            waypoints=np.arange(geometries[0].index, geometries[0].index + n, dtype=np.int32),
-            lengths=np.array([geometry.curve.length for geometry in geometries]),
-            angles=np.array([geometry.curve.angle for geometry in geometries]),
-            durations=np.array([timing.duration for timing in timings]),
-            blend_entries=blend_entries,
-            joints=joints,
+            waypoints=indices,
+            lengths=curves.length,
+            angles=curves.angle,
+            durations=timings.durations,
+            blend_entries=timings.chain.blend_entries,
+            joints=geometries.joints,
             primitives=moves,
             report_lines=segment_lines(geometries, timings, moves, self.reasons),
         )
 
-    def _is_special(self, geometry: SegmentGeometry) -> bool:
-        """Tell whether a primitive is more than a row of numbers."""
-        return (
-            geometry.waits
-            or geometry.kind == SegmentType.CIRCULAR
-            or bool(geometry.waypoint.posture)
-            or not self.options.dialect.supports_q_near
-        )
+    def _special_rows(self, geometries: SegmentGeometries) -> list[int]:
+        """Return the rows whose primitives are more than numbers."""
+        special = geometries.kinds == SegmentType.CIRCULAR
+        special |= not self.options.dialect.supports_q_near
+        special[list(geometries.waypoints.postures)] = True
+        special[0] |= geometries.waits
+        return rows_where(special)
 
     # -- checks of the start ---------------------------------------------------------------------
 
@@ -433,92 +409,92 @@ class GoalPlanner:
 
     # -- primitives ------------------------------------------------------------------------------
 
-    def _special(self, geometry: SegmentGeometry, moves: MoveRows, row: int) -> Primitive:
+    def _special(self, geometries: SegmentGeometries, moves: MoveRows, row: int) -> Primitive:
         """Return a primitive that is more than its row of numbers."""
+        point, kind = geometries.begin + row, geometries.kinds[row]
+        joints = vector6(geometries.joints[row].tolist())
         primitive: Primitive
-        if geometry.waits:  # no move of the robot does: a spline in which the joints rest
+        if geometries.waits and row == 0:  # no move of the robot does: a spline that rests
             primitive = Spline(
                 target=self.state.actual_q,
                 velocities=ZERO6,
                 duration=float(moves.durations[row]),
             )
-        elif geometry.kind == SegmentType.CIRCULAR:
-            primitive = self._arc(geometry, moves, row)
+        elif kind == SegmentType.CIRCULAR:
+            primitive = self._arc(geometries, moves, row, joints)
         else:
             move = moves[row]
             assert not isinstance(move, MoveC | Spline)
             primitive = move
-            if geometry.kind in JOINT_SPACE_TYPES or geometry.waypoint.posture:
-                primitive = replace(move, q_near=self._q_near(geometry))
-        primitive, reason = adapt_to_dialect(
-            primitive, geometry.index, geometry.joints, self.options
-        )
+            if kind in JOINT_SPACE_TYPES or row in geometries.waypoints.postures:
+                primitive = replace(move, q_near=self._q_near(point, joints))
+        primitive, reason = adapt_to_dialect(primitive, point, joints, self.options)
         if reason:
-            self.reasons.setdefault(geometry.index, []).append(reason)
+            self.reasons.setdefault(point, []).append(reason)
         return primitive
 
-    def _q_near(self, geometry: SegmentGeometry) -> Joints:
+    def _q_near(self, point: int, joints: Joints) -> Joints:
         """Return the chosen solution; a full posture itself where it selects the same one."""
-        wanted = full_posture(named_joints(geometry.waypoint.posture, self.options.tf_prefix))
+        posture = self.goal.waypoints.postures.get(point, NO_POSTURE)
+        wanted = full_posture(named_joints(posture, self.options.tf_prefix))
         if wanted is not None:
-            location = point_field(geometry.index, 'pose')
-            found = self.kinematics.nearest(self.targets[geometry.index], wanted, location)
-            if max_joint_change(found, geometry.joints) <= SAME_SOLUTION:
-                return wanted
-        return geometry.joints
-
-    def _arc(self, geometry: SegmentGeometry, moves: MoveRows, row: int) -> MoveC:
-        """Return the arc, with joint fields where target or via carry a posture."""
-        segment = geometry.segment
-        assert segment.via is not None
-        assert isinstance(geometry.curve, ArcCurve)
-        T_base_via = self.goal.T_base_frame @ segment.via
-        via: Target = T_base_via
-        target: Target = self.targets[geometry.index]
-        wanted = [
-            name
-            for name, posture in (
-                ('the point', geometry.waypoint.posture),
-                ('the via', segment.via_posture),
+            found = self.kinematics.nearest(
+                self.targets[point], wanted, point_field(point, 'pose')
             )
-            if posture
-        ]
+            if max_joint_change(found, joints) <= SAME_SOLUTION:
+                return wanted
+        return joints
+
+    def _arc(
+        self, geometries: SegmentGeometries, moves: MoveRows, row: int, joints: Joints
+    ) -> MoveC:
+        """Return the arc, with joint fields where target or via carry a posture."""
+        point, segments = geometries.begin + row, geometries.segments
+        segment_via = segments.via(row)
+        assert segment_via is not None
+        T_base_via = self.goal.T_base_frame @ segment_via
+        via: Target = T_base_via
+        target: Target = self.targets[point]
+        at_point, at_via = row in geometries.waypoints.postures, segments.via_postures.get(row)
+        wanted = [name for name, has in (('the point', at_point), ('the via', at_via)) if has]
         if wanted and (reason := explain_poses_only(self.options)):
             self.remarks.append(
-                f'point {geometry.index}: sent as poses despite the posture of '
+                f'point {point}: sent as poses despite the posture of '
                 f'{" and ".join(wanted)}, because {reason}'
             )
         elif wanted:
-            self.reasons.setdefault(geometry.index, []).append(
+            self.reasons.setdefault(point, []).append(
                 f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
             )
-            target = geometry.joints if geometry.waypoint.posture else target
-            via = self._via_joints(geometry, segment, T_base_via) if segment.via_posture else via
+            target = joints if at_point else target
+            if at_via:
+                arc = geometries.path.curves.others[row]
+                via = self._via_joints(point, arc, at_via, T_base_via)
         return MoveC(
             target=target,
             via=via,
             velocity=float(moves.velocities[row]),
             acceleration=float(moves.accelerations[row]),
             blend_radius=float(moves.blend_radii[row]),
-            mode=segment.arc_mode,
+            mode=ArcMode(int(segments.arc_modes[row])),
         )
 
-    def _via_joints(self, geometry: SegmentGeometry, segment: Segment, via: Pose) -> Joints:
+    def _via_joints(self, point: int, arc: SegmentCurve, posture: Posture, via: Pose) -> Joints:
         """
         Return the solution of the via's pose that its posture selects.
 
         :raises InvalidPosture: the arm follows the arc in another configuration.
         """
-        assert isinstance(geometry.curve, ArcCurve)
-        location = segment_field(geometry.index, 'via')
-        passing = self.samples.joints_at(geometry.index, geometry.curve.u_via)
+        assert isinstance(arc, ArcCurve)
+        location = segment_field(point, 'via')
+        passing = self.samples.joints_at(point, arc.u_via)
         # The orientation of the via does not shape the arc: continue from the arc to its pose.
         q = self.kinematics.nearest(via, passing, location)
-        named = named_joints(segment.via_posture, self.options.tf_prefix)
+        named = named_joints(posture, self.options.tf_prefix)
         chosen = self.kinematics.solve_posture(via, named, q, location)
         if clause := describe_miss(q, chosen, named):
             raise InvalidPosture(
-                f'{segment_field(geometry.index, "via_posture")} is not the configuration of the '
+                f'{segment_field(point, "via_posture")} is not the configuration of the '
                 f'arm on the arc: {clause}; leave it empty, or start the arc in that '
                 'configuration.'
             )

@@ -102,6 +102,12 @@ class CurveRows:
                 pose_from_row(start), pose_from_row(end), length, angle
             )
 
+    def joint_line(self, row: int) -> JointLineCurve:
+        """Return the curve of a joint move."""
+        curve = self.others[row]
+        assert isinstance(curve, JointLineCurve)
+        return curve
+
     def put(self, row: int, curve: SegmentCurve) -> None:
         """Replace a curve."""
         self.start[row], self.end[row] = curve.start.row(), curve.end.row()
@@ -181,10 +187,6 @@ class BlendedPath:
     def __getitem__(self, number: int) -> SegmentCurve | Blend:
         row, is_blend = divmod(number, 2)
         return Blend(self, row) if is_blend else self.curves[row]
-
-    def blend(self, row: int) -> Blend | None:
-        """Return the blend after a curve, None if there is none."""
-        return Blend(self, row) if 0 <= row < len(self.radius) and self.radius[row] else None
 
     @property
     def has_blend_after(self) -> Flags:

@@ -20,8 +20,6 @@ from ur_cartesian_driver.planning.geometry.samples import (
     last_greatest,
     PathSamples,
 )
-from ur_cartesian_driver.planning.moves.segment_data import BlendSamples
-from ur_cartesian_driver.planning.moves.segment_geometries import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     tightest_margins,
@@ -30,6 +28,34 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 
 # Samples whose parameters differ by less say nothing about a speed.
 _MIN_STEP = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSpeedBounds:
+    """The times of whole segments at the speed limits of the joints; columns (n,)."""
+
+    #: At the rate of the sample where the joints are fastest [s]; the leading joint there, and the
+    #: fraction of the segment.
+    times: Floats
+    joints: NDArray[np.intp]
+    fractions: Floats
+    #: At the rate of the sample where they are slowest; with some joint at its limit everywhere.
+    shortest_times: Floats
+    times_at_limits: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlendSamples:
+    """The samples in all blends of a goal; columns (n,)."""
+
+    #: The waypoint that the blend rounds, and the parameter half-way to the sample before.
+    index: Ints
+    s: Floats
+    #: For a unit of ``s`` there: time at the joint speed limits [s], with the joint that takes
+    #: longest, and distance of the tool [m].
+    joint_time: Floats
+    joint: NDArray[np.intp]
+    tool_distance: Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,39 +7,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import degrees
 
+import numpy as np
+
 from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE, Goal, SegmentType
+from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import LateLines
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
-from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
 
-def segment_line(
-    geometry: SegmentGeometry, timing: SegmentTiming, primitive: Primitive, reasons: Sequence[str]
-) -> str:
-    """
-    Return the line of one segment.
-
-    :param reasons: for the choice of the primitive.
-    """
-    asked = SegmentType(geometry.segment.type).name
-    because = f' because {" and ".join(reasons)}' if reasons else ''
-    parts = [
-        f'point {geometry.index}: {asked} -> {_name(primitive)}{because}',
-        f'{_extent(geometry)} in {_duration(geometry, timing)}',
-    ]
-    if geometry.blend_after is not None:
-        parts.append(f'blend {1e3 * geometry.blend_after.radius:g} mm')
-    parts.append(timing.source)
-    return f'{", ".join(parts)}; margin {geometry.tightest_margin}'
-
-
 def segment_lines(
-    geometries: Sequence[SegmentGeometry],
-    timings: Sequence[SegmentTiming],
+    geometries: SegmentGeometries,
+    timings: SegmentTimings,
     primitives: Sequence[Primitive],
     reasons: Mapping[int, Sequence[str]],
 ) -> LateLines:
@@ -48,45 +32,61 @@ def segment_lines(
 
     :param reasons: by point, for the choice of the primitive.
     """
-    return LateLines(
-        len(geometries),
-        lambda: [
-            segment_line(geometry, timing, primitive, reasons.get(geometry.index, ()))
-            for geometry, timing, primitive in zip(geometries, timings, primitives, strict=True)
-        ],
+    return LateLines(len(geometries), lambda: _lines(geometries, timings, primitives, reasons))
+
+
+def _lines(
+    geometries: SegmentGeometries,
+    timings: SegmentTimings,
+    primitives: Sequence[Primitive],
+    reasons: Mapping[int, Sequence[str]],
+) -> list[str]:
+    lines, path = [], geometries.path
+    columns = zip(
+        geometries.segments.types.tolist(),
+        primitives,
+        path.radius.tolist(),
+        geometries.tightest_margins,
+        strict=True,
     )
+    for row, (asked, primitive, radius, margin) in enumerate(columns):
+        why = reasons.get(geometries.begin + row)
+        parts = [
+            f'point {geometries.begin + row}: {SegmentType(asked).name} -> {_name(primitive)}'
+            + (f' because {" and ".join(why)}' if why else ''),
+            f'{_extent(path.curves, row)} in {_duration(geometries, timings, row)}',
+        ]
+        if radius:
+            parts.append(f'blend {1e3 * radius:g} mm')
+        parts.append(timings.requests.source(row))
+        lines.append(f'{", ".join(parts)}; margin {margin}')
+    return lines
 
 
-def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
+def tightest_remark(geometries: SegmentGeometries) -> str:
     """Return the remark about the tightest margin of the goal."""
-    geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.normalized)
-    return f'tightest margin: {geometry.tightest_margin} of the segment to point {geometry.index}'
+    margins = geometries.tightest_margins
+    row = int(np.argmin(margins.normalized))
+    return f'tightest margin: {margins[row]} of the segment to point {geometries.begin + row}'
 
 
-def stop_remarks(geometries: Sequence[SegmentGeometry]) -> list[str]:
+def stop_remarks(geometries: SegmentGeometries) -> list[str]:
     """Return at which inner points the arm stops."""
     lines: list[str] = []
-    stops = [geometry.index for geometry in geometries[:-1] if geometry.blend_after is None]
+    stops = [geometries.begin + row for row in rows_where(geometries.path.radius[:-1] == 0.0)]
     add_remark(lines, stops, 'the arm stops there, because there is no blend (blend_radius)')
     return lines
 
 
-def blend_remarks(
-    goal: Goal, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
-) -> list[str]:
+def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTimings) -> list[str]:
     """Return by how much the end may be off its planned time, if the goal has blends."""
-    if all(geometry.blend_after is None for geometry in geometries) or any(
-        is_optimized(geometry.kind) for geometry in geometries
-    ):
+    if not geometries.path.has_blend_after.any() or geometries.is_optimized.any():
         return []
-    planned = sum(timing.duration for timing in timings)
-    off = max(
-        planned - sum(timing.least_time for timing in timings),
-        sum(timing.greatest_time for timing in timings) - planned,
-    )
+    planned = timings.durations.sum()
+    off = max(planned - timings.least_times.sum(), timings.greatest_times.sum() - planned)
     clause = ''
     tolerance = goal.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
-    if 0.0 <= tolerance < off and geometries[-1].time is not None:
+    if 0.0 <= tolerance < off and geometries.times[-1] > 0.0:
         clause = f', more than goal_time_tolerance ({tolerance:g} s)'
     return [
         f'blends: the end may be up to {off:.3f} s off{clause}, because how the robot passes them '
@@ -107,18 +107,18 @@ def _name(primitive: Primitive) -> str:
     return name
 
 
-def _extent(geometry: SegmentGeometry) -> str:
-    turn = degrees(geometry.curve.angle)
-    return f'{geometry.curve.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
+def _extent(curves: CurveRows, row: int) -> str:
+    turn = degrees(curves.angle[row])
+    return f'{curves.length[row]:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
 
 
-def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
-    if is_optimized(geometry.kind):
+def _duration(geometries: SegmentGeometries, timings: SegmentTimings, row: int) -> str:
+    if is_optimized(geometries.kinds[row]):
         return 'a time that the controller chooses and that is not predicted'
-    amount, unit = geometry.curve.angle, 'rad/s mean'
-    if geometry.curve.length > 1e-6:
-        amount, unit = geometry.curve.length, 'm/s mean'
-    elif isinstance(geometry.curve, JointLineCurve):  # another posture of the same pose
-        amount, unit = geometry.curve.joint_travel, 'rad/s mean of the leading joint'
-    speed = f'{amount / max(timing.duration, 1e-9):.3f} {unit}'
-    return f'{timing.duration:.3f} s ({speed})'
+    curves, duration = geometries.path.curves, timings.durations[row]
+    amount, unit = curves.angle[row], 'rad/s mean'
+    if curves.length[row] > 1e-6:
+        amount, unit = curves.length[row], 'm/s mean'
+    elif curves.is_joint_line[row]:  # another posture of the same pose
+        amount, unit = curves.joint_travel[row], 'rad/s mean of the leading joint'
+    return f'{duration:.3f} s ({amount / max(duration, 1e-9):.3f} {unit})'

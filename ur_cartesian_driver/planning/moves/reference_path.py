@@ -4,59 +4,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import chain
-from math import ceil
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
-from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
 
 #: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8
 
 
-def reference_path(
-    start: Pose, path: BlendedPath, geometries: Sequence[SegmentGeometry], times: MoveTimes
-) -> ReferencePath:
+def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes) -> ReferencePath:
     """
     Return the path that the robot is expected to follow, blends included.
 
     Lines are sampled at their ends and where their acceleration changes, other curves so that
     their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); no two rows
     differ by more than 10 degrees.
+
+    :param begin: index of the waypoint at the end of the first segment.
     """
-    numbers: list[int] = []
-    parameters: list[list[float]] = []
-    knots = (times.knots / np.maximum(times.length - times.tail, 1e-300)[:, None]).tolist()
-    for k, (geometry, own_knots) in enumerate(zip(geometries, knots, strict=True)):
-        numbers.append(2 * k)
-        parameters.append(_row_parameters(geometry, own_knots))
-        if (blend := geometry.blend_after) is not None:
-            numbers.append(2 * k + 1)
-            n = blend.samples + blend.samples % 2  # one of them at the point
-            parameters.append([k / n for k in range(1, n + 1)])
-    number = np.repeat(numbers, [len(at) for at in parameters])
-    at = np.fromiter(chain.from_iterable(parameters), dtype=np.float64)
+    number, at = _places(path, times)
     row, is_blend = number // 2, number % 2 == 1
-    points = geometries[0].index + row + (is_blend & (at > 0.5))
+    points = begin + row + (is_blend & (at > 0.5))
     blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
     poses = np.concatenate([[start.row()], path.rows(number, at)])
     keep_hemisphere(poses)
     time = _times(path, times, row + is_blend, is_blend, at)
     return ReferencePath(
         poses=poses,
-        point=np.concatenate([[geometries[0].index], points]).astype(np.int32),
+        point=np.concatenate([[begin], points]).astype(np.int32),
         time=np.maximum.accumulate(np.concatenate([[0.0], time])),
         blend_tolerance=np.concatenate([[(0.0, 0.0)], blend_tolerance]),
     )
+
+
+def _places(path: BlendedPath, times: MoveTimes) -> tuple[Integers, Floats]:
+    """Return the curves (n,) of all rows but the start, by number, and the places on them (n,)."""
+    curves, rows = path.curves, np.arange(len(path.u_join))
+    begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
+    n = np.maximum(1, np.ceil(curves.samples * span)).astype(np.intp)
+    # Joint moves evenly: preview finds the joint positions by counting.
+    n = np.where(curves.is_joint_line, np.maximum(n, _MIN_JOINT_SAMPLES), n)
+    row, k = _counted(n - 1)
+    between = begin[row] + span[row] * k / n[row]
+    knots = np.sort(times.knots / np.maximum(times.length - times.tail, 1e-300)[:, None], axis=1)
+    inside = (knots > 0.0) & (knots < 1.0) & ~curves.is_joint_line[:, None]
+    inside[:, 1:] &= knots[:, 1:] > knots[:, :-1]
+    own = np.repeat(rows, inside.sum(axis=1))
+    at_knots = (begin[:, None] + span[:, None] * knots)[inside]
+    if len(row):
+        own, at_knots = np.concatenate([row, own]), np.concatenate([between, at_knots])
+        order = np.lexsort((at_knots, own))
+        own, at_knots = own[order], at_knots[order]
+    blends = np.flatnonzero(path.has_blend_after)
+    # One of them at the point.
+    n = path.blend_samples[blends] + path.blend_samples[blends] % 2
+    blend, k = _counted(n)
+    number = np.concatenate([2 * own, 2 * rows, 2 * blends[blend] + 1])
+    at = np.concatenate([at_knots, path.u_leave, k / n[blend]])
+    order = np.argsort(number, kind='stable')  # three sorted runs
+    return number[order], at[order]
+
+
+def _counted(counts: Integers) -> tuple[Integers, Integers]:
+    """Return for counts (n,) the rows 0, 0, ..., 1, 1, ... and the numbers 1, 2, ..., 1, 2, ..."""
+    rows = np.repeat(np.arange(len(counts)), counts)
+    return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _times(
@@ -83,22 +100,3 @@ def _times(
     begin, end = times.begin_rate[own], times.end_rate[own]
     found[rows] += ramp_time(begin, end, at[rows]) - ramp_time(begin, end, 1.0)
     return found
-
-
-def _row_parameters(geometry: SegmentGeometry, knots: Sequence[float]) -> list[float]:
-    """
-    Return the ``u`` of the rows of a segment without its start, which the row before is.
-
-    :param knots: fractions between the blends at which to sample the time.
-    """
-    begin, end = geometry.u_join, geometry.u_leave
-    span = max(end - begin, 0.0)
-    if isinstance(
-        geometry.curve, JointLineCurve
-    ):  # evenly: preview finds the joint positions by counting
-        n = max(_MIN_JOINT_SAMPLES, ceil(geometry.curve.samples * span))
-        return [*(begin + span * k / n for k in range(1, n)), end]
-    n = max(1, ceil(geometry.curve.samples * span))
-    parameters = {begin + span * k / n for k in range(1, n)}
-    parameters.update(begin + span * f for f in knots if 0.0 < f < 1.0)
-    return [*sorted(parameters), end]

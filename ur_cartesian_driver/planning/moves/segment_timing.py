@@ -10,29 +10,23 @@ derived so that the time is met. How moves and blends follow each other is that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from math import ceil, isnan
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, inf
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.blended_path import Integers
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
-from ur_cartesian_driver.planning.moves.segment_data import (
-    BlendSamples,
-    SegmentGeometry,
-    SegmentTiming,
-)
-from ur_cartesian_driver.planning.moves.speed_limits import is_blended
-from ur_cartesian_driver.planning.moves.speed_requests import (
-    RAMP_SHARE,
-    SegmentTimer,
-    SpeedRequest,
-)
+from ur_cartesian_driver.planning.moves.path_margins import BlendSamples
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_field
 
@@ -48,6 +42,26 @@ _WITHIN = 1.0 + 1e-6
 _MAX_ROUNDS = 40
 #: A point that is passed no earlier than this is in time [s].
 _EARLY = 0.001
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmentTimings:
+    """The speeds of segments over time; columns (n,)."""
+
+    #: What the wire carries; time 0 = speed and acceleration count.
+    velocities: Floats
+    accelerations: Floats
+    wire_times: Floats
+    #: Expected times from point to point [s]; blended points are passed in the middle of the
+    #: blend. Their bounds, whatever the law by which the robot passes its blends.
+    durations: Floats
+    least_times: Floats
+    greatest_times: Floats
+    #: Where speeds and times come from; changes that the limits made, in order of the segments.
+    requests: SpeedRequests
+    remarks: Mapping[int, str]
+    #: How they follow each other.
+    chain: MoveChain
 
 
 def shortest_duration(
@@ -66,38 +80,23 @@ def shortest_duration(
 
 
 def schedule(
-    geometries: Sequence[SegmentGeometry],
+    geometries: SegmentGeometries,
     options: PlanningOptions,
     model: RobotModel,
     blend_samples: BlendSamples,
     running: PlannedSegment | None = None,
-) -> tuple[list[SegmentTiming], MoveChain]:
+) -> SegmentTimings:
     """
-    Return the timing of every segment, and the chain of moves.
+    Return the timings of all segments.
 
     :param running: the first segment as it was planned, where it has been sent.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
-    :raises InvalidGoal: a speed is too low for the wire.
+    :raises InvalidGoal: a speed is too low for the wire, a blend too small.
     """
-    timers = [SegmentTimer(geometry, options, model) for geometry in geometries]
-    timetable = _Timetable(timers, options, blend_samples, running)
+    requests = SpeedRequests(geometries, options, model, running)
+    timetable = _Timetable(requests, options, model, blend_samples, running)
     timetable.solve()
-    return timetable.timings(), timetable.chain
-
-
-class _Result(NamedTuple):
-    """What has been found for a segment, or columns of it; see :class:`SegmentTiming`."""
-
-    speed: Any
-    acceleration: Any
-    wire_time: Any
-    duration: Any
-    #: Its time, longer where it is slowed [s]; NaN = none.
-    wanted: Any
-    #: So much before its time its point is passed [s].
-    ahead: Any
-    least_time: Any
-    greatest_time: Any
+    return timetable.timings()
 
 
 class _Timetable:
@@ -105,45 +104,32 @@ class _Timetable:
 
     def __init__(
         self,
-        timers: Sequence[SegmentTimer],
+        requests: SpeedRequests,
         options: PlanningOptions,
+        model: RobotModel,
         blend_samples: BlendSamples,
         running: PlannedSegment | None,
     ) -> None:
         """Begin with what is asked for."""
-        self._timers, self._options, self._samples = timers, options, blend_samples
-        self._requests = requests = [
-            timer.request() if k or running is None else timer.request_again(running)
-            for k, timer in enumerate(timers)
-        ]
-        self._time, min_time, self._speed, self._least, self._most, self._rate, timed = np.array(
-            [
-                (
-                    r.time,
-                    r.min_time,
-                    r.speed,
-                    r.acceleration,
-                    r.max_acceleration,
-                    r.rate,
-                    r.has_wire_time,
-                )
-                for r in requests
-            ]
-        ).T
-        self._timed = timed > 0.0
-        self._wanted = np.maximum(self._time, min_time)
+        self._requests, self._options, self._model = requests, options, model
+        self._geometries, self._samples = requests.geometries, blend_samples
+        n = len(self._geometries)
+        self._time, self._timed, self._rate = requests.time, requests.has_wire_time, requests.rate
+        self._speed = requests.speed
+        self._least, self._most = requests.acceleration, requests.max_acceleration
+        self._wanted = np.maximum(self._time, requests.min_time)
         #: So much before their times points are passed, for the sake of the next ones [s].
-        self._ahead = np.zeros(len(timers))
-        #: What slows a segment where it is not a limit of its own.
-        self._limit_names: dict[int, str] = {}
-        self._moves = Moves.of([timer.move() for timer in timers])
+        self._ahead = np.zeros(n)
+        #: The sample in a blend that slows a segment, where that is no limit of its own; else -1.
+        self._slowed_at: Integers = np.full(n, -1)
+        self._moves = requests.moves()
         # No time on the wire is less than the robot needs from rest to rest, however it blends.
         self._max_rate = np.where(
-            np.isnan(self._time), self._rate, 1.0 / np.maximum(min_time, 1e-9)
+            np.isnan(self._time), self._rate, 1.0 / np.maximum(requests.min_time, 1e-9)
         )
         self._allow_acceleration()
         self._rate = np.minimum(self._rate, self._max_rate)
-        self._moves = self._at_rate(np.arange(len(timers)), self._rate)
+        self._moves = self._at_rate(np.arange(n), self._rate)
         entry = running.blend_entry if running and self._moves.tail[0] > 0.0 else None
         self.chain = MoveChain(self._moves, entry)
         if entry is not None:
@@ -190,28 +176,32 @@ class _Timetable:
         self._ahead += more
         return bool((more + back).max() > _EARLY * (_NEARLY - 1.0))
 
-    def timings(self) -> list[SegmentTiming]:
+    def timings(self) -> SegmentTimings:
         """
         Return the timings of the segments.
 
         :raises GoalRefused: a time is too short, a speed too low, a blend too small.
         """
-        times, moves = self.chain.times, self._moves
-        columns = _Result(
-            moves.speed,
-            moves.acceleration,
-            moves.time,
-            times.durations,
-            self._wanted,
-            self._ahead,
-            *self._bounds(),
+        requests, times, moves = self._requests, self.chain.times, self._moves
+        on_wire = moves.time > 0.0
+        # A third each of speeding up, cruising and braking.
+        time = np.where(on_wire, moves.time, 1.0)
+        cruise = requests.length / time / (1.0 - RAMP_SHARE)
+        least, greatest = self._bounds()
+        sent = moves.acceleration / requests.acceleration_unit
+        timings = SegmentTimings(
+            velocities=np.where(on_wire, cruise, moves.speed),
+            accelerations=np.where(on_wire, cruise / (RAMP_SHARE * time), sent),
+            wire_times=moves.time,
+            durations=times.durations,
+            least_times=least,
+            greatest_times=greatest,
+            requests=requests,
+            remarks=requests.remarks,
+            chain=self.chain,
         )
-        return [
-            _timing(timer, request, self._limit_names.get(k, timer.limits.name), _Result(*row))
-            for k, (timer, request, *row) in enumerate(
-                zip(self._timers, self._requests, *(c.tolist() for c in columns), strict=True)
-            )
-        ]
+        self._remark_changes(timings)
+        return timings
 
     def _at_rate(self, rows: Rows, rate: Floats) -> Moves:
         """Return moves at rates; a rate beyond the greatest speed stands for more acceleration."""
@@ -233,7 +223,7 @@ class _Timetable:
 
     def _slow_down(self) -> bool:
         """Slow moves that are too fast when blended; return whether there are any."""
-        times, slowed = self.chain.times, False
+        times = self.chain.times
         over = np.maximum(
             np.maximum(times.cruise, times.enter) / self._speed,
             np.sqrt(
@@ -246,15 +236,7 @@ class _Timetable:
         )
         slower = np.where(self._timed & (over > _WITHIN), self._rate / over, self._max_rate)
         speed = self._speed.copy()
-        for k, ratio, name in self._fast_blends():
-            # The move at the faster end of the blend is slowed.
-            row = k if times.end_rate[k] > times.begin_rate[k] else k - 1
-            there = times.enter[k] if row == k else times.leave[k - 1]
-            if self._timed[row]:
-                slower[row] = min(slower[row], self._rate[row] / ratio)
-            else:
-                speed[row] = min(speed[row], there / ratio)
-            self._limit_names[row] = name
+        self._slow_blends(slower, speed)
         by_speed = ~self._timed & (speed < self._speed)
         self._speed = speed
         slower = np.where(by_speed, np.minimum(slower, speed / self._moves.length), slower)
@@ -265,31 +247,43 @@ class _Timetable:
         if len(rows):
             self._moves.put(rows, self._at_rate(rows, self._rate[rows]))
             self.chain.follow(rows)
-            slowed = True
-        return slowed
+        return bool(len(rows))
 
-    def _fast_blends(self) -> Iterator[tuple[int, float, str]]:
-        """Yield the blends (as the rows behind them) that are too fast, and how much."""
+    def _slow_blends(self, rate: Floats, speed: Floats) -> None:
+        """Lower rates and speeds of the moves whose blends are too fast for tool or joints."""
         samples, times = self._samples, self.chain.times
-        if not len(samples.s):
+        after = samples.index - self._geometries.begin + 1
+        begin, end = times.begin_rate[after], times.end_rate[after]
+        at_sample = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * samples.s, 0.0))
+        over = at_sample * np.maximum(samples.joint_time, self._tool_times())
+        worst = np.flatnonzero(over > _WITHIN)
+        if not len(worst):
             return
-        row = samples.index - self._timers[0].geometry.index + 1
-        begin, end = times.begin_rate[row], times.end_rate[row]
-        rate = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * samples.s, 0.0))
-        least = samples.joint_time
-        if self._options.max_tool_speed > 0.0:
-            least = np.maximum(least, samples.tool_distance / self._options.max_tool_speed)
-        over = rate * least
-        for worst in np.flatnonzero(over > _WITHIN):
-            name = f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
-            joint = samples.joint[worst]
-            if samples.joint_time[worst] >= least[worst]:
-                source = self._timers[0].model.speed_source(joint)
-                name = (
-                    f'the joint speed limits ({JOINT_NAMES[joint]} in the blend at point '
-                    f'{samples.index[worst]}{source})'
-                )
-            yield int(row[worst]), float(over[worst]), name
+        # The move at the faster end of the blend is slowed.
+        after, over, speeds_up = after[worst], over[worst], (end > begin)[worst]
+        row = np.where(speeds_up, after, after - 1)
+        there = np.where(speeds_up, times.enter[after], times.leave[after - 1])
+        on_wire = self._timed[row]
+        np.minimum.at(rate, row[on_wire], self._rate[row[on_wire]] / over[on_wire])
+        np.minimum.at(speed, row[~on_wire], there[~on_wire] / over[~on_wire])
+        self._slowed_at[row] = worst
+
+    def _tool_times(self) -> Floats:
+        """Return the times of the samples in blends at the speed limit of the tool."""
+        return self._samples.tool_distance / (self._options.max_tool_speed or inf)
+
+    def _limit_name(self, row: int) -> str:
+        """Return what slows a segment."""
+        sample, samples = int(self._slowed_at[row]), self._samples
+        if sample < 0:
+            return self._requests.limits.name(row)
+        if samples.joint_time[sample] < self._tool_times()[sample]:
+            return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+        joint = int(samples.joint[sample])
+        return (
+            f'the joint speed limits ({JOINT_NAMES[joint]} in the blend at point '
+            f'{samples.index[sample]}{self._model.speed_source(joint)})'
+        )
 
     def _bounds(self) -> tuple[Floats, Floats]:
         """
@@ -298,153 +292,128 @@ class _Timetable:
         At most the arm rests at each point; at least it cruises between the blends and passes each
         straight across, at the faster of its two speeds.
         """
-        times, moves, geometries = (
-            self.chain.times,
-            self._moves,
-            [t.geometry for t in self._timers],
-        )
-        blended = np.array([is_blended(geometry) for geometry in geometries])
-        timed = moves.time > 0.0
+        times, moves, path = self.chain.times, self._moves, self._geometries.path
+        before, after = path.has_blend_before, path.has_blend_after
+        timed, blended = moves.time > 0.0, before | after
         time = np.where(timed, moves.time, 1.0)
         speed = np.where(timed, moves.length / time / (1.0 - RAMP_SHARE), moves.speed)
         acceleration = np.where(timed, speed / (RAMP_SHARE * time), moves.acceleration)
-        ramps = np.array(
-            [(g.blend_before is None) + (g.blend_after is None) for g in geometries], dtype=float
-        )
-        between = moves.length * np.array([g.unblended_fraction for g in geometries])
+        between = moves.length * self._geometries.unblended_fractions
+        ramps = 2.0 - before.astype(np.float64) - after
         least = shortest_duration(between, speed, acceleration, ramps)
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
-        tool_speed = speed * np.array([max(g.curve.length, 1e-9) for g in geometries])
-        tool_speed /= moves.length
+        tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
         # Legs of the radius r with a chord c between them: no blend is longer than r + c / 2.
-        across = np.array(
-            [
-                2.0 * max(g.blend_after.length - g.blend_after.radius, 0.0)
-                if g.blend_after
-                else 0.0
-                for g in geometries
-            ]
-        )
+        across = np.where(after, 2.0 * np.maximum(path.blend_length - path.radius, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
             np.where(blended, least, times.durations),
             np.where(blended, np.where(timed, moves.time, greatest), times.durations),
         )
 
+    # -- remarks and refusals --------------------------------------------------------------------
 
-def _timing(
-    timer: SegmentTimer, request: SpeedRequest, limit_name: str, result: _Result
-) -> SegmentTiming:
-    """
-    Return the timing of a segment.
+    def _remark_changes(self, timings: SegmentTimings) -> None:
+        """
+        Remark what is slower than asked for, or early.
 
-    :param limit_name: what slows it.
-    :raises GoalRefused: its time is too short, its speed too low, its blend too small.
-    """
-    geometry, remark = timer.geometry, request.remark
-    speed, acceleration, wire_time, duration, wanted, ahead, least, greatest = result
-    if wanted > request.time * _NEARLY:
-        remark = _too_fast(timer, wanted, limit_name)
-    elif wire_time > 1.0 / request.rate * _NEARLY and isnan(request.time):
-        remark = (
-            f'point {geometry.index}: takes {wire_time:.3f} s instead of '
-            f'{1.0 / request.rate:.3f} s, because of {limit_name}'
-        )
-    elif isnan(request.time) and wire_time <= 0.0 and speed * _NEARLY < request.speed:
-        remark = (
-            f'point {geometry.index}: slowed from {request.speed:.3g} to {speed:.3g} '
-            f'{timer.speed_unit} by {limit_name}'
-        )
-    elif ahead > _EARLY:
-        remark = (
-            f'point {geometry.index}: passed {ahead:.3f} s before its time, because the next '
-            'segment could not make good the time in the blend'
-        )
-    timing = SegmentTiming(
-        speed,
-        acceleration / timer.acceleration_unit,
-        request.source,
-        remark,
-        wire_time=wire_time,
-        duration=duration,
-        least_time=least,
-        greatest_time=greatest,
-    )
-    if wire_time > 0.0:
-        # A third each of speeding up, cruising and braking.
-        timing.velocity = timer.length / wire_time / (1.0 - RAMP_SHARE)
-        timing.acceleration = timing.velocity / (RAMP_SHARE * wire_time)
-    _check_wire(timer, timing)
-    _check_blend(timer, timing)
-    return timing
+        :raises GoalRefused: a time is too short, a speed too low, a blend too small.
+        """
+        requests, path, timed = self._requests, self._geometries.path, ~np.isnan(self._time)
+        is_late = self._wanted > self._time * _NEARLY
+        takes_longer = ~timed & (timings.wire_times > 1.0 / requests.rate * _NEARLY)
+        by_speed = timings.wire_times <= 0.0
+        is_slower = ~timed & by_speed & (self._moves.speed * _NEARLY < requests.speed)
+        is_ahead = self._ahead > _EARLY
+        takes_too_long = timings.wire_times > self._options.max_segment_time
+        slowest = np.minimum(timings.velocities, timings.accelerations)
+        too_slow = by_speed & (slowest < MIN_SPEED)
+        needs_a_cycle = np.isin(self._geometries.kinds, _NEEDS_A_CYCLE) & path.has_blend_after
+        travel = timings.velocities * self._model.control_cycle
+        too_small = needs_a_cycle & (path.radius < travel)
+        refused = takes_too_long | too_slow | too_small
+        remarks = requests.remarks
+        for row in rows_where(is_late | takes_longer | is_slower | is_ahead | refused):
+            point = self._geometries.begin + row
+            if is_late[row]:
+                remarks[row] = self._too_fast(row)
+            elif takes_longer[row]:
+                remarks[row] = (
+                    f'point {point}: takes {timings.wire_times[row]:.3f} s instead of '
+                    f'{1.0 / requests.rate[row]:.3f} s, because of {self._limit_name(row)}'
+                )
+            elif is_slower[row]:
+                remarks[row] = (
+                    f'point {point}: slowed from {requests.speed[row]:.3g} to '
+                    f'{self._moves.speed[row]:.3g} {requests.limits.unit(row)} by '
+                    f'{self._limit_name(row)}'
+                )
+            elif is_ahead[row]:
+                remarks[row] = (
+                    f'point {point}: passed {self._ahead[row]:.3f} s before its time, because '
+                    'the next segment could not make good the time in the blend'
+                )
+            if takes_too_long[row]:
+                raise InvalidGoal(
+                    point_field(point),
+                    f'would be approached in {timings.wire_times[row]:.4g} s, more than '
+                    f'max_segment_time = {self._options.max_segment_time:.0f} s',
+                    'raise velocity or acceleration',
+                )
+            if too_slow[row]:
+                raise self._too_slow(row, timings)
+            if too_small[row]:
+                raise InvalidGoal(  # the robot would stop at the point (C171)
+                    segment_field(point, 'blend_radius'),
+                    f'is {1e3 * path.radius[row]:g} mm, less than the {1e3 * travel[row]:.3g} mm '
+                    f'that the robot moves in one control cycle at {timings.velocities[row]:.3g} '
+                    f'{requests.limits.unit(row)}: it would stop at the point',
+                    'enlarge it, move slower, or set it to 0 to stop there',
+                )
 
-
-def _check_wire(timer: SegmentTimer, timing: SegmentTiming) -> None:
-    """Refuse speeds too small for the wire, and times too large for it."""
-    if timing.wire_time > timer.options.max_segment_time:
-        raise InvalidGoal(
-            point_field(timer.geometry.index),
-            f'would be approached in {timing.wire_time:.4g} s, more than '
-            f'max_segment_time = {timer.options.max_segment_time:.0f} s',
-            'raise velocity or acceleration',
+    def _too_slow(self, row: int, timings: SegmentTimings) -> InvalidGoal:
+        """Return the refusal of a speed too small for the wire."""
+        unit, value = self._requests.limits.unit(row), timings.velocities[row]
+        if value >= MIN_SPEED:
+            unit, value = f'{unit}^2', timings.accelerations[row]
+        return InvalidGoal(
+            point_field(self._geometries.begin + row),
+            f'would be approached with {value:.2g} {unit}, less than the {MIN_SPEED:g} that can '
+            'be sent',
+            'give it less time'
+            if self._geometries.times[row] > 0.0
+            else 'raise velocity or acceleration',
         )
-    if timing.wire_time > 0.0:
-        return
-    unit = timer.speed_unit
-    for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
-        if value < MIN_SPEED:
-            raise InvalidGoal(
-                point_field(timer.geometry.index),
-                f'would be approached with {value:.2g} {name}, less than '
-                f'the {MIN_SPEED:g} that can be sent',
-                'give it less time' if timer.geometry.time else 'raise velocity or acceleration',
+
+    def _too_fast(self, row: int) -> str:
+        """
+        Return the remark on a time that is too short.
+
+        :raises TooFast: it is refused.
+        """
+        requests, limits, options = self._requests, self._requests.limits, self._options
+        point, min_time = self._geometries.begin + row, float(self._wanted[row])
+        time, length = self._geometries.times[row], requests.length[row]
+        unit, name = limits.unit(row), self._limit_name(row)
+        where = point_field(point, 'time_from_start')
+        if min_time > options.max_segment_time:
+            raise TooFast(
+                where,
+                f'gives the segment {time:.3f} s, but because of {name} it takes '
+                f'{min_time:.0f} s, more than max_segment_time = '
+                f'{options.max_segment_time:.0f} s',
+                'move the path away from there, or use a JOINT segment',
             )
-
-
-def _check_blend(timer: SegmentTimer, timing: SegmentTiming) -> None:
-    """Refuse a blend that the robot does not make: it would stop at the point (C171)."""
-    blend = timer.geometry.blend_after
-    if blend is None or timer.geometry.kind not in _NEEDS_A_CYCLE:
-        return
-    travel = timing.velocity * timer.model.control_cycle
-    if blend.radius < travel:
-        raise InvalidGoal(
-            segment_field(timer.geometry.index, 'blend_radius'),
-            f'is {1e3 * blend.radius:g} mm, less than the {1e3 * travel:.3g} mm that the '
-            f'robot moves in one control cycle at {timing.velocity:.3g} {timer.speed_unit}: '
-            'it would stop at the point',
-            'enlarge it, move slower, or set it to 0 to stop there',
-        )
-
-
-def _too_fast(timer: SegmentTimer, min_time: float, limit_name: str) -> str:
-    """
-    Return the remark on a time that is too short.
-
-    :raises TooFast: it is refused.
-    """
-    time, limits, unit = timer.geometry.time, timer.limits, timer.speed_unit
-    assert time is not None
-    where = point_field(timer.geometry.index, 'time_from_start')
-    if min_time > timer.options.max_segment_time:
+        if options.on_too_fast == 'slow':
+            return (
+                f'point {point}: takes {min_time:.3f} s instead of {time:.3f} s, because of {name}'
+            )
+        speed, acceleration = requests.peak[row] * length / time, 4.5 * length / time**2
         raise TooFast(
             where,
-            f'gives the segment {time:.3f} s, but because of {limit_name} it takes '
-            f'{min_time:.0f} s, more than max_segment_time = '
-            f'{timer.options.max_segment_time:.0f} s',
-            'move the path away from there, or use a JOINT segment',
+            f'gives the segment {time:.3f} s for {length:.3f} {limits.length_unit(row)}, which '
+            f'needs up to {speed:.3f} {unit} and {acceleration:.3f} {unit}^2; allowed are '
+            f'{limits.speed[row]:.3f} {unit} ({name}) and '
+            f'{requests.allowed_acceleration[row]:.3f} {unit}^2',
+            f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
         )
-    if timer.options.on_too_fast == 'slow':
-        return (
-            f'point {timer.geometry.index}: takes {min_time:.3f} s instead of {time:.3f} s, '
-            f'because of {limit_name}'
-        )
-    speed, acceleration = timer.peak * timer.length / time, 4.5 * timer.length / time**2
-    raise TooFast(
-        where,
-        f'gives the segment {time:.3f} s for {timer.length:.3f} {timer.unit}, which needs up '
-        f'to {speed:.3f} {unit} and {acceleration:.3f} {unit}^2; '
-        f'allowed are {limits.speed:.3f} {unit} ({limit_name}) and '
-        f'{timer.max_acceleration():.3f} {unit}^2',
-        f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
-    )

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The leading quantity of a segment and its speed limits.
+The leading quantities of segments and their speed limits.
 
 The robot has one speed for the translation [m/s] and the turn [rad/s] of the tool, which neither
 may exceed; so the larger of both numbers *leads* a segment (for joint moves the joint that turns
@@ -10,113 +10,115 @@ farthest). Tool, joints and accelerations bound it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
+
+import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, SAME_POSITION
-from ur_cartesian_driver.planning.moves.segment_data import JointSpeedBound, SegmentGeometry
+from ur_cartesian_driver.motion.goal_table import rows_where
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.blended_path import CurveRows, Flags, Integers
+from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 
 #: Length of a segment to a first point where the robot already is.
 _MIN_LENGTH = 1e-9
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLimits:
-    """Maximum speed of the leading quantity, what sets it, and the maximum acceleration."""
+    """The leading quantity of each segment, and its limits; columns (n,)."""
 
-    speed: float
-    name: str
-    acceleration: float
+    def __init__(
+        self, geometries: SegmentGeometries, options: PlanningOptions, model: RobotModel
+    ) -> None:
+        """Find the largest quantities, and the smallest limits."""
+        self._bounds, self._options, self._model = geometries.speed_bounds, options, model
+        curves, kinds = geometries.path.curves, geometries.kinds
+        #: Whether the tool's position changes; if not, the segment only turns it.
+        self.translates: Flags = curves.length > SAME_POSITION
+        self.is_optimized = geometries.is_optimized
+        turns_with_arc = (kinds == SegmentType.CIRCULAR) & (
+            geometries.segments.arc_modes == ArcMode.FIXED
+        )
+        #: Whether the turn of the tool, or of a joint, is the larger number.
+        self.is_turn: Flags = ~self.is_optimized & (
+            curves.is_joint_line | ((curves.length < curves.angle) & ~turns_with_arc)
+        )
+        travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
+        length = np.where(self.is_turn, travel, curves.length)
+        # That of an OPTIMIZED move is its time with some joint at its limit everywhere.
+        length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
+        #: Length of the leading quantity [m], [rad], or [s] of an OPTIMIZED move.
+        self.length: Floats = np.maximum(length, _MIN_LENGTH)
+        times = np.where(self.is_optimized, 0.0, self._bounds.times)
+        joint_speed = np.where(times > 0.0, self.length / np.maximum(times, 1e-300), inf)
+        self._joint = self._bounds.joints.copy()
+        self._is_joint_move = (kinds == SegmentType.JOINT) & curves.is_joint_line
+        if len(rows := np.flatnonzero(self._is_joint_move)):
+            joint_speed[rows], self._joint[rows] = self._joint_moves(rows, curves)
+        tool_speed = self._tool_speed(curves)
+        self._is_joint_limit = joint_speed < tool_speed
+        #: Maximum speed and acceleration of the leading quantity.
+        self.speed: Floats = np.minimum(joint_speed, tool_speed)
+        self.acceleration = self._acceleration(curves)
+        # Where the robot turns the tool faster than it moves it, it gets ahead of the turn.
+        turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by its angle
+        counted = np.maximum(curves.length, turn / options.turn_ratio) / self.length
+        ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
+        faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
+        self.speed *= faster
+        self.acceleration *= faster
 
+    def length_unit(self, row: int) -> str:
+        """Return the unit of the length of a segment."""
+        return 's' if self.is_optimized[row] else 'rad' if self.is_turn[row] else 'm'
 
-def leading_quantity(geometry: SegmentGeometry) -> tuple[float, str]:
-    """
-    Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
+    def unit(self, row: int) -> str:
+        """Return the unit of the speed of a segment."""
+        return 'of the limits' if self.is_optimized[row] else f'{self.length_unit(row)}/s'
 
-    The length of an OPTIMIZED move is its time with some joint at its limit everywhere.
-    """
-    path = geometry.curve
-    if is_optimized(geometry.kind):
-        length, unit = geometry.speed_bound.time_at_limits, 's'
-    elif isinstance(path, JointLineCurve):
-        length, unit = max(path.travel), 'rad'
-    elif path.length >= path.angle or (isinstance(path, ArcCurve) and path.mode == ArcMode.FIXED):
-        length, unit = path.length, 'm'
-    else:
-        length, unit = path.angle, 'rad'
-    return max(length, _MIN_LENGTH), unit
+    def name(self, row: int) -> str:
+        """Return what limits the speed of a segment."""
+        if not self._is_joint_limit[row]:
+            return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
+        joint, fraction = int(self._joint[row]), self._bounds.fractions[row]
+        name, source = JOINT_NAMES[joint], self._model.speed_source(joint)
+        if self._is_joint_move[row]:
+            limit = self._model.max_joint_speed[joint]
+            return f'the speed limit of {name}, {limit:.3f} rad/s{source}'
+        return (
+            f'the joint speed limits ({name} at {100.0 * fraction:.0f} % of the segment{source})'
+        )
 
+    def _joint_moves(self, rows: Integers, curves: CurveRows) -> tuple[Floats, Integers]:
+        """Return how fast joint moves may be (m,), and the joints that limit them."""
+        travel = np.array([curves.joint_line(row).travel for row in rows.tolist()])
+        speeds = np.array(self._model.max_joint_speed) * self.length[rows, None]
+        speeds = np.where(travel > 0.0, speeds / np.maximum(travel, 1e-300), inf)
+        return speeds.min(axis=1), speeds.argmin(axis=1)
 
-def speed_limits(
-    geometry: SegmentGeometry, length: float, options: PlanningOptions, model: RobotModel
-) -> SpeedLimits:
-    """Return the limits of the leading quantity of a segment."""
-    tool = inf
-    if options.max_tool_speed > 0.0 and translates(geometry):
-        tool = options.max_tool_speed / _tool_travel_per_unit(geometry, length)
-    speed, name = tool, f'max_tool_speed = {options.max_tool_speed:g} m/s'
-    if geometry.kind == SegmentType.JOINT and isinstance(geometry.curve, JointLineCurve):
-        for k, travel_of_joint in enumerate(geometry.curve.travel):
-            if (
-                travel_of_joint > 0.0
-                and model.max_joint_speed[k] * length / travel_of_joint < speed
-            ):
-                speed = model.max_joint_speed[k] * length / travel_of_joint
-                name = (
-                    f'the speed limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
-                    f'{model.speed_source(k)}'
-                )
-        return SpeedLimits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
-    if not is_optimized(geometry.kind):
-        min_time = geometry.speed_bound.time
-        if min_time > 0.0 and length / min_time < speed:
-            speed, name = length / min_time, _joint_limit(geometry.speed_bound, model)
-    bound = (
-        options.max_linear_acceleration * length / geometry.curve.length
-        if translates(geometry)
-        else inf
-    )
-    if geometry.curve.angle > 0.0:
-        bound = min(bound, options.max_angular_acceleration * length / geometry.curve.angle)
-    # Where the robot turns the tool faster than it moves it, it gets ahead of the turn.
-    faster = 1.0
-    if geometry.kind in (SegmentType.CIRCULAR, SegmentType.PROCESS):
-        turn = min(geometry.curve.angle, length)  # a FIXED arc turns the tool by its angle
-        faster = min(1.0, max(geometry.curve.length, turn / options.turn_ratio) / length)
-    return SpeedLimits(speed=speed * faster, name=name, acceleration=bound * faster)
+    def _tool_speed(self, curves: CurveRows) -> Floats:
+        """Return how fast the leading quantities may be for the sake of the tool."""
+        if self._options.max_tool_speed <= 0.0:
+            return np.full(len(self.length), inf)
+        # The tool of an OPTIMIZED move is fastest where the joints turn least.
+        shortest = np.maximum(self._bounds.shortest_times, _MIN_LENGTH)
+        travel = curves.length * 1.0
+        for row in rows_where(curves.is_joint_line):
+            travel[row] *= curves.joint_line(row).unevenness
+        per_unit = travel / np.where(self.is_optimized, shortest, self.length)
+        speed = self._options.max_tool_speed / np.maximum(per_unit, 1e-300)
+        return np.where(self.translates, speed, inf)
 
-
-def _joint_limit(speed_bound: JointSpeedBound, model: RobotModel) -> str:
-    joint = speed_bound.joint
-    return (
-        f'the joint speed limits ({JOINT_NAMES[joint]} at {100.0 * speed_bound.fraction:.0f} % of '
-        f'the segment{model.speed_source(joint)})'
-    )
-
-
-def _tool_travel_per_unit(geometry: SegmentGeometry, length: float) -> float:
-    """Return the maximum distance of the tool [m] per unit of the leading quantity."""
-    path = geometry.curve
-    if is_optimized(geometry.kind):  # the tool is fastest where the joints turn least
-        length = max(geometry.speed_bound.shortest_time, _MIN_LENGTH)
-    uneven = path.unevenness if isinstance(path, JointLineCurve) else 1.0
-    return path.length * uneven / length
-
-
-def is_blended(geometry: SegmentGeometry) -> bool:
-    """Tell whether a segment has a blend at one of its ends."""
-    return geometry.blend_before is not None or geometry.blend_after is not None
-
-
-def translates(geometry: SegmentGeometry) -> bool:
-    """Tell whether the tool's position changes; if not, the segment only turns it."""
-    return geometry.curve.length > SAME_POSITION
-
-
-def speed_unit(unit: str) -> str:
-    """Return the unit of speeds of a quantity in a unit."""
-    return 'of the limits' if unit == 's' else f'{unit}/s'
+    def _acceleration(self, curves: CurveRows) -> Floats:
+        options, length = self._options, self.length
+        # Lengths that count, for a unit of the leading quantity.
+        linear = np.where(self.translates, curves.length, 0.0) / length
+        angular = curves.angle / length
+        bound = np.minimum(
+            options.max_linear_acceleration / np.maximum(linear, 1e-300),
+            options.max_angular_acceleration / np.maximum(angular, 1e-300),
+        )
+        return np.where(self._is_joint_move, options.max_joint_acceleration, bound)

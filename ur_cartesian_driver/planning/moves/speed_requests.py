@@ -1,31 +1,29 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a segment asks of its move: from the times of the goal, from its speeds, or from the defaults.
+What segments ask of their moves: from times or speeds of the goal, or from the defaults.
 
 All numbers are about the leading quantity of a segment, see :mod:`~.speed_limits`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import hypot, inf, nan, sqrt
+from math import inf, nan
+
+import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import PlannedSegment
+from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.planning.geometry.blended_path import Blend
-from ur_cartesian_driver.planning.moves.segment_data import SegmentGeometry
-from ur_cartesian_driver.planning.moves.speed_limits import (
-    leading_quantity,
-    speed_limits,
-    speed_unit,
-    translates,
-)
+from ur_cartesian_driver.planning.moves.move_chain import Moves
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized, point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
 #: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
@@ -45,278 +43,278 @@ _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
 _UNLIMITED = 1e9
 #: A time that is longer by less than this factor is not remarked.
 _NOTICEABLY = 1.001
+#: Limits that are lower by less than this factor are the speed asked for.
+_ROUNDED = 1.0 - 1e-9
+#: Where a speed comes from, for the report.
+_SOURCES = (
+    'speed from segments[{}].velocity',
+    'speed from optimized_velocity',
+    'speed from joint_velocity',
+    'speed from points[{}].twist',
+    'speed from angular_velocity',
+    'speed from linear_velocity and angular_velocity, as the turn leads',
+    'speed from linear_velocity',
+)
 
 
-def min_duration(length: float, speed: float, acceleration: float, peak: float = _PEAK) -> float:
+def min_duration(length: Floats, speed: Floats, acceleration: Floats, peak: Floats) -> Floats:
     """
-    Return the shortest time on the wire that keeps its peaks from rest to rest within bounds [s].
+    Return the shortest times on the wire that keep the peaks from rest to rest within bounds [s].
 
     :param peak: speed over mean speed; 2 where it might be a triangle, whose acceleration is less.
     """
-    return max(
-        peak * length / speed,
-        sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
-    )
+    ramps = np.sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE)))
+    return np.maximum(peak * length / speed, ramps)
 
 
-@dataclass(slots=True, kw_only=True)
-class SpeedRequest:
-    """What a segment asks of its move, in the lengths that the robot counts."""
+class SpeedRequests:
+    """
+    What segments ask of their moves, in the lengths that the robot counts; columns (n,).
 
-    #: Its greatest speed; its acceleration, and the greatest one that may follow from a time.
-    speed: float
-    acceleration: float
-    max_acceleration: float
-    #: 1 / time on the wire, or speed / length [1/s]. Faster only as its limits allow.
-    rate: float
-    has_wire_time: bool = False
-    source: str
-    remark: str = ''
-    #: Its time; NaN = it has none. At least: what its limits allow at rest at both ends.
-    time: float = nan
-    min_time: float = 0.0
+    :param running: the first segment as it was planned, where it has been sent.
+    :raises InvalidGoal: nobody knows how fast the robot would run a segment.
+    """
 
-
-class SegmentTimer:
-    """Knows what one segment asks of its move, and its limits."""
+    #: Greatest speeds; accelerations, and the greatest ones that may follow from a time.
+    speed: Floats
+    acceleration: Floats
+    max_acceleration: Floats
+    #: The greatest ones as the goal and the limits give them, for lengths in full.
+    allowed_acceleration: Floats
+    #: 1 / time on the wire, or speed / length [1/s]. Faster only as their limits allow.
+    rate: Floats
+    #: Their times; NaN = none. At least: what the limits allow at rest at both ends.
+    time: Floats
+    min_time: Floats
 
     def __init__(
-        self, geometry: SegmentGeometry, options: PlanningOptions, model: RobotModel
+        self,
+        geometries: SegmentGeometries,
+        options: PlanningOptions,
+        model: RobotModel,
+        running: PlannedSegment | None = None,
     ) -> None:
-        self.geometry, self.options, self.model = geometry, options, model
-        self.length, self.unit = leading_quantity(geometry)
-        self.speed_unit = speed_unit(self.unit)
-        self.limits = speed_limits(geometry, self.length, options, model)
-        self.turn_leads_line = self.unit == 'rad' and geometry.kind == SegmentType.LINEAR
-        self.peak = _PEAK_OF_TURN if self.turn_leads_line else _PEAK
-        self._ramp_share = RAMP_SHARE
-        #: Part of its length that the robot counts, by the turn ratio.
-        self._counted = 1.0
-        if self.turn_leads_line:
-            counted = max(geometry.curve.length, self.length / options.turn_ratio)
-            self._counted = counted / self.length
-            # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
-            self._ramp_share = 1.0 / (1.0 + max(1.0, 2.0 * self._counted))
+        self.geometries, self._options = geometries, options
+        self.limits = limits = SpeedLimits(geometries, options, model)
+        self._kinds, self._curves = geometries.kinds, geometries.path.curves
+        self.length: Floats = limits.length
+        self._turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
+        self.peak = np.where(self._turn_leads_line, _PEAK_OF_TURN, _PEAK)
+        # Part of the length that the robot counts, by the turn ratio.
+        counted = np.maximum(self._curves.length, self.length / options.turn_ratio) / self.length
+        self._counted = np.where(self._turn_leads_line, counted, 1.0)
         #: The acceleration that the robot makes of the one that is sent.
-        self.acceleration_unit = 1.0
-        if is_optimized(geometry.kind):
-            self.acceleration_unit = _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
+        self.acceleration_unit = np.where(
+            limits.is_optimized, _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed), 1.0
+        )
+        #: Whether the wire carries a time. Never in the dialect that counts in milliseconds: a
+        #: robot program that counts in microseconds would run a segment a thousand times too fast,
+        #: and a program does not report how it counts.
+        self.has_wire_time = np.isin(self._kinds, _TIMED_ON_WIRE) & (not options.dialect.is_coarse)
+        #: By row, on what the limits change.
+        self.remarks: dict[int, str] = {}
+        self._source = np.zeros(len(geometries), dtype=np.intp)
+        self.time, self.min_time = geometries.times.copy(), np.zeros(len(geometries))
+        self.is_timed = bool(geometries.times[0] > 0.0)
+        if self.is_timed:
+            self._by_time()
+        else:
+            self._by_speed()
+        self._is_running = running is not None
+        if running is not None:
+            self._request_again(running)
 
-    @property
-    def takes_time(self) -> bool:
-        """
-        Tell whether the wire carries a time for the motion.
+    def source(self, row: int) -> str:
+        """Return where speed or time of a segment come from."""
+        point = self.geometries.begin + row
+        if self._is_running and row == 0:
+            return ''
+        if self.is_timed:
+            return f'time from points[{point}].time_from_start'
+        within = self._turn_leads_line[row] and self.limits.translates[row]
+        source = _SOURCES[self._source[row]].format(point)
+        return source + (', turn within angular_velocity' if within else '')
 
-        Never in the dialect that counts in milliseconds: a robot program that counts in
-        microseconds would run a segment a thousand times too fast, and a program does not report
-        how it counts.
-        """
-        return self.geometry.kind in _TIMED_ON_WIRE and not self.options.dialect.is_coarse
-
-    def move(self) -> tuple[float, ...]:
-        """Return its row of :class:`Moves`, still without speeds and time."""
-        geometry, counted = self.geometry, self.length * self._counted
-        before, after = geometry.blend_before, geometry.blend_after
-        head = counted * geometry.u_join if before else 0.0
-        tail = max(counted * (1.0 - geometry.u_leave), 1e-12) if after else 0.0
-        stops_within = inf
-        if after is not None and geometry.kind == SegmentType.PROCESS:
-            stops_within = after.radius
-        return (
-            counted,
-            1.0,
-            1.0,
-            0.0,
-            self._ramp_share,
-            stops_within,
-            head,
-            tail,
-            self._blend_rate(before, head),
-            self._blend_rate(after, tail),
+    def moves(self) -> Moves:
+        """Return the moves, still without speeds and times."""
+        path, counted = self.geometries.path, self.length * self._counted
+        before, after = path.has_blend_before, path.has_blend_after
+        head = np.where(before, counted * path.u_join, 0.0)
+        tail = np.where(after, np.maximum(counted * (1.0 - path.u_leave), 1e-12), 0.0)
+        # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
+        ramp = np.where(
+            self._turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
+        )
+        fillet, arc = path.fillet & after, path.blend_length
+        at_radius = after & (self._kinds == SegmentType.PROCESS)
+        # Lengths for a unit of ``s``.
+        leaving = np.maximum(2.0 * tail, 1e-12)
+        joining = np.maximum(2.0 * head, 1e-12)
+        per_metre = self.length / np.maximum(self._curves.length, 1e-300)
+        joining[1:] = np.where(fillet[:-1], arc[:-1] * per_metre[1:], joining[1:])
+        leaving = np.where(fillet, arc * per_metre, leaving)
+        one = np.ones(len(counted))
+        return Moves(
+            length=counted,
+            speed=one,
+            acceleration=one,
+            time=0.0 * one,
+            ramp_part=ramp,
+            stops_within=np.where(at_radius, path.radius, inf),
+            head=head,
+            tail=tail,
+            exit_rate=joining,
+            entry_rate=leaving,
         )
 
-    def _blend_rate(self, blend: Blend | None, part: float) -> float:
-        """Return its length for a unit of ``s`` at its end of a blend."""
-        if blend is not None and blend.fillet:
-            return blend.length * self.length / self.geometry.curve.length
-        return max(2.0 * part, 1e-12)
-
-    def request(self) -> SpeedRequest:
-        """Return what it asks for."""
-        geometry = self.geometry
-        if geometry.time is None:
-            return self._by_speed()
-        if not self.takes_time and self.unit == 'rad' and geometry.kind in _UNMEASURED_TURNS:
-            raise InvalidGoal(
-                point_field(geometry.index, 'time_from_start'),
-                f'is the time of a {geometry.kind.name} segment that turns the tool by '
-                f'{self.length:.3f} rad over {geometry.curve.length:.3f} m; how fast the '
-                'robot runs it where the turn is the larger number has not been measured',
-                'give velocity instead of times, or turn the tool on LINEAR segments',
-            )
-        return self._by_time()
-
-    def request_again(self, running: PlannedSegment) -> SpeedRequest:
-        """Return what has been sent already."""
+    def _request_again(self, running: PlannedSegment) -> None:
+        """Ask for what has been sent already."""
         sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
         assert not isinstance(sent, Spline)
-        speed, acceleration = sent.velocity, sent.acceleration * self.acceleration_unit
-        return SpeedRequest(
-            speed=speed,
-            acceleration=acceleration,
-            max_acceleration=acceleration,
-            rate=1.0 / time if time else speed / (self.length * self._counted),
-            has_wire_time=time > 0.0,
-            source='',
-        )
+        acceleration = sent.acceleration * self.acceleration_unit[0]
+        self.speed[0], self.acceleration[0] = sent.velocity, acceleration
+        self.max_acceleration[0] = acceleration
+        counted = self.length[0] * self._counted[0]
+        self.rate[0] = 1.0 / time if time else sent.velocity / counted
+        self.has_wire_time[0] = time > 0.0
+        self.time[0], self.min_time[0] = nan, 0.0
+        self.remarks.pop(0, None)
 
     # -- speeds ----------------------------------------------------------------------------------
 
-    def _by_speed(self) -> SpeedRequest:
-        """Return what a segment without a time asks for."""
-        geometry, limits = self.geometry, self.limits
-        bound, name, unit = limits.speed, limits.name, self.speed_unit
-        if self.turn_leads_line and translates(geometry):
-            bound, name, unit = self.options.max_tool_speed or inf, 'max_tool_speed', 'm/s'
-        wanted, source = self._wanted_speed()
-        velocity = min(wanted, bound)
-        remark = ''
-        if velocity < wanted:
-            remark = (
-                f'point {geometry.index}: slowed from {wanted:.3g} to {velocity:.3g} {unit} '
-                f'by {name}'
+    def _by_speed(self) -> None:
+        """Ask for speeds."""
+        options, limits = self._options, self.limits
+        at_speed_of_tool = self._turn_leads_line & limits.translates
+        bound = np.where(at_speed_of_tool, options.max_tool_speed or inf, limits.speed)
+        wanted = self._wanted_speeds()
+        velocity = np.minimum(wanted, bound)
+        for row in rows_where(velocity < wanted * _ROUNDED):
+            name, unit = limits.name(row), limits.unit(row)
+            if at_speed_of_tool[row]:
+                name, unit = 'max_tool_speed', 'm/s'
+            self.remarks[row] = (
+                f'point {self.geometries.begin + row}: slowed from {wanted[row]:.3g} to '
+                f'{velocity[row]:.3g} {unit} by {name}'
             )
-        acceleration = geometry.segment.acceleration or self._default_acceleration()
-        if not is_optimized(geometry.kind):
-            acceleration = min(acceleration, limits.acceleration)
-        if self.turn_leads_line:
-            return self._turning_line(velocity, acceleration, source, remark)
-        acceleration *= self.acceleration_unit
-        return SpeedRequest(
-            speed=velocity,
-            acceleration=acceleration,
-            max_acceleration=acceleration,
-            rate=velocity / self.length,
-            source=source,
-            remark=remark,
+        own = self.geometries.segments.accelerations
+        acceleration = np.where(own > 0.0, own, self._default_accelerations())
+        acceleration = np.where(
+            limits.is_optimized, acceleration, np.minimum(acceleration, limits.acceleration)
+        )
+        self.speed, self.rate = velocity, velocity / self.length
+        self.acceleration = acceleration * self.acceleration_unit
+        self.has_wire_time &= self._turn_leads_line
+        self._turning_lines(velocity, acceleration)
+        self.max_acceleration = self.acceleration.copy()
+
+    def _wanted_speeds(self) -> Floats:
+        """Return the speeds that the goal asks for."""
+        options, segments, kinds = self._options, self.geometries.segments, self._kinds
+        limits, twists = self.limits, self.geometries.waypoints.twists
+        speeds = np.where(
+            limits.translates,
+            np.linalg.norm(twists[:, :3], axis=1),
+            np.linalg.norm(twists[:, 3:], axis=1),
+        )
+        # One number for both: the turn may be faster [rad/s], but no faster than the tool [m/s].
+        fastest = options.max_tool_speed or options.angular_velocity
+        both = max(options.linear_velocity, min(options.angular_velocity, fastest))
+        choices = (
+            (segments.velocities > 0.0, segments.velocities),
+            (limits.is_optimized, options.optimized_velocity),
+            (kinds == SegmentType.JOINT, options.joint_velocity),
+            (speeds > 0.0, speeds),
+            (~limits.translates, options.angular_velocity),
+            (limits.is_turn & (kinds != SegmentType.LINEAR), both),
+        )
+        conditions = [condition for condition, _ in choices]
+        self._source = np.select(conditions, range(len(choices)), len(choices))
+        return np.select(conditions, [speed for _, speed in choices], options.linear_velocity)
+
+    def _default_accelerations(self) -> Floats:
+        options = self._options
+        return np.select(
+            [self.limits.is_optimized, self._kinds == SegmentType.JOINT, self.limits.translates],
+            [
+                options.optimized_acceleration,
+                options.joint_acceleration,
+                options.linear_acceleration,
+            ],
+            options.angular_acceleration,
         )
 
-    def _wanted_speed(self) -> tuple[float, str]:
-        """Return the speed that the goal asks for, and where it comes from."""
-        geometry, options = self.geometry, self.options
-        if geometry.segment.velocity > 0.0:
-            return geometry.segment.velocity, f'speed from segments[{geometry.index}].velocity'
-        if is_optimized(geometry.kind):
-            return options.optimized_velocity, 'speed from optimized_velocity'
-        if geometry.kind == SegmentType.JOINT:
-            return options.joint_velocity, 'speed from joint_velocity'
-        twist = geometry.waypoint.twist
-        speed = hypot(*twist[:3]) if translates(geometry) else hypot(*twist[3:])
-        if speed > 0.0:
-            return speed, f'speed from points[{geometry.index}].twist'
-        if not translates(geometry):
-            return options.angular_velocity, 'speed from angular_velocity'
-        if self.unit == 'rad' and geometry.kind != SegmentType.LINEAR:
-            # One number for both: the turn may be faster [rad/s], but no faster than the tool
-            # [m/s].
-            fastest = options.max_tool_speed or options.angular_velocity
-            return (
-                max(options.linear_velocity, min(options.angular_velocity, fastest)),
-                'speed from linear_velocity and angular_velocity, as the turn leads',
-            )
-        return options.linear_velocity, 'speed from linear_velocity'
-
-    def _default_acceleration(self) -> float:
-        options = self.options
-        if is_optimized(self.geometry.kind):
-            return options.optimized_acceleration
-        if self.geometry.kind == SegmentType.JOINT:
-            return options.joint_acceleration
-        if translates(self.geometry):
-            return options.linear_acceleration
-        return options.angular_acceleration
-
-    def _turning_line(
-        self, velocity: float, acceleration: float, source: str, remark: str
-    ) -> SpeedRequest:
+    def _turning_lines(self, velocity: Floats, acceleration: Floats) -> None:
         """
-        Return what a line asks for on which the turn leads.
+        Ask for the times of lines on which the turn leads.
 
         The robot may turn the tool as slowly as it moves it, or several times as fast: a time is
         sent instead, in which the tool keeps its speed [m/s] and turns no faster than the default
         (without a way: than was asked for), whichever it is.
         """
-        options, limits, peak = self.options, self.limits, self.peak
-        turn = velocity, acceleration
-        line_time = 0.0
-        if translates(self.geometry):
-            line_time = min_duration(self.geometry.curve.length, velocity, acceleration, peak)
-            turn = options.angular_velocity, options.angular_acceleration
-            source = f'{source}, turn within angular_velocity'
-        turn_rate = min(turn[1], limits.acceleration)
+        rows = np.flatnonzero(self._turn_leads_line)
+        if not len(rows):
+            return
+        options, translates, peak = self._options, self.limits.translates[rows], self.peak[rows]
+        length, counted, timed = self.length[rows], self._counted[rows], self.has_wire_time[rows]
+        speed_limit, velocity = self.limits.speed[rows], velocity[rows]
+        line_time = np.where(
+            translates,
+            min_duration(self._curves.length[rows], velocity, acceleration[rows], peak),
+            0.0,
+        )
+        turn_speed = np.where(translates, options.angular_velocity, velocity)
+        turn_rate = np.where(translates, options.angular_acceleration, acceleration[rows])
+        turn_rate = np.minimum(turn_rate, self.limits.acceleration[rows])
         time, wanted = (
-            max(line_time, min_duration(self.length, turn_speed, turn_rate, peak))
-            for turn_speed in (min(turn[0], limits.speed), turn[0])
+            np.maximum(line_time, min_duration(length, speed, turn_rate, peak))
+            for speed in (np.minimum(turn_speed, speed_limit), turn_speed)
         )
-        if time > wanted * _NOTICEABLY:
-            slowed = (
-                f'point {self.geometry.index}: turns in {time:.3f} s instead of {wanted:.3f} s, '
-                f'because of {limits.name}'
+        for k in rows_where(time > wanted * _NOTICEABLY):
+            row = int(rows[k])
+            before = f'{self.remarks[row]}; ' if row in self.remarks else ''
+            self.remarks[row] = (
+                f'{before}point {self.geometries.begin + row}: turns in {time[k]:.3f} s instead '
+                f'of {wanted[k]:.3f} s, because of {self.limits.name(row)}'
             )
-            remark = f'{remark}; {slowed}' if remark else slowed
-        counted, timed, peak = self._counted, self.takes_time, self.peak
         # Without a time on the wire: a third each of speeding up, cruising and braking.
-        speed = self.length / time * (peak if timed else _PEAK)
-        acceleration = turn_rate if timed else 4.5 * self.length / time**2
-        return SpeedRequest(
-            speed=speed * counted,
-            acceleration=acceleration * counted,
-            max_acceleration=acceleration * counted,
-            rate=1.0 / time if timed else speed / self.length,
-            has_wire_time=timed,
-            source=source,
-            remark=remark,
-        )
+        speed = length / time * np.where(timed, peak, _PEAK)
+        self.speed[rows] = speed * counted
+        self.acceleration[rows] = counted * np.where(timed, turn_rate, 4.5 * length / time**2)
+        self.rate[rows] = np.where(timed, 1.0 / time, speed / length)
 
     # -- times -----------------------------------------------------------------------------------
 
-    def _by_time(self) -> SpeedRequest:
-        """Return what a segment with a time asks for."""
-        geometry, limits = self.geometry, self.limits
-        assert geometry.time is not None
-        length = self.length * geometry.unblended_fraction
-        mean = length / geometry.time
-        most = min(self.max_acceleration(), _UNLIMITED)
-        least = most
-        if not self.takes_time:
-            least = self._own_acceleration() or max(
-                self._default_acceleration(),
-                # A third each of speeding up, cruising and braking; and no braking before a blend.
-                4.5 * length / geometry.time**2,
-                mean**2 / (self.length * (1.0 - geometry.u_leave))
-                if geometry.blend_after and geometry.kind != SegmentType.PROCESS
-                else 0.0,
+    def _by_time(self) -> None:
+        """Ask for times."""
+        geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
+        unmeasured = ~timed & limits.is_turn & np.isin(self._kinds, _UNMEASURED_TURNS)
+        for row in rows_where(unmeasured)[:1]:
+            raise InvalidGoal(
+                point_field(geometries.begin + row, 'time_from_start'),
+                f'is the time of a {SegmentType(self._kinds[row]).name} segment that turns the '
+                f'tool by {self.length[row]:.3f} rad over {self._curves.length[row]:.3f} m; how '
+                'fast the robot runs it where the turn is the larger number has not been measured',
+                'give velocity instead of times, or turn the tool on LINEAR segments',
             )
-        counted = self._counted
-        return SpeedRequest(
-            speed=limits.speed * counted,
-            acceleration=min(least, most) * counted,
-            max_acceleration=most * counted,
-            rate=1.0 / geometry.time,
-            has_wire_time=self.takes_time,
-            source=f'time from points[{geometry.index}].time_from_start',
-            time=geometry.time,
-            # A move with a time is planned to rest at its waypoint, also where it is blended.
-            min_time=min_duration(self.length, limits.speed, limits.acceleration, self.peak)
-            if self.takes_time
-            else 0.0,
-        )
+        length, path = self.length * geometries.unblended_fractions, geometries.path
+        own = self._own_accelerations()
+        most = np.minimum(np.where(own > 0.0, own, inf), limits.acceleration)
+        self.allowed_acceleration, most = most, np.minimum(most, _UNLIMITED)
+        # A third each of speeding up, cruising and braking; and no braking before a blend.
+        brakes = path.has_blend_after & (self._kinds != SegmentType.PROCESS)
+        tail = np.where(brakes, self.length * (1.0 - path.u_leave), inf)
+        needed = np.maximum(4.5 * length / self.time**2, (length / self.time) ** 2 / tail)
+        by_speed = np.where(own > 0.0, own, np.maximum(self._default_accelerations(), needed))
+        least = np.minimum(np.where(timed, most, by_speed), most)
+        self.speed = limits.speed * self._counted
+        self.acceleration, self.max_acceleration = least * self._counted, most * self._counted
+        self.rate = 1.0 / self.time
+        # A move with a time is planned to rest at its waypoint, also where it is blended.
+        alone = min_duration(self.length, limits.speed, limits.acceleration, self.peak)
+        self.min_time = np.where(timed, alone, 0.0)
 
-    def _own_acceleration(self) -> float:
-        """Return the acceleration that the goal gives a timed segment; 0 = none."""
-        timed = self.geometry.kind in _TIMED_ON_WIRE
-        return 0.0 if timed else self.geometry.segment.acceleration
-
-    def max_acceleration(self) -> float:
-        """Return the maximum acceleration that may follow from a time."""
-        return min(self._own_acceleration() or inf, self.limits.acceleration)
+    def _own_accelerations(self) -> Floats:
+        """Return the accelerations that the goal gives timed segments; 0 = none."""
+        timed = np.isin(self._kinds, _TIMED_ON_WIRE)
+        return np.where(timed, 0.0, self.geometries.segments.accelerations)
