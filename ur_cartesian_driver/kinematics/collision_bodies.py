@@ -28,6 +28,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import IntEnum
+from functools import cache
 from math import hypot
 from types import MappingProxyType
 from typing import TypeAlias
@@ -376,6 +377,7 @@ def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
     return _END_FACTOR * body.radius / length, _RADIUS_FACTOR * body.radius
 
 
+@cache
 def _pair_indices(
     links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
 from operator import attrgetter, eq
-from typing import Any, overload, TypeVar
+from typing import Any, ClassVar, overload, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,18 +59,17 @@ class Rows(Sequence[T]):
     Arrays are made read-only. Mappings hold what few rows have, by row.
     """
 
-    __slots__ = ()
+    __slots__: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         for name, column in self._columns():
-            if isinstance(column, np.ndarray):
+            if isinstance(column, np.ndarray) and column.flags.writeable:
                 view = column.view()
                 view.setflags(write=False)
                 object.__setattr__(self, name, view)
 
-    def _columns(self) -> Iterator[tuple[str, Any]]:
-        for each in fields(self):  # type: ignore[arg-type]
-            yield each.name, getattr(self, each.name)
+    def _columns(self) -> list[tuple[str, Any]]:
+        return [(name, getattr(self, name)) for name in type(self).__slots__]
 
     def take(self: R, rows: slice) -> R:
         """Return some of the rows."""

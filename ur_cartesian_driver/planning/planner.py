@@ -89,6 +89,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     resolve_execution_mode,
     segment_field,
+    type_table,
 )
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
@@ -114,6 +115,7 @@ _CLASSES = {
 }
 #: The kind of the primitive's row, by type; that of an arc has no meaning.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
+_HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
 #: A planner in the registry of execution modes.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
@@ -316,7 +318,7 @@ class GoalPlanner:
             kinds=_MOVE_OF[kinds],
             targets=self.targets.rows[geometries.begin :],
             q_near=geometries.joints,
-            has_q_near=np.isin(kinds, JOINT_SPACE_TYPES),
+            has_q_near=_HAS_Q_NEAR[kinds],
             velocities=timings.velocities,
             accelerations=timings.accelerations,
             durations=timings.wire_times,

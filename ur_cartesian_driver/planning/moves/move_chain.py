@@ -15,8 +15,8 @@ Lengths are those that the robot counts: metres, or radians where the turn or a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,10 @@ _SAME = 1e-10
 #: A point is in time within this [s]; so often neighbours are fitted to each other at most.
 _IN_TIME = 1e-7
 _MAX_FITS = 60
-#: Steps of a fit, and the part of the mean speed below which no move is slowed.
+#: Steps of a fit, which takes one more from where times differ by less than this (relative).
 _FIT_STEPS = 14
+_SAME_TIME = 1e-11
+#: The part of the mean speed below which no move is slowed.
 _MIN_RATE = 0.2
 _TINY = 1e-300
 
@@ -42,19 +44,21 @@ _TINY = 1e-300
 class _Columns:
     """Columns (n,) of floats."""
 
+    __slots__: ClassVar[tuple[str, ...]] = ()
+
     @classmethod
     def of(cls, rows: Any) -> Self:
         """Return the columns of rows (n, m)."""
-        return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(fields(cls))).T.copy())  # type: ignore[arg-type]
+        return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls.__slots__)).T.copy())
 
     def take(self, rows: Rows) -> Self:
         """Return some rows."""
-        return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))  # type: ignore[arg-type]
+        return type(self)(*[getattr(self, name)[rows] for name in self.__slots__])
 
     def put(self, rows: Rows, other: Self) -> None:
         """Replace some rows."""
-        for f in fields(self):  # type: ignore[arg-type]
-            getattr(self, f.name)[rows] = getattr(other, f.name)
+        for name in self.__slots__:
+            getattr(self, name)[rows] = getattr(other, name)
 
 
 @dataclass(slots=True)
@@ -210,7 +214,7 @@ class MoveChain:
         n = len(moves.length)
         self.moves, self._first = moves, first
         self._handed = Handover.of(np.zeros((n, 4)))
-        self.times = MoveTimes.of(np.zeros((n, len(fields(MoveTimes)))))
+        self.times = MoveTimes.of(np.zeros((n, len(MoveTimes.__slots__))))
         if first is not None:
             self._handed.put(np.array([1]), Handover.of([first[:-1]]))
         self.follow(np.arange(n))
@@ -218,7 +222,7 @@ class MoveChain:
     @property
     def blend_entries(self) -> Floats:
         """The :class:`BlendEntry` of the blend after each move (n, 5), zeros without one."""
-        handed = (getattr(self._handed, f.name) for f in fields(Handover))
+        handed = (getattr(self._handed, name) for name in Handover.__slots__)
         before = np.stack((*handed, self.times.blend_half), axis=1)
         return np.concatenate((before[1:], np.zeros((1, 5))))
 
@@ -232,8 +236,8 @@ class MoveChain:
             new = _hand_over(self.moves.take(rows), self.times.take(rows))
             old = self._handed.take(rows + 1)
             changed = np.zeros(len(rows), dtype=np.bool_)
-            for f in fields(Handover):
-                a, b = getattr(new, f.name), getattr(old, f.name)
+            for name in Handover.__slots__:
+                a, b = getattr(new, name), getattr(old, name)
                 changed |= np.abs(a - b) > _SAME * np.abs(a)
             rows = rows[changed] + 1
             self._handed.put(rows, new.take(np.flatnonzero(changed)))
@@ -276,12 +280,9 @@ class MoveChain:
             rows = np.flatnonzero(asked & (slow | fast))
             if not len(rows):
                 return
-
-            def durations(x: Floats, rows: Rows = rows) -> Floats:
-                return self.durations_with(rows, at_rate(rows, x))
-
             rate[rows] = _fit(
-                durations,
+                lambda rows, x: self.durations_with(rows, at_rate(rows, x)),
+                rows,
                 spent[rows] - off[rows],
                 rate[rows],
                 lowest[rows],
@@ -361,7 +362,8 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
 
 
 def _fit(
-    durations: Callable[[Floats], Floats],
+    durations: Callable[[Rows, Floats], Floats],
+    rows: Rows,
     wanted: Floats,
     rate: Floats,
     lowest: Floats,
@@ -372,12 +374,11 @@ def _fit(
 
     Times are nearly powers of the rate: the secant between two rates with the time in between.
     """
-    low, high = np.log(lowest), np.log(highest)
-    f_low, f_high = (np.log(durations(x) / wanted) for x in (lowest, highest))
-    unreachable = f_high >= 0.0
-    x, side = np.log(np.clip(rate, lowest, highest)), np.zeros(len(rate))
+    low, high, x = tried = np.log([lowest, highest, np.clip(rate, lowest, highest)])
+    took = durations(np.tile(rows, 3), np.exp(tried).ravel())
+    f_low, f_high, f = np.log(took.reshape(tried.shape) / wanted)
+    unreachable, side = f_high >= 0.0, np.zeros(len(rate))
     for _ in range(_FIT_STEPS):
-        f = np.log(durations(np.exp(x)) / wanted)
         slow = f > 0.0
         low, f_low_new = np.where(slow, x, low), np.where(slow, f, f_low)
         high, f_high_new = np.where(slow, high, x), np.where(slow, f_high, f)
@@ -389,6 +390,7 @@ def _fit(
         x = np.where(
             f_high >= 0.0, high, np.where(f_low <= 0.0, low, low + (high - low) * f_low / between)
         )
-        if (np.abs(f) < 1e-13).all():
+        if (np.abs(f) < _SAME_TIME).all():
             break
+        f = np.log(durations(rows, np.exp(x)) / wanted)
     return np.where(unreachable, highest, np.clip(np.exp(x), lowest, highest))

@@ -28,13 +28,14 @@ from ur_cartesian_driver.planning.geometry.curves import (
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
-from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
 from ur_cartesian_driver.planning.request.validate import arc_through_via
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+_IN_JOINT_SPACE = type_table(JOINT_SPACE_TYPES)
 #: What is left of a segment between blends that touch, or that reach its end [m]: more than the
 #: rounding of two poses and two radii to micrometres.
 _MIN_BLEND_GAP = 5e-6
@@ -81,7 +82,7 @@ class SegmentDrafts:
         #: (n,) numbers of types: AUTO resolved, JOINT where that replaces a line or an arc.
         self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
         #: (n,) which are straight lines in joint space.
-        self.is_joint_move: Flags = np.isin(self.kinds, JOINT_SPACE_TYPES)
+        self.is_joint_move: Flags = _IN_JOINT_SPACE[self.kinds]
         # By row, so that they can be put in order.
         found: list[tuple[int, str]] = []
         #: (n,) [m]

@@ -13,7 +13,9 @@ from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Flags
 from ur_cartesian_driver.planning.moves.path_margins import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins
-from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES
+from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
+
+_IS_OPTIMIZED = type_table(OPTIMIZED_TYPES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +47,7 @@ class SegmentGeometries:
     @property
     def is_optimized(self) -> Flags:
         """(n,) whether speeds are fractions of the robot's limits."""
-        return np.isin(self.kinds, OPTIMIZED_TYPES)
+        return _IS_OPTIMIZED[self.kinds]
 
     @property
     def unblended_fractions(self) -> Floats:

@@ -28,7 +28,11 @@ from ur_cartesian_driver.planning.moves.path_margins import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    point_field,
+    segment_field,
+    type_table,
+)
 
 #: Times that differ by less than this factor are the same. One that comes out longer by less than
 #: the second is kept.
@@ -36,7 +40,7 @@ _NEARLY, _KEPT = 1.0 + 1e-5, 1.002
 #: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
 #: Motions whose blends the robot leaves out if it passes their radius within a control cycle.
-_NEEDS_A_CYCLE = (SegmentType.CIRCULAR, SegmentType.PROCESS)
+_NEEDS_A_CYCLE = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
 #: What exceeds a limit by less than this factor keeps to it. Faster moves are slowed so often.
 _WITHIN = 1.0 + 1e-6
 _MAX_ROUNDS = 40
@@ -328,7 +332,7 @@ class _Timetable:
         takes_too_long = timings.wire_times > self._options.max_segment_time
         slowest = np.minimum(timings.velocities, timings.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
-        needs_a_cycle = np.isin(self._geometries.kinds, _NEEDS_A_CYCLE) & path.has_blend_after
+        needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
         travel = timings.velocities * self._model.control_cycle
         too_small = needs_a_cycle & (path.radius < travel)
         refused = takes_too_long | too_slow | too_small

@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
 
 #: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
 #: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
@@ -33,9 +33,9 @@ RAMP_SHARE = 1.0 / 3.0
 #: not published. It only serves to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 #: Motions that take a time on the wire.
-_TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
+_TIMED_ON_WIRE = type_table((SegmentType.LINEAR, SegmentType.JOINT))
 #: Motions that take none, whose turn has never been measured.
-_UNMEASURED_TURNS = (SegmentType.CIRCULAR, SegmentType.PROCESS)
+_UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
 #: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
 #: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
@@ -110,7 +110,7 @@ class SpeedRequests:
         #: Whether the wire carries a time. Never in the dialect that counts in milliseconds: a
         #: robot program that counts in microseconds would run a segment a thousand times too fast,
         #: and a program does not report how it counts.
-        self.has_wire_time = np.isin(self._kinds, _TIMED_ON_WIRE) & (not options.dialect.is_coarse)
+        self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & (not options.dialect.is_coarse)
         #: By row, on what the limits change.
         self.remarks: dict[int, str] = {}
         self._source = np.zeros(len(geometries), dtype=np.intp)
@@ -288,7 +288,7 @@ class SpeedRequests:
     def _by_time(self) -> None:
         """Ask for times."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
-        unmeasured = ~timed & limits.is_turn & np.isin(self._kinds, _UNMEASURED_TURNS)
+        unmeasured = ~timed & limits.is_turn & _UNMEASURED_TURNS[self._kinds]
         for row in rows_where(unmeasured)[:1]:
             raise InvalidGoal(
                 point_field(geometries.begin + row, 'time_from_start'),
@@ -316,5 +316,5 @@ class SpeedRequests:
 
     def _own_accelerations(self) -> Floats:
         """Return the accelerations that the goal gives timed segments; 0 = none."""
-        timed = np.isin(self._kinds, _TIMED_ON_WIRE)
+        timed = _TIMED_ON_WIRE[self._kinds]
         return np.where(timed, 0.0, self.geometries.segments.accelerations)
