@@ -69,17 +69,20 @@ from ur_cartesian_driver.kinematics.robot_models import (
 from ur_cartesian_driver.motion.errors import (
     ErrorCode,
     GoalRefused,
+    InvalidGoal,
     LocalProtocolError,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.io_signals import Signals
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
@@ -110,7 +113,7 @@ class Driver(RobotServices, InteractiveMotions):
 
         with Driver(DriverConfig(robot_ip='192.168.56.101', ur_type='ur5e')) as driver:
             driver.wait_ready(timeout=10.0)
-            plan = driver.plan(goal)  # raises GoalRefused; nothing moves
+            plan = driver.plan(goal)  # or a Path; raises GoalRefused; nothing moves
             motion = driver.start(plan)  # returns at once
             outcome = motion.result()
 
@@ -123,17 +126,20 @@ class Driver(RobotServices, InteractiveMotions):
         config: DriverConfig,
         options: PlanningOptions | None = None,
         *,
+        frames: Frames | None = None,
         auto_heartbeat: bool = True,
     ) -> None:
         """
         Prepare a driver; nothing is connected before :meth:`open`.
 
+        :param frames: the frames that paths may name; None = those of every robot.
         :param auto_heartbeat: send heartbeats from a thread; an owner that can hang (a ROS
             executor) calls :meth:`heartbeat` itself.
         :raises ValueError: ``ur_type`` is unknown.
         """
         self.config = config
         self.options = options if options is not None else PlanningOptions()
+        self.frames = frames if frames is not None else Frames(self.options.tf_prefix)
         self._has_warned_of_cell = False
         self._arm = Arm(robot_model(config.ur_type))
         self._loop = LoopConnection(
@@ -258,13 +264,17 @@ class Driver(RobotServices, InteractiveMotions):
 
     # ---- motion -------------------------------------------------------------------------------
 
-    def plan(self, goal: Goal) -> Plan:
+    def plan(self, goal: Goal | Path) -> Plan:
         """
         Check a goal and choose its primitives, starting from :attr:`rest_state`; nothing moves.
 
+        :param goal: or a path: its frames are resolved now, and the arm has to stand at its start
+            unless its first motion is a joint motion.
         :raises GoalRefused: the text says why; :exc:`RobotNotReady` without a robot state.
         """
         state = self._require(self.rest_state)
+        if isinstance(goal, Path):
+            goal = self._goal_of(goal, state)
         return plan(goal, state, self.arm, self._options_for(state))
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
@@ -286,14 +296,14 @@ class Driver(RobotServices, InteractiveMotions):
 
     def execute(
         self,
-        goal: Goal,
+        goal: Goal | Path,
         on_progress: OnProgress | None = None,
         timeout: float | None = None,
         *,
         preempt: bool = False,
     ) -> Outcome:
         """
-        Plan and run a goal, and wait for its outcome; a refusal is an outcome too.
+        Plan and run a goal or path, and wait for its outcome; a refusal is an outcome too.
 
         :param preempt: stop a running motion for this goal, once the goal has passed all checks
             from where the arm would come to rest; False = refuse the goal while a motion runs.
@@ -388,6 +398,31 @@ class Driver(RobotServices, InteractiveMotions):
         if state is None:
             raise RobotNotReady(self._status.message or NO_STATE)
         return state
+
+    def _goal_of(self, path: Path, state: RobotState) -> Goal:
+        """
+        Return the goal of a path for the robot in a state.
+
+        :raises InvalidGoal: a frame is not known, or the arm does not stand at the start.
+        """
+        snapshot = ArmSnapshot.of(state)
+        goal = path.goal(self.frames, snapshot)
+        if path.start is None or path.starts_with_joint_motion:
+            return goal
+        T_flange_tool = goal.T_flange_controlled or snapshot.T_flange_tcp
+        tool = snapshot.T_base_flange @ T_flange_tool
+        start = goal.T_base_frame @ path.start
+        distance, angle = tool.distance_to(start), tool.angle_to(start)
+        options = self.options
+        if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
+            raise InvalidGoal(
+                'the start of the path',
+                f'is {1e3 * distance:.1f} mm and {angle:.3f} rad away from the tool (allowed are '
+                f'{1e3 * options.start_tolerance_position:g} mm and '
+                f'{options.start_tolerance_angle:g} rad)',
+                'begin the path with a joint motion to there, or where the tool stands',
+            )
+        return goal
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
         """Return the planning options, with what the connected robot supports."""

@@ -28,8 +28,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
 from ur_cartesian_driver.goal_files.goal_reading import is_packed, point_rows, segment_rows
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
+from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.msg import CartesianTrajectory, DriverStatus
+from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.ros.messages.goal_messages import message_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_points
 
@@ -221,6 +223,25 @@ class GoalClient:
             )
             raise failures[0]
         return response.status, response.result
+
+    def execute(
+        self,
+        path: Path,
+        on_feedback: Callable[[FollowCartesianTrajectory.Feedback], None] | None = None,
+        timeout: float = 10.0,
+    ) -> Outcome:
+        """
+        Send a path and return how it ended, as ``Driver.execute`` does; as :meth:`send`.
+
+        The node knows the frames that the path names. Where the arm stands is not compared with
+        the start of the path, which a message does not hold.
+        """
+        _, result = self.send(path.to_message(), on_feedback, timeout)
+        return Outcome(
+            code=ErrorCode(result.error_code),
+            text=result.error_string,
+            report=tuple(result.report),
+        )
 
     def wait_ready(self, timeout: float) -> None:
         """

@@ -47,7 +47,7 @@ Flags = NDArray[np.bool_]
 _CHORDS = 16
 
 
-class Path(Protocol):
+class CurveSequence(Protocol):
     """Consecutive curves, by their numbers, as the checks along a path need them."""
 
     def __getitem__(self, number: int) -> Curve:
@@ -164,7 +164,7 @@ class BlendedPath:
     """
     The curves of consecutive segments with the blends between them; columns (n,).
 
-    As a :class:`Path` the curve of row k has the number 2k, and the blend after it 2k + 1.
+    As a :class:`CurveSequence` the curve of row k has the number 2k, the blend after it 2k + 1.
     """
 
     def __init__(self, curves: CurveRows) -> None:
@@ -245,7 +245,7 @@ class BlendedPath:
         return length, turn
 
     def rows(self, number: Integers, t: Floats) -> Floats:
-        """See :class:`Path`."""
+        """See :class:`CurveSequence`."""
         row, on_blend = number // 2, number % 2 == 1
         if not on_blend.any():
             return self.curves.rows(row, t)
@@ -285,7 +285,7 @@ class BlendedPath:
         return rows
 
     def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
-        """See :class:`Path`; the second half of a blend counts to the segment after it."""
+        """See :class:`CurveSequence`; the second half of a blend counts to the next segment."""
         row, on_blend = number // 2, number % 2 == 1
         after = on_blend & (t > 0.5)
         first, second = crossfade(self.u_leave[row], self.u_join[row + on_blend], t)

@@ -24,9 +24,9 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blended_path import (
     BlendedPath,
+    CurveSequence,
     Flags,
     Integers,
-    Path,
 )
 from ur_cartesian_driver.planning.geometry.curves import Curve
 
@@ -93,7 +93,7 @@ class PathSamples:
 class CurvePieces:
     """Parts of the curves of a path, one after the other; columns (n,)."""
 
-    path: Path
+    path: CurveSequence
     #: Index of the waypoint at the end of the path's first segment.
     first: int
     #: The number of the curve, and its range: ``u`` of a segment's curve, ``s`` of a blend.

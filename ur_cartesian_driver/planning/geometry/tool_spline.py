@@ -172,7 +172,7 @@ class ToolCurve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolSplinePath:
-    """The pieces of a spline as a :class:`~.blended_path.Path`, each a segment."""
+    """The pieces of a spline as a :class:`~.blended_path.CurveSequence`, each a segment."""
 
     spline: ToolSpline
     #: (n,) [m], [rad]

@@ -1,0 +1,368 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A path says what a goal has, and a mistake is a sentence at the line that makes it."""
+
+from math import nan, pi
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.goal_files import GoalFileError
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SafeOutput, SegmentType
+from ur_cartesian_driver.motion.pose import rotate
+from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.path import (
+    against,
+    analog,
+    AnalogDomain,
+    axis_angle,
+    deg,
+    digital,
+    DOWN,
+    ExecutionMode,
+    Frames,
+    mm,
+    Path,
+    Pose,
+    roll_pitch_yaw,
+    StaticFrame,
+    tilted,
+    Tolerance,
+    X,
+    Y,
+    Z,
+)
+from ur_cartesian_driver.resources import share_path
+
+HERE = Pose((-0.5, -0.1, 0.5), DOWN)
+START = Path(HERE)
+TORCH = digital(2)
+#: A text where a number is meant, and a pose where a name is.
+TEXT: Any = 'abc'
+POSE: Any = HERE
+
+
+def positions(path):
+    return [pose.position for pose in path.poses]
+
+
+def test_a_square_in_five_lines():
+    path = START.at(speed=0.1, acceleration=0.5, blend=mm(10))
+    path = path.by(dy=0.2).by(dx=0.2).by(dy=-0.2).by(dx=-0.2)
+    goal = path._table()
+    assert np.array(positions(path)) == pytest.approx(
+        np.array([(-0.5, 0.1, 0.5), (-0.3, 0.1, 0.5), (-0.3, -0.1, 0.5), (-0.5, -0.1, 0.5)])
+    )
+    for segment in goal.segments:
+        assert segment.type is SegmentType.LINEAR
+        assert (segment.velocity, segment.acceleration, segment.blend_radius) == (0.1, 0.5, 0.01)
+    assert not goal.waypoints.times.any()
+    assert {point.pose.quaternion for point in goal.waypoints} == {DOWN}
+
+
+def test_a_path_never_changes():
+    first = START.by(dx=0.1)
+    first.at(speed=1.0).by(dx=0.1).set(TORCH, True)
+    assert len(first) == 1
+    with pytest.raises(AttributeError):
+        first.frame = 'part'  # type: ignore[misc]
+
+
+def test_a_feed_holds_until_it_is_changed_and_one_motion_may_differ():
+    path = START.at(speed=0.1, joint_speed=1.0, turn_speed=0.5).by(dx=0.1).by(dx=0.1, speed=0.2)
+    path = path.at(speed=0.3).by(dx=0.1).joint((-0.4, 0.1, 0.4)).by(turn=axis_angle(Z, 1.0))
+    assert [segment.velocity for segment in path.goal().segments] == [0.1, 0.2, 0.3, 1.0, 0.5]
+
+
+def test_durations_become_times():
+    goal = START.by(dx=0.1, duration=0.1).by(dx=0.1, duration=0.2).goal()
+    assert [point.time for point in goal.waypoints] == [0.1, 0.3]
+
+
+def test_every_kind_of_motion():
+    path = (
+        START.line((-0.4, 0.0, 0.5), optimized=True, speed=0.5)
+        .joint((-0.4, 0.1, 0.5), posture={'elbow_joint': 1.6})
+        .process((-0.4, 0.15, 0.5), blend=mm(1))
+        .arc((-0.3, 0.25, 0.5), via=(-0.37, 0.22, 0.5), via_posture={'elbow_joint': 1.0})
+        .joint((-0.3, 0.1, 0.5), optimized=True)
+    )
+    goal = path.goal()
+    assert [segment.type for segment in goal.segments] == [
+        SegmentType.OPTIMIZED_LINEAR,
+        SegmentType.JOINT,
+        SegmentType.PROCESS,
+        SegmentType.CIRCULAR,
+        SegmentType.OPTIMIZED_JOINT,
+    ]
+    assert goal.waypoints[1].posture.values == (1.6,)
+    assert goal.segments[3].via_posture.names == ('elbow_joint',)
+
+
+def test_a_process_goes_on_at_its_points_and_through_an_arc():
+    path = START.at(speed=0.5).process((-0.5, 0.1, 0.5)).process((-0.4, 0.1, 0.5))
+    path = path.arc((-0.3, 0.2, 0.5), via=(-0.33, 0.13, 0.5)).process((-0.3, 0.21, 0.5))
+    path = path.process((-0.3, 0.3, 0.5), blend=0.0).line((-0.3, 0.3, 0.6))
+    radii = [segment.blend_radius for segment in path.goal().segments]
+    # 10 ms at 0.5 m/s, but not more than 0.3 of 10 mm, and none where that is too little.
+    assert radii == [0.005, 0.005, 0.0, 0.0, 0.0, 0.0]
+    slow = START.at(speed=0.05).process((-0.5, 0.1, 0.5)).process((-0.4, 0.1, 0.5))
+    assert [segment.blend_radius for segment in slow.goal().segments] == [0.002, 0.0]
+
+
+def test_outputs_belong_to_the_point_before():
+    path = START.by(dx=0.1).set(TORCH, True).by(dx=0.1)
+    path = path.set(analog(1, AnalogDomain.VOLTAGE), 0.5, after=0.2).set(TORCH, False)
+    first, second, third = path.goal().io_commands
+    assert (first.waypoint, first.output, first.pin, first.value, first.offset) == (
+        0,
+        OutputKind.STANDARD_DIGITAL,
+        2,
+        1.0,
+        0.0,
+    )
+    assert (second.waypoint, second.domain, second.offset) == (1, AnalogDomain.VOLTAGE, 0.2)
+    assert (third.waypoint, third.value) == (1, 0.0)
+
+
+def test_an_output_before_a_point_counts_from_the_one_before():
+    path = START.by(dx=0.1, duration=1.0).by(dx=0.1, duration=2.0).set(TORCH, True, before=0.5)
+    (command,) = path.goal().io_commands
+    assert (command.waypoint, command.offset) == (0, 1.5)
+
+
+def test_a_spline_has_its_execution_and_free_twists():
+    path = START.spline((-0.4, 0.0, 0.5), duration=1.0, twist=(0.1, 0.0, 0.0))
+    goal = path.spline((-0.3, 0.0, 0.5), duration=1.0, twist=ZERO6, acceleration=ZERO6)._table()
+    assert goal.execution is ExecutionMode.SPLINE
+    assert np.isnan(goal.waypoints.twists[0]).tolist() == [False] * 3 + [True] * 3
+    assert path.executed_as(ExecutionMode.SERVO).goal().execution is ExecutionMode.SERVO
+
+
+def test_settings_of_the_whole_path():
+    goal = (
+        START.tolerances(path=Tolerance(position=(0.001,) * 3), time=2.0)
+        .tolerances(goal=Tolerance(orientation=(0.1,) * 3))
+        .safe(TORCH, False, restore=True)
+        .keep_open()
+        .by(dx=0.1)
+        .goal()
+    )
+    assert goal.path_tolerance.position == (0.001,) * 3
+    assert goal.goal_tolerance.orientation == (0.1,) * 3
+    assert goal.goal_time_tolerance == 2.0
+    assert goal.keep_open
+    assert goal.safe_outputs == (
+        SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=2, value=0.0, restore=True),
+    )
+
+
+def test_frames_are_found_by_their_names():
+    part = Pose((0.1, 0.2, 0.3), axis_angle(Z, 1.0))
+    nozzle = Pose((0.0, 0.0, 0.1))
+    frames = Frames(
+        '', [StaticFrame('part', 'base', part), StaticFrame('nozzle', 'tool0', nozzle)]
+    )
+    path = Path((0.0, 0.0, 0.1), DOWN, frame='part', tool='nozzle').by(dx=0.1)
+    goal = path.goal(frames)
+    assert (goal.T_base_frame, goal.T_flange_controlled) == (part, nozzle)
+    with pytest.raises(InvalidGoal, match='is "nozzle", which is not a known frame'):
+        path.goal()
+
+
+# ---- orientations -------------------------------------------------------------------------------
+
+
+def test_the_tool_points_against_a_normal():
+    for normal, x in ((Z, Y), ((0.0, 1.0, 1.0), X), (X, (0.3, 1.0, -1.0)), ((0, 0, -1), X)):
+        q = against(normal, x)
+        n = np.array(normal) / np.linalg.norm(normal)
+        assert np.array(rotate(q, Z)) == pytest.approx(-n)
+        along = np.array(x) - n * np.dot(n, x)
+        assert np.array(rotate(q, X)) == pytest.approx(along / np.linalg.norm(along))
+    assert np.array(against(Z, x=Y)) == pytest.approx(np.array(DOWN))
+
+
+def test_roll_pitch_and_yaw_turn_about_fixed_axes():
+    q = roll_pitch_yaw(deg(90), deg(90), 0.0)
+    # y goes to z by the roll, and to x by the pitch.
+    assert np.array(rotate(q, Y)) == pytest.approx(np.array(X), abs=1e-12)
+    assert np.array(rotate(roll_pitch_yaw(0.0, 0.0, deg(90)), X)) == pytest.approx(
+        np.array(Y), abs=1e-12
+    )
+
+
+def test_a_tilted_tool_leans_by_its_angle():
+    axis = np.array(rotate(tilted(deg(20)), Z))
+    assert np.arccos(-axis[2]) == pytest.approx(deg(20))
+    assert axis[1] > 0.3
+
+
+def test_a_turn_of_the_tool_goes_about_its_own_axis():
+    tilt = Path((-0.5, 0.0, 0.5), tilted(0.5))
+    there = tilt.by(turn=axis_angle(Z, 1.0), of_tool=True).end
+    assert np.array(rotate(there.quaternion, Z)) == pytest.approx(np.array(rotate(tilted(0.5), Z)))
+    assert tilt.by(dz=0.1, of_tool=True).end.position[2] < 0.5
+
+
+def test_an_arc_that_is_followed_turns_the_tool_with_its_tangent():
+    path = START.arc(
+        (-0.4, 0.0, 0.5), via=(-0.4 - 0.1 / 2**0.5, 0.1 / 2**0.5 - 0.1, 0.5), follow=True
+    )
+    turn = path.end.angle_to(HERE)
+    assert turn == pytest.approx(pi / 2, abs=1e-9)
+    assert path.goal().segments[0].arc_mode is ArcMode.FIXED
+
+
+# ---- mistakes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('make', 'sentence'),
+    [
+        (lambda: START.by(dy=200), 'point 0 (line) has dy = 200 m, more than 3 m; write mm(200)'),
+        (lambda: Path((-550, 0, 1), DOWN), 'start has x = -550 m, more than 3 m'),
+        (lambda: START.at(speed=50), 'at() after 0 points has the speed 50, outside 0 to 5 m/s'),
+        (lambda: START.at(blend=-0.1), 'at() after 0 points has the blend -0.1, outside'),
+        (lambda: START.by(dx=0.1, blend=10), 'point 0 (line) has the blend 10, outside 0 to 0.5'),
+        (lambda: Path().by(dx=0.1), 'point 0 (line) is relative, but the path has no start'),
+        (lambda: Path().line((0, 0, 1)), 'point 0 (line) has no orientation'),
+        (lambda: START.line((1, 2)), 'point 0 (line) has the position (1, 2); give x, y and z'),
+        (lambda: START.line((nan, 0, 0)), 'point 0 (line) has x = nan; give a finite number'),
+        (lambda: START.line(TEXT), "point 0 (line) has the position 'abc'; give x, y and z"),
+        (lambda: START.by(), 'point 0 (line) is where the tool is before'),
+        (lambda: START.by(dx=0.1, motion='jump'), "point 0 (by) has the motion 'jump'; use line"),
+        (lambda: START.line((0, 0, 1), (1, 1, 0, 0)), 'point 0 (line) has the orientation (1, 1,'),
+        (lambda: START.by(dx=0.1, speed=TEXT), "point 0 (line) has the speed 'abc'; give a"),
+        (
+            lambda: START.by(dx=0.1, duration=1).by(dx=0.1),
+            'point 1 (line) has no duration, but the points before have; give each one.',
+        ),
+        (
+            lambda: START.by(dx=0.1).by(dx=0.1, duration=1),
+            'point 1 (line) has a duration, but the points before have none',
+        ),
+        (
+            lambda: START.at(speed=0.1).by(dx=0.1, duration=1),
+            'point 0 (line) has a duration and a speed; give one of them',
+        ),
+        (lambda: START.by(dx=0.1, duration=0), 'point 0 (line) has a duration of 0'),
+        (lambda: START.set(TORCH, True), 'set() comes before the first point'),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, 0.5),
+            'the value of standard digital output 2 is 0.5',
+        ),
+        (lambda: digital(9), 'the pin of standard digital output 9 is 9'),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, True, before=0.1),
+            'set() at point 0 has before=0.1 s, but no motion with a duration',
+        ),
+        (
+            lambda: START.by(dx=0.1, posture={'elbow_joint': 90}),
+            'point 0 (line): posture has elbow_joint = 90 rad, more than a joint turns',
+        ),
+        (lambda: axis_angle(Z, 90), 'angle is 90 rad, more than two turns; write deg(90)'),
+        (lambda: axis_angle((0, 0, 0), 1), 'axis is (0, 0, 0); give three numbers'),
+        (lambda: against(Z, Z), 'x is parallel to the normal'),
+        (
+            lambda: START.arc((-0.3, -0.1, 0.5), via=(-0.4, -0.1, 0.5)),
+            'point 0 (arc) goes through three points of one line',
+        ),
+        (
+            lambda: START.arc((-0.3, -0.1, 0.5), DOWN, via=(-0.4, 0.1, 0.5), follow=True),
+            'point 0 (arc) has an orientation, but the arc turns the tool',
+        ),
+        (
+            lambda: START.by(dx=0.1).spline((0, 0, 1), duration=1),
+            'point 1 (spline) mixes spline points with other motions',
+        ),
+        (
+            lambda: START.spline((0, 0, 1), duration=1).by(dx=0.1, duration=1),
+            'point 1 (line) mixes spline points with other motions',
+        ),
+        (lambda: START.spline((0, 0, 1), duration=1, twist=(1, 2)), 'point 0 (spline): twist is'),
+        (
+            lambda: START.by(dx=0.1).then(Path(HERE).by(dx=0.1)),
+            'then() joins a path that ends 100 mm and 0 rad away from where the other begins',
+        ),
+        (
+            lambda: START.then(Path(HERE, frame='part').by(dx=0.1)),
+            "then() joins the frames 'base' and 'part'; use one for both.",
+        ),
+        (lambda: Path().joint(HERE).reversed(), 'reversed() has no start to go back to'),
+        (
+            lambda: START.by(dx=0.1).set(TORCH, True).reversed(),
+            'reversed() has outputs, which have no reverse',
+        ),
+        (lambda: START.repeated(0), 'repeated() is asked for 0 times'),
+        (lambda: START.by(dx=0.1).weave(0.01, 0.1), 'weave() needs a speed and a wavelength'),
+        (
+            lambda: START.at(speed=0.1).by(dx=0.1).by(dy=0.1).weave(0.01, 0.1),
+            'weave() at point 0 has a corner; weave each leg and join them.',
+        ),
+        (
+            lambda: START.at(speed=0.1).by(dz=-0.1).weave(0.01, 0.1),
+            'weave() has a tool that points along the path; turn it across.',
+        ),
+        (
+            lambda: START.arc((-0.3, -0.1, 0.5), tilted(0.2), via=(-0.4, 0.1, 0.5)).offset(
+                dz=0.1, of_tool=True
+            ),
+            'offset() at point 0 turns the tool on an arc',
+        ),
+        (lambda: Path(frame=POSE), 'frame is Pose('),
+        (
+            lambda: Path.from_yaml('validate_only: true'),
+            'trajectory.header.stamp or validate_only',
+        ),
+    ],
+)
+def test_a_mistake_is_a_sentence_where_it_is_made(make, sentence):
+    with pytest.raises(InvalidGoal) as error:
+        make()
+    text = str(error.value)
+    assert text.startswith(sentence)
+    assert text.endswith('.')
+    assert '\n' not in text
+
+
+# ---- files --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'path',
+    sorted((share_path() / 'config' / 'examples').glob('*.yaml')),
+    ids=lambda path: path.stem,
+)
+def test_the_examples_are_paths(path, tmp_path):
+    loaded = Path.load(path)
+    loaded.save(tmp_path / 'again.yaml')
+    again = Path.load(tmp_path / 'again.yaml')
+    assert again._table() == loaded._table()
+
+
+def test_a_goal_in_a_frame_without_a_name_comes_into_the_base():
+    T = Pose((0.1, 0.0, 0.0))
+    goal = START.by(dx=0.1).goal()
+    moved = type(goal)(waypoints=goal.waypoints, segments=goal.segments, T_base_frame=T)
+    assert Path.from_goal(moved).end.position == pytest.approx((-0.3, -0.1, 0.5))
+
+
+def test_a_file_that_is_no_goal_is_refused_with_its_name(tmp_path):
+    (tmp_path / 'wrong.yaml').write_text('points: []')
+    with pytest.raises(GoalFileError, match=r'wrong\.yaml: points is not a field'):
+        Path.load(tmp_path / 'wrong.yaml')
+
+
+def test_a_path_needs_no_ros():
+    script = (
+        'import sys; from ur_cartesian_driver.path import *; '
+        'text = Path(mm(-500, 0, 400), DOWN).by(dx=0.1).to_yaml(); Path.from_yaml(text); '
+        'print([name for name in sys.modules if name.startswith(("rclpy", "rosidl"))])'
+    )
+    ended = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True)
+    assert ended.stdout == '[]\n', ended.stderr

@@ -1,0 +1,57 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Compose a path of the tool in a few lines, without ROS and for ROS.
+
+::
+
+    from ur_cartesian_driver.path import DOWN, mm, Path
+
+    square = Path(mm(-492, -133, 488), DOWN).at(speed=0.1, blend=mm(10)).by(dy=0.2).by(dx=0.2)
+    driver.execute(square).raise_for_error()
+"""
+
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.path.orientations import (
+    against,
+    axis_angle,
+    DOWN,
+    roll_pitch_yaw,
+    tilted,
+    X,
+    Y,
+    Z,
+)
+from ur_cartesian_driver.path.outputs import analog, configurable, digital, Output, tool_digital
+from ur_cartesian_driver.path.path_builder import FREE, Path
+from ur_cartesian_driver.path.units import deg, mm
+
+__all__ = [
+    'DOWN',
+    'FREE',
+    'AnalogDomain',
+    'ExecutionMode',
+    'Frames',
+    'Output',
+    'Path',
+    'Pose',
+    'StaticFrame',
+    'Tolerance',
+    'X',
+    'Y',
+    'Z',
+    'against',
+    'analog',
+    'axis_angle',
+    'configurable',
+    'deg',
+    'digital',
+    'mm',
+    'roll_pitch_yaw',
+    'tilted',
+    'tool_digital',
+]

@@ -1,0 +1,107 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Orientations of the tool, in the words of people who mount parts: unit quaternions (x, y, z, w).
+
+All are orientations of the controlled frame in the frame of the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, isfinite, pi, sin, sqrt
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.pose import multiply, normalize, Quaternion
+from ur_cartesian_driver.motion.vectors import cross, dot, norm, scale, subtract, unit, Vector3
+
+#: The tool's axis z straight down, its x along y of the frame.
+DOWN: Quaternion = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
+#: Directions.
+X: Vector3 = (1.0, 0.0, 0.0)
+Y: Vector3 = (0.0, 1.0, 0.0)
+Z: Vector3 = (0.0, 0.0, 1.0)
+
+#: Larger angles are degrees by mistake [rad].
+MAX_ANGLE = 4.0 * pi
+#: Directions that are nearer than this are parallel [rad].
+_PARALLEL = 1e-6
+
+
+def roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """
+    Return the rotation by roll about x, then pitch about y, then yaw about z, all fixed [rad].
+
+    :raises InvalidGoal: an angle looks like degrees.
+    """
+    about_z, about_y = axis_angle(Z, yaw), axis_angle(Y, pitch)
+    return multiply(about_z, multiply(about_y, axis_angle(X, roll)))
+
+
+def axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
+    """
+    Return the rotation about an axis of any length by an angle [rad].
+
+    :raises InvalidGoal: the axis is zero, or the angle looks like degrees.
+    """
+    x, y, z = direction('axis', axis)
+    if not isfinite(angle) or abs(angle) > MAX_ANGLE:
+        raise InvalidGoal(
+            'angle', f'is {angle:g} rad, more than two turns', f'write deg({angle:g}) for degrees'
+        )
+    s = sin(0.5 * angle)
+    return normalize((x * s, y * s, z * s, cos(0.5 * angle)))
+
+
+def against(normal: Sequence[float], x: Sequence[float]) -> Quaternion:
+    """
+    Return the orientation whose axis z points against the normal of a surface.
+
+    :param x: where the tool's axis x points, as far as it can; not along the normal.
+    :raises InvalidGoal: a direction is zero, or the two are parallel.
+    """
+    n, along = direction('normal', normal), direction('x', x)
+    along = subtract(along, scale(n, dot(along, n)))
+    if norm(along) < _PARALLEL:
+        raise InvalidGoal('x', 'is parallel to the normal', 'choose a direction along the surface')
+    ex, ez = unit(along), scale(n, -1.0)
+    return _of_axes(ex, cross(ez, ex), ez)
+
+
+def tilted(angle: float, about: Sequence[float] = X, of: Quaternion = DOWN) -> Quaternion:
+    """
+    Return an orientation that leans: straight down, say, turned about an axis of the frame [rad].
+
+    :raises InvalidGoal: as :func:`axis_angle`.
+    """
+    return multiply(axis_angle(about, angle), of)
+
+
+def direction(name: str, vector: Sequence[float]) -> Vector3:
+    """
+    Return a vector of length 1.
+
+    :raises InvalidGoal: it is zero, or no vector of three numbers.
+    """
+    values = [float(value) for value in vector]
+    if len(values) != 3 or not all(map(isfinite, values)) or not any(values):
+        raise InvalidGoal(name, f'is {vector!r}', 'give three numbers that are not all zero')
+    x, y, z = values
+    return unit((x, y, z))
+
+
+def _of_axes(ex: Vector3, ey: Vector3, ez: Vector3) -> Quaternion:
+    """Return the orientation of a frame from its axes: the largest component first."""
+    m = (ex, ey, ez)  # columns
+    trace = ex[0] + ey[1] + ez[2]
+    candidates = (trace, ex[0], ey[1], ez[2])
+    k = candidates.index(max(candidates)) - 1
+    if k < 0:
+        w = 1.0 + trace
+        return normalize((ey[2] - ez[1], ez[0] - ex[2], ex[1] - ey[0], w))
+    i, j = (k + 1) % 3, (k + 2) % 3
+    q = [0.0, 0.0, 0.0, m[i][j] - m[j][i]]
+    q[k] = 1.0 + m[k][k] - m[i][i] - m[j][j]
+    q[i] = m[i][k] + m[k][i]
+    q[j] = m[j][k] + m[k][j]
+    return normalize((q[0], q[1], q[2], q[3]))

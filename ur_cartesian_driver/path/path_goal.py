@@ -1,0 +1,123 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From the points of a path to a goal and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from itertools import accumulate
+from math import inf
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
+from ur_cartesian_driver.path.path_points import PathPoint, PathSettings, SAME_POSITION
+
+#: The blend of a point on a process that has none [m], and how long the tool is in it at least
+#: [s]: the cycle of the slowest controller is 8 ms, and a blend that is passed in one is left out.
+PROCESS_BLEND = 0.002
+_PROCESS_BLEND_TIME = 0.01
+#: The share of a segment that such a blend takes at most.
+_PROCESS_BLEND_SHARE = 0.3
+
+
+def goal_of_points(
+    points: Sequence[PathPoint],
+    settings: PathSettings,
+    start: Pose | None,
+    frame: str,
+    tool: str,
+) -> GoalTable:
+    """
+    Return a goal whose frames only have their names.
+
+    :param start: where the path begins, if it says so.
+    """
+    times = accumulate(point.duration for point in points)
+    segments = [
+        replace(point.segment, blend_radius=_process_blend(points, i, start))
+        if point.auto_blend
+        else point.segment
+        for i, point in enumerate(points)
+    ]
+    return GoalTable(
+        waypoints=WaypointRows.of(
+            [
+                replace(point.waypoint, time=time / NANOSECONDS)
+                for point, time in zip(points, times, strict=True)
+            ]
+        ),
+        segments=SegmentRows.of(
+            segments if any(segment != Segment() for segment in segments) else ()
+        ),
+        frame_id=frame,
+        controlled_frame=tool,
+        io_commands=tuple(
+            replace(command, waypoint=i)
+            for i, point in enumerate(points)
+            for command in point.outputs
+        ),
+        **{each.name: getattr(settings, each.name) for each in fields(settings)},
+    )
+
+
+def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
+    """
+    Return the points of a goal.
+
+    :raises InvalidGoal: its lists do not fit each other, so that it would be refused anyway.
+    """
+    points, segments = tuple(goal.waypoints), tuple(goal.segments)
+    if len(segments) not in (0, len(points)):
+        raise InvalidGoal(
+            'segments',
+            f'has {len(segments)} entries for {len(points)} points',
+            'give none, or one for each point',
+        )
+    times = [to_nanoseconds(f'points[{i}]', point.time) for i, point in enumerate(points)]
+    outputs: dict[int, list[IOCommand]] = {}
+    for command in goal.io_commands:
+        if not 0 <= command.waypoint < len(points):
+            raise InvalidGoal(
+                'io_commands', f'names point {command.waypoint}, which is none', 'name another'
+            )
+        outputs.setdefault(command.waypoint, []).append(replace(command, waypoint=0))
+    in_spline = any(times) and (
+        goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
+        or any(any(point.twist) or any(point.acceleration) for point in points[:-1])
+    )
+    return tuple(
+        PathPoint(
+            waypoint=replace(point, time=0.0),
+            segment=segments[i] if segments else Segment(),
+            duration=times[i] - (times[i - 1] if i else 0),
+            outputs=tuple(outputs.get(i, ())),
+            in_spline=in_spline,
+        )
+        for i, point in enumerate(points)
+    )
+
+
+def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) -> float:
+    """
+    Return the radius at a point without one where a process goes on; 0 where none fits.
+
+    An arc is part of a process where one follows.
+    """
+    if index + 1 == len(points):
+        return 0.0
+    point, after = points[index], points[index + 1]
+    if SegmentType.PROCESS not in (point.segment.type, after.segment.type):
+        return 0.0
+    before = points[index - 1].pose if index else start
+    shortest = min(
+        point.pose.distance_to(after.pose),
+        inf if before is None else point.pose.distance_to(before),
+    )
+    least = _PROCESS_BLEND_TIME * point.segment.velocity
+    radius = min(max(PROCESS_BLEND, least), _PROCESS_BLEND_SHARE * shortest)
+    return radius if radius >= max(least, SAME_POSITION) else 0.0

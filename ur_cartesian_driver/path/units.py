@@ -1,0 +1,30 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Millimetres and degrees to SI units."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import overload
+
+from ur_cartesian_driver.motion.vectors import Vector3
+
+
+@overload
+def mm(value: float, /) -> float: ...
+
+
+@overload
+def mm(x: float, y: float, z: float, /) -> Vector3: ...
+
+
+def mm(x: float, y: float | None = None, z: float | None = None, /) -> float | Vector3:
+    """Return a length, or a position x, y, z, given in millimetres [m]."""
+    if y is None or z is None:
+        return x / 1000.0
+    return (x / 1000.0, y / 1000.0, z / 1000.0)
+
+
+def deg(value: float, /) -> float:
+    """Return an angle given in degrees [rad]."""
+    return radians(value)
