@@ -20,6 +20,7 @@ import struct
 from typing import Any
 
 import pytest
+from robot_ports import robot_of_all_cycles
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -136,12 +137,7 @@ class Watcher:
             + recipe
             + struct.pack('>HB', 3, ord('S'))
         )
-        self._skipped = self._skipped_cycles()
         self.last = self._stamp()
-
-    def _skipped_cycles(self) -> int:
-        """Return how many cycles the simulator has left out because the computer was too busy."""
-        return round(self._robot.call(lambda c: c.skipped_time) / 0.002)
 
     def close(self) -> None:
         self._stream.close()
@@ -161,18 +157,14 @@ class Watcher:
         while stamps[-1] < until:
             stamps.append(self._stamp())
         steps = [round((b - a) / 0.002) for a, b in itertools.pairwise(stamps)]
-        missed, skipped = sum(steps) - len(steps), self._skipped_cycles() - self._skipped
-        assert min(steps) == 1
-        # Rounded once at each time that the simulator stood still.
-        assert missed <= 1.1 * skipped
-        self.last, self._skipped = stamps[-1], self._skipped + missed
+        assert set(steps) == {1}
+        self.last = stamps[-1]
 
 
 @pytest.fixture(scope='module')
 def robot(polyscope):
     programs = {'a.urp': SCRIPTS[6].decode()}
-    config = SimulatorConfig(**FREE, programs=programs, polyscope=polyscope)
-    with SimulatedRobot(config) as robot:
+    with robot_of_all_cycles(**FREE, programs=programs, polyscope=polyscope) as robot:
         yield robot
 
 

@@ -10,14 +10,11 @@ with closed formulas. Their sources: doc/simulation.md.
 from __future__ import annotations
 
 from itertools import pairwise
-from math import inf, pi, sqrt
+from math import pi, sqrt
 
 from plain_clients import PlainPrimary, PlainRealtime
 import pytest
-from robot_ports import FREE
-
-from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.clock import RealClock
+from robot_ports import robot_of_all_cycles
 
 CYCLE = 0.002
 #: The first motion of a program loses half of the time in which it sets out [s].
@@ -26,9 +23,8 @@ START = 0.16
 
 @pytest.fixture(scope='module')
 def robot():
-    """Run a robot twice as fast as time; a busy computer slows it down and leaves no cycle out."""
-    clock = RealClock(CYCLE, rate=2.0, max_lag=inf)
-    with SimulatedRobot(SimulatorConfig(**FREE), clock=clock) as robot:
+    """Run a robot twice as fast as time."""
+    with robot_of_all_cycles(rate=2.0) as robot:
         yield robot
 
 
