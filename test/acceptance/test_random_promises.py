@@ -176,7 +176,7 @@ def refused_goal(cell, robot, case, state, text):
     T_flange_tool = case.goal.T_flange_controlled or case.T_flange_tcp
     return Refused(
         goal=case.goal,
-        q=state.actual_q,
+        q=state.target_q,
         arm=Kinematics(robot.arm.geometry, model.position_limits, T_flange_tool),
         joint_speeds=model.max_joint_speed,
         cycle=cell.robot.config.cycle,

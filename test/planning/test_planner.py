@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
@@ -71,6 +72,20 @@ def square(cell, **fields):
     corners = ((0.1, 0.0), (0.1, 0.2), (-0.1, 0.2), (-0.1, 0.0), (0.1, 0.0))
     points = tuple(cell.point(x, y, time=2.0 * (i + 1)) for i, (x, y) in enumerate(corners))
     return Goal(waypoints=points, **fields)
+
+
+@pytest.mark.parametrize(('error', 'starts_there'), [(4e-4, True), (0.1, False)])
+@pytest.mark.parametrize('execution', [ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE])
+def test_a_plan_begins_at_the_set_point_that_friction_leaves_the_arm_beside(
+    cell, error, starts_there, execution
+):
+    target_q = tuple(q + error for q in cell.state.actual_q)
+    goal = Goal(waypoints=(cell.point(0.05, time=2.0),), execution=execution)
+    made = plan(goal, replace(cell.state, target_q=target_q), cell.arm, OPTIONS)
+    begin = target_q if starts_there else cell.state.actual_q
+    assert made.start == begin
+    T_base_tcp = cell.arm.forward(begin) @ cell.state.T_flange_tcp
+    assert made.reference.poses[0, :3] == pytest.approx(T_base_tcp.position, abs=1e-9)
 
 
 def test_a_plain_square_becomes_timed_straight_lines_to_its_poses(cell):
