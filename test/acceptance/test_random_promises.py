@@ -60,7 +60,7 @@ START_TIME = 0.4
 TCP_GOALS, GOALS_OF_A_DRIVER = int(os.environ.get('RANDOM_TCP_GOALS', '5')), 5
 #: Their robots are others; time is real there [s].
 FIRST_OF_TCP, MAX_TCP_DURATION = 1000, 2.5
-#: A simulator that a busy computer gives no time leaves out cycles; of such a run is no judgement [s].
+#: A simulator that a busy computer gives no time leaves out cycles: such a run is not judged [s].
 MAX_GAP = 0.05
 
 
