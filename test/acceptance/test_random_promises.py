@@ -24,7 +24,7 @@ import time
 
 from goal_feasibility import is_right, Refused, remedied
 from goal_geometry import Kinematics
-from goal_judge import judge, KNOWN, Promise, Run
+from goal_judge import judge, KNOWN, promise_of, Run
 from mixed_goals import mixed_case, random_robot
 import numpy as np
 from plain_clients import PlainRtde, RtdeBytes
@@ -39,7 +39,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveP
+from ur_cartesian_driver.motion.primitive import MoveC, MoveP
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -131,35 +131,6 @@ class Session:
             sent=sent,
             is_first=is_first,
         )
-
-
-def promise_of(made):
-    goal, times, radii = made.goal, {}, [0.0] * len(made.goal.waypoints)
-    for point, at in zip(made.reference.point.tolist(), made.reference.time.tolist(), strict=True):
-        times[point] = at
-    for segment in made.segments:
-        radii[segment.waypoint] = getattr(segment.primitive, 'blend_radius', 0.0)
-    joint_moves = frozenset(
-        segment.waypoint
-        for segment in made.segments
-        if isinstance(segment.primitive, MoveJ)
-        and goal.segments
-        and goal.segments[segment.waypoint].type != SegmentType.JOINT
-    )
-    return Promise(
-        execution=made.execution,
-        duration=made.duration,
-        point_times=times,
-        joints=made.segments[-1].joints if made.segments else made.start,
-        slowed=any('instead of' in line or 'stretched' in line for line in made.remarks),
-        early=frozenset(
-            int(found[1])
-            for line in made.remarks
-            if (found := re.match(r'point (\d+): .*before its time', line))
-        ),
-        joint_moves=joint_moves,
-        radii=tuple(radii),
-    )
 
 
 def leaves_blends_out(made, cycle):

@@ -22,6 +22,8 @@ from plain_clients import RtdeRow
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.primitive import MoveJ
 
 #: Speeds may be exceeded by this share.
 OVER = 0.02
@@ -81,6 +83,37 @@ class Promise:
     #: By point: lines that became joint motions.
     joint_moves: frozenset[int]
     radii: tuple[float, ...]
+
+
+def promise_of(made: Plan) -> Promise:
+    """Return what a plan promises."""
+    goal, radii = made.goal, [0.0] * len(made.goal.waypoints)
+    times: dict[int, float] = {}
+    for point, at in zip(made.reference.point.tolist(), made.reference.time.tolist(), strict=True):
+        times[point] = at
+    for segment in made.segments:
+        radii[segment.waypoint] = getattr(segment.primitive, 'blend_radius', 0.0)
+    joint_moves = frozenset(
+        segment.waypoint
+        for segment in made.segments
+        if isinstance(segment.primitive, MoveJ)
+        and goal.segments
+        and goal.segments[segment.waypoint].type != SegmentType.JOINT
+    )
+    return Promise(
+        execution=made.execution,
+        duration=made.duration,
+        point_times=times,
+        joints=made.segments[-1].joints if made.segments else made.start,
+        slowed=any('instead of' in line or 'stretched' in line for line in made.remarks),
+        early=frozenset(
+            int(found[1])
+            for line in made.remarks
+            if (found := re.match(r'point (\d+): .*before its time', line))
+        ),
+        joint_moves=joint_moves,
+        radii=tuple(radii),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -140,7 +140,7 @@ class Path:
         self._set(_start=None, _points=(), _feed=Feed(), _settings=PathSettings())
         if start is not None:
             pose = self._pose('start', start, orientation, 'start')
-            self._set(_start=PathPoint(waypoint=Waypoint(pose=pose)))
+            self._set(_start=PathPoint(waypoint=Waypoint(pose=pose), auto_blend=True))
 
     def _set(self, **values: Any) -> None:
         for name, value in values.items():
@@ -216,7 +216,11 @@ class Path:
             )
             if (number := amount(where, name, value, bound, hint)) is not None
         }
-        return self._with(_feed=replace(self._feed, **given))
+        start = self._start
+        if start is not None and not self._points and 'blend' in given:  # for the way back
+            segment = replace(start.segment, blend_radius=given['blend'])
+            start = replace(start, segment=segment, auto_blend=False)
+        return self._with(_feed=replace(self._feed, **given), _start=start)
 
     # ---- motions -------------------------------------------------------------------------------
 

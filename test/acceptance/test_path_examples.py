@@ -1,0 +1,177 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The examples, carried out by the Python API and over ROS on one simulated robot.
+
+Its time runs faster than real time. The record of a client of its own is judged by the geometry of
+the tests.
+"""
+
+from dataclasses import replace
+from importlib import util
+from pathlib import Path as FilePath
+import threading
+from typing import Any
+
+from goal_geometry import Kinematics
+from goal_judge import judge, promise_of, Run
+from plain_clients import PlainRtde
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from waiting import wait_for
+
+from ur_cartesian_driver.driver import ConnectionState
+from ur_cartesian_driver.execution.goal import goal_monitor
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+from ur_cartesian_driver.path import Frames
+from ur_cartesian_driver.ros import CartesianDriverNode
+from ur_cartesian_driver.ros.client import GoalClient
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+FOLDER = FilePath(__file__).resolve().parents[2] / 'examples'
+NAMES = sorted(path.stem for path in FOLDER.glob('*.py') if path.stem != 'on_robot')
+
+pytestmark = [
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    pytest.mark.skipif(not NAMES, reason='only a checkout has the examples'),
+]
+
+#: Simulated seconds per second, and cycles per simulated second: one that small computers can do.
+RATE, FREQUENCY = 15.0, 125.0
+MODEL = robot_model('ur5e')
+OUR_PORTS = ('reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port')
+
+
+def example(name):
+    """Return the module of an example."""
+    spec = util.spec_from_file_location(f'example_{name}', FOLDER / f'{name}.py')
+    module = util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class Cell:
+    """One robot, the node with its driver, a client, and a record of what the robot does."""
+
+    def __init__(self, robot, node, client, rtde):
+        self.robot, self.node, self.client, self.rtde = robot, node, client, rtde
+        self.driver = node.driver
+        self.is_first = True
+
+    def go_home(self):
+        home = self.robot.config.q
+        self.robot.call(lambda controller: controller.motion.teleport(home))
+        wait_for(lambda: self.driver.state.target_q == home, 10.0)
+        return self.driver.state
+
+    def judged(self, path, execute, frames):
+        """Carry out a path, and return what is wrong with the motion."""
+        state = self.go_home()
+        goal = path.goal(frames, ArmSnapshot.of(state))
+        made = self.driver.plan(goal)
+        first_row = max(len(self.rtde.rows) - 1, 0)
+        # The driver's clock cannot be kept on a busy computer: see below.
+        outcome = execute(path.tolerances(time=-1.0))
+        self.rtde.wait(0.05)
+        # A controller that has to wait for the computer leaves cycles out, in which nothing moves:
+        # so the rows are counted.
+        rows = [
+            replace(row, time=i / FREQUENCY) for i, row in enumerate(self.rtde.rows[first_row:])
+        ]
+        is_first, self.is_first = self.is_first, False
+        run = Run(
+            goal=goal,
+            promise=promise_of(made),
+            arm=Kinematics(
+                Arm(MODEL).geometry,
+                MODEL.position_limits,
+                goal.T_flange_controlled or state.T_flange_tcp,
+            ),
+            joint_speeds=MODEL.max_joint_speed,
+            max_tool_speed=0.25,
+            cycle=1.0 / FREQUENCY,
+            q=state.actual_q,
+            sent=0.0,
+            rows=rows,
+            is_first=is_first,
+            late=0.1,
+            succeeded=outcome.succeeded,
+            outcome=f'{outcome.code.name}: {outcome.text}',
+        )
+        return outcome, list(judge(run))
+
+
+@pytest.fixture(scope='module')
+def cell(private_ros_graph):
+    every_frame = [frame for name in NAMES for frame in getattr(example(name), 'FRAMES', ())]
+    monkeypatch = pytest.MonkeyPatch()
+    monkeypatch.setattr(goal_monitor, 'STALL_TIMEOUT', RATE * goal_monitor.STALL_TIMEOUT)
+    config = SimulatorConfig(
+        rtde_port=0, primary_port=0, dashboard_port=0, rate=RATE, frequency=FREQUENCY
+    )
+    parameters: dict[str, Any] = {
+        'headless_mode': True,
+        'robot_loop': 'thread',
+        'max_state_age': 0.0,
+        'robot_receive_timeout': 10.0,  # in simulated time, which passes quickly
+        'static_frames': [as_parameter(frame) for frame in every_frame],
+    }
+    context = Context()
+    rclpy.init(args=[], context=context)
+    with SimulatedRobot(config) as robot:
+        node = CartesianDriverNode(
+            context=context,
+            parameter_overrides={
+                'rtde_port': robot.ports.rtde,
+                'primary_port': robot.ports.primary,
+                'dashboard_port': robot.ports.dashboard,
+                **dict.fromkeys(OUR_PORTS, 0),
+                **parameters,
+            },
+        )
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        spinning = threading.Thread(target=executor.spin)
+        spinning.start()
+        try:
+            node.driver.frames = Frames(static_frames=every_frame)
+            node.driver.wait_ready(30.0)
+            assert node.driver.status.state is ConnectionState.READY
+            with (
+                GoalClient() as client,
+                PlainRtde('127.0.0.1', robot.ports.rtde, FREQUENCY) as rtde,
+            ):
+                yield Cell(robot, node, client, rtde)
+        finally:
+            executor.shutdown()
+            spinning.join()
+            node.destroy_node()
+            rclpy.shutdown(context=context)
+            monkeypatch.undo()
+
+
+def as_parameter(frame):
+    return f'{frame.name} {frame.parent} ' + ' '.join(map(repr, frame.T_parent_frame.row()))
+
+
+def test_there_are_twelve_examples_of_at_most_thirty_lines():
+    assert len(NAMES) >= 12
+    for name in NAMES:
+        assert len((FOLDER / f'{name}.py').read_text().splitlines()) <= 30
+
+
+@pytest.mark.parametrize('over_ros', [False, True], ids=['api', 'ros'])
+@pytest.mark.parametrize('name', NAMES)
+def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
+    module = example(name)
+    path = getattr(module, name)(cell.go_home().actual_tcp_pose)
+    frames = Frames(static_frames=getattr(module, 'FRAMES', ()))
+    execute = cell.client.execute if over_ros else cell.driver.execute
+    outcome, wrong = cell.judged(path, execute, frames)
+    outcome.raise_for_error()
+    assert wrong == []
