@@ -7,7 +7,7 @@ from ur_cartesian_driver.path import analog, digital, mm, Path, Pose
 VALVE, PRESSURE = digital(0), analog(0)
 
 
-def layers(start: Pose, count: int = 3) -> Path:
+def layers(start: Pose, count: int = 2) -> Path:
     bead = (
         Path(start)
         .at(speed=0.12, acceleration=1.0, blend=mm(1))

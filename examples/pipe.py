@@ -19,7 +19,7 @@ def place(angle: float) -> Pose:
 def pipe(start: Pose) -> Path:
     path = Path(start).spline(place(deg(130)), duration=2.0)
     for angle in range(120, 49, -10):
-        path = path.spline(place(deg(angle)), duration=0.35)
+        path = path.spline(place(deg(angle)), duration=0.25)
     return path.spline(start, duration=2.0)
 
 

@@ -8,13 +8,13 @@ from ur_cartesian_driver.path import axis_angle, deg, mm, Path, Pose, Z
 def polishing(start: Pose) -> Path:
     strokes = (
         Path(start)
-        .at(speed=0.15, acceleration=1.0, blend=mm(4))
-        .by(dy=0.12)
-        .repeated(4, dx=mm(10), alternating=True)
+        .at(speed=0.2, acceleration=2.0, blend=mm(4))
+        .by(dy=0.08)
+        .repeated(3, dx=mm(10), alternating=True)
     )
     there = Pose(start.position, (0.0, 0.0, 0.0, 1.0))
     about_start = there @ Pose(quaternion=axis_angle(Z, deg(90))) @ there.inverse()
-    crosswise = strokes.transformed(about_start).repeated(1)
+    crosswise = strokes.transformed(about_start)
     return strokes.line(crosswise.start or start, speed=0.2).then(crosswise)
 
 

@@ -6,11 +6,8 @@ from ur_cartesian_driver.path import mm, Path, Pose
 
 
 def square(start: Pose) -> Path:
-    return (
-        Path(start)
-        .at(speed=0.1, acceleration=0.5, blend=mm(10))
-        .by(dy=0.2).by(dx=0.2).by(dy=-0.2).by(dx=-0.2)
-    )  # fmt: skip
+    path = Path(start).at(speed=0.1, acceleration=0.5, blend=mm(10))
+    return path.by(dy=0.2).by(dx=0.2).by(dy=-0.2).by(dx=-0.2)
 
 
 if __name__ == '__main__':

@@ -26,8 +26,9 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.execution.goal import goal_monitor
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot
-from ur_cartesian_driver.path import Frames
+from ur_cartesian_driver.path import DOWN, Frames, Path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -38,6 +39,7 @@ NAMES = sorted(path.stem for path in FOLDER.glob('*.py') if path.stem != 'on_rob
 pytestmark = [
     pytest.mark.acceptance,
     pytest.mark.slow,
+    pytest.mark.exhaustive,
     pytest.mark.skipif(not NAMES, reason='only a checkout has the examples'),
 ]
 
@@ -175,3 +177,21 @@ def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
     outcome, wrong = cell.judged(path, execute, frames)
     outcome.raise_for_error()
     assert wrong == []
+
+
+def test_a_path_that_begins_elsewhere_is_refused_unless_its_first_motion_leads_there(cell):
+    x, y, z = cell.go_home().actual_tcp_pose.position
+    elsewhere = Path((x, y + 0.02, z), DOWN)
+    outcome = cell.driver.execute(elsewhere.by(dx=0.05))
+    assert outcome.code is ErrorCode.INVALID_GOAL
+    assert outcome.text.startswith('the start of the path is 20.0 mm and 0.000 rad away from the')
+    assert cell.driver.plan(elsewhere.joint((x, y + 0.05, z)))
+
+
+def test_a_frame_that_the_driver_does_not_know_is_refused(cell):
+    start = cell.go_home().actual_tcp_pose
+    outcome = cell.driver.execute(Path(start, frame='table').by(dx=0.05))
+    assert outcome.code is ErrorCode.INVALID_GOAL
+    assert 'is "table", which is not a known frame' in outcome.text
+    over_ros = cell.client.execute(Path(start, frame='table').by(dx=0.05))
+    assert (over_ros.code, over_ros.text) == (outcome.code, outcome.text)

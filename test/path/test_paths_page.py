@@ -1,0 +1,86 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The snippets of the page on paths run, one after the other, and plan what they compose."""
+
+from pathlib import Path as FilePath
+import re
+
+import pytest
+
+from ur_cartesian_driver.cli.validate_command import stationary_state
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.ros import client
+from ur_cartesian_driver.sim.simulator_config import HOME
+
+CHECKOUT = FilePath(__file__).resolve().parents[2]
+PAGE = CHECKOUT / 'doc' / 'paths.md'
+pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+
+ARM = Arm(robot_model('ur5e'))
+STATE = stationary_state(ARM, HOME)
+FRAMES = Frames(
+    static_frames=[
+        StaticFrame('part', 'base', Pose((0.02, -0.01, 0.0))),
+        StaticFrame('nozzle', 'tool0', Pose((0.0, 0.0, 0.1))),
+    ]
+)
+
+
+class PlanningDriver:
+    """Plans as the driver does, for an arm at home, and does no more."""
+
+    def plan(self, path):
+        return plan(path.goal(FRAMES, ArmSnapshot.of(STATE)), STATE, ARM, PlanningOptions())
+
+    def execute(self, path):
+        return Outcome(code=ErrorCode.SUCCESSFUL, text='', report=self.plan(path).report)
+
+    __enter__ = lambda self: self  # noqa: E731
+    __exit__ = lambda self, *_: None  # noqa: E731
+
+
+def test_the_snippets_of_the_page_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(client, 'GoalClient', PlanningDriver)
+    names = {'driver': PlanningDriver(), 'start': STATE.actual_tcp_pose}
+    snippets = re.findall(r'^```python\n(.*?)^```$', PAGE.read_text(), re.DOTALL | re.MULTILINE)
+    for snippet in snippets:
+        exec(snippet, names)
+    printed = capsys.readouterr().out
+    mistake = re.search(r'print\(mistake\)  # (.*)', PAGE.read_text())[1]
+    assert mistake in printed
+    assert 'point 3: LINEAR -> MOVEL' in printed
+    assert Path.load(tmp_path / 'seam.yaml').goal(FRAMES) == names['goal']
+    paths = {name: value for name, value in names.items() if isinstance(value, Path)}
+    assert set(paths) >= {'square', 'seam', 'timed', 'careful', 'streamed', 'strokes', 'bead'}
+    for name in ('timed', 'careful', 'streamed', 'strokes', 'bead'):
+        assert PlanningDriver().plan(paths[name]).duration > 0.0
+    # A path that begins elsewhere needs a motion to there.
+    assert len(paths['screw']) == 1
+
+
+@pytest.mark.parametrize('name', ['square', 'seam'])
+def test_the_page_shows_the_examples(name):
+    def code(text):
+        return re.sub(r'\s', '', re.sub(r'#.*', '', text))
+
+    example = code((CHECKOUT / 'examples' / f'{name}.py').read_text())
+    (motions,) = re.findall(r'->Path:.*?Path\([^)]*\)(.*?)\)?if__name__', example)
+    shown = code(PAGE.read_text())
+    for part in motions.split('returnpath'):
+        assert part in shown
+
+
+def test_the_page_names_every_method_of_a_path():
+    page = PAGE.read_text()
+    methods = [name for name in vars(Path) if not name.startswith('_')]
+    known = {'end', 'frame', 'poses', 'starts_with_joint_motion', 'tool', 'from_goal'}
+    known |= {'from_message', 'from_yaml', 'to_yaml'}
+    missing = [name for name in methods if not re.search(rf'\b{name}\b', page)]
+    assert set(missing) <= known
