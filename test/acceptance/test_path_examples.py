@@ -8,7 +8,8 @@ the tests.
 """
 
 from dataclasses import replace
-from importlib import util
+from functools import partial
+from importlib import import_module, util
 from pathlib import Path as FilePath
 import threading
 from typing import Any
@@ -22,13 +23,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from waiting import wait_for
 
-from ur_cartesian_driver.driver import ConnectionState
+from ur_cartesian_driver.driver import ConnectionState, DriverConfig
 from ur_cartesian_driver.execution.goal import goal_monitor
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot
-from ur_cartesian_driver.path import DOWN, Frames, Path
+from ur_cartesian_driver.path import DOWN, Frames, mm, Path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -46,6 +47,7 @@ pytestmark = [
 #: Simulated seconds per second, and cycles per simulated second: one that small computers can do.
 RATE, FREQUENCY = 15.0, 125.0
 MODEL = robot_model('ur5e')
+ROBOT_PORTS = ('rtde_port', 'primary_port', 'dashboard_port')
 OUR_PORTS = ('reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port')
 
 
@@ -195,3 +197,28 @@ def test_a_frame_that_the_driver_does_not_know_is_refused(cell):
     assert 'is "table", which is not a known frame' in outcome.text
     over_ros = cell.client.execute(Path(start, frame='table').by(dx=0.05))
     assert (over_ros.code, over_ros.text) == (outcome.code, outcome.text)
+
+
+def test_points_are_appended_to_a_path_that_is_open(cell):
+    start = cell.go_home().actual_tcp_pose
+    first = Path(start).at(speed=0.1, blend=mm(2)).by(dy=0.04).by(dx=0.02)
+    more = Path(first.end).at(speed=0.1).by(dy=-0.02).goal()
+    motion = cell.driver.start(cell.driver.plan(first.keep_open()))
+    motion.append(more.waypoints, more.segments, last=True)
+    motion.result(30.0).raise_for_error()
+    end = cell.driver.state.target_tcp_pose
+    assert end.distance_to(more.waypoints[-1].pose) < 1e-5
+
+
+def test_an_example_is_a_program(ur_sim, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(FOLDER)
+    on_robot = import_module('on_robot')
+    ports: dict[str, Any] = {
+        name: getattr(ur_sim.ports, name.removesuffix('_port')) for name in ROBOT_PORTS
+    } | dict.fromkeys(OUR_PORTS, 0)
+    config = partial(DriverConfig, robot_loop='thread', **ports)
+    monkeypatch.setattr(on_robot, 'DriverConfig', config)
+    monkeypatch.setattr('sys.argv', ['square.py', '--plan'])
+    on_robot.run(example('square').square)
+    assert 'point 3: LINEAR -> MOVEL, 0.200 m in 2.100 s' in capsys.readouterr().out
+    assert ur_sim.state().q == ur_sim.config.q

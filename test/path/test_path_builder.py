@@ -59,7 +59,11 @@ def test_a_square_in_five_lines():
     )
     for segment in goal.segments:
         assert segment.type is SegmentType.LINEAR
-        assert (segment.velocity, segment.acceleration, segment.blend_radius) == (0.1, 0.5, 0.01)
+        assert (segment.velocity, segment.acceleration) == (0.1, 0.5)
+    # The last point is never blended, unless the path goes on.
+    assert goal.segments.blend_radii.tolist() == [0.01, 0.01, 0.01, 0.0]
+    assert path.then(path)._table().segments.blend_radii.tolist() == [0.01] * 7 + [0.0]
+    assert path.keep_open()._table().segments.blend_radii.tolist() == [0.01] * 4
     assert not goal.waypoints.times.any()
     assert {point.pose.quaternion for point in goal.waypoints} == {DOWN}
 

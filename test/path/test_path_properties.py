@@ -240,6 +240,7 @@ def test_passes_lie_beside_each_other(path, step):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @given(paths(), st.sampled_from((None, ExecutionMode.SERVO)))
 @settings(max_examples=PATHS, deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_the_builder_accepts_is_planned_or_refused_in_words(path, mode):

@@ -13,6 +13,9 @@ import yaml
 
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
+#: A goal nests less; the fast loader crashes where a text nests a thousand times as much.
+_MAX_DEPTH = 100
+
 
 class GoalFileError(ValueError):
     """A text is not a goal; the sentence names the key."""
@@ -29,7 +32,7 @@ def read_goal_file(source: str | os.PathLike[str]) -> Message:
     text = source if isinstance(source, str) else Path(source).read_text(encoding='utf-8')
     name = '' if isinstance(source, str) else f'{os.fspath(source)}: '
     try:
-        values = yaml.safe_load(text)
+        values = yaml.load(text, Loader=_loader(text))  # both of them are safe
         return with_defaults({} if values is None else values)
     except yaml.YAMLError as error:
         raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
@@ -47,6 +50,22 @@ def goal_text(fields: Mapping[str, Any]) -> str:
         dict(fields), Dumper=_Dumper, default_flow_style=None, sort_keys=False, width=99
     )
     return text
+
+
+def _loader(text: str) -> Any:
+    """Return the faster loader, if there is one and the text does not nest so that it crashes."""
+    fast = getattr(yaml, 'CSafeLoader', None)
+    if fast is None:
+        return yaml.SafeLoader
+    depth = 0
+    for event in yaml.parse(text, Loader=fast):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > _MAX_DEPTH:
+                return yaml.SafeLoader
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+    return fast
 
 
 class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]

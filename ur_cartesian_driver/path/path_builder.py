@@ -219,7 +219,7 @@ class Path:
         start = self._start
         if start is not None and not self._points and 'blend' in given:  # for the way back
             segment = replace(start.segment, blend_radius=given['blend'])
-            start = replace(start, segment=segment, auto_blend=False)
+            start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
         return self._with(_feed=replace(self._feed, **given), _start=start)
 
     # ---- motions -------------------------------------------------------------------------------
@@ -594,6 +594,7 @@ class Path:
                 motion,
                 waypoint=backwards(place.waypoint),
                 segment=replace(motion.segment, blend_radius=place.segment.blend_radius),
+                feed_blend=place.feed_blend,
                 auto_blend=place.auto_blend,
             )
             for place, motion in zip(places, self._points, strict=False)
@@ -602,6 +603,7 @@ class Path:
         start = PathPoint(
             waypoint=backwards(end.waypoint),
             segment=Segment(blend_radius=end.segment.blend_radius),
+            feed_blend=end.feed_blend,
             auto_blend=end.auto_blend,
         )
         return self._with(_start=start, _points=tuple(points[::-1]))
@@ -810,6 +812,7 @@ class Path:
         duration = self._nanoseconds(where, rates.duration)
         velocity, acceleration = self._rates(where, kind, rates, moved, bool(duration))
         blend = amount(where, 'blend', rates.blend, MAX_BLEND, 'm')
+        feed_blend = blend is None and self._feed.blend is not None
         blend = self._feed.blend if blend is None else blend
         point = PathPoint(
             waypoint=Waypoint(pose=pose, posture=posture_near(f'{where}: posture', posture)),
@@ -821,6 +824,7 @@ class Path:
                 **(arc_fields or {}),
             ),
             duration=duration,
+            feed_blend=feed_blend,
             auto_blend=blend is None and kind in (SegmentType.PROCESS, SegmentType.CIRCULAR),
         )
         return self._with(_points=(*self._points, point))

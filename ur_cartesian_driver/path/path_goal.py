@@ -44,6 +44,8 @@ def goal_of_points(
         else point.segment
         for i, point in enumerate(points)
     ]
+    if points and points[-1].feed_blend and not settings.keep_open:
+        segments[-1] = replace(segments[-1], blend_radius=0.0)
     return GoalTable(
         waypoints=WaypointRows.of(
             [

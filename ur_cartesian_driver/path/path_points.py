@@ -48,7 +48,9 @@ class PathPoint:
     duration: int = 0
     #: With the waypoint 0, whichever point this is.
     outputs: tuple[IOCommand, ...] = ()
-    #: Whether the blend is chosen when the path is finished.
+    #: Whether the blend is that of the feed, which the last point of a path does without, and
+    #: whether it is chosen when the path is finished.
+    feed_blend: bool = False
     auto_blend: bool = False
     in_spline: bool = False
 
