@@ -20,7 +20,7 @@ from math import tau
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at, pose_error
+from ur_cartesian_driver.kinematics.chain import Arm, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.closed_form_rows import (
     branch_rows,
     BRANCHES,
@@ -46,6 +46,8 @@ _EXACT = 1e-21
 _MAX_JOINT_STEP = 0.5
 # Newton steps from a solution of the ideal arm: two suffice except near singularities.
 _STEPS = 3
+# Every so many rows of a path begin there; those in between begin as far beside it as they ended.
+_STRIDE = 8
 # Farther than this from the ideal solution [rad], Newton may have found another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
 # Branches of the ideal arm closer than this may be swapped in the real one [rad].
@@ -201,8 +203,21 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
 
     Exact is an error below 3e-11 [m, rad].
 
-    :param q: (n, 6) [rad], within some hundredths of the solution.
+    :param q: (n, 6) [rad], within some hundredths of the solution; rows should follow a path.
     """
+    every = np.arange(0, len(q), _STRIDE)
+    if len(every) < 2:
+        return _refine(arm, targets, q)
+    # Along a path the shifts change slowly: with those in between, one step is enough.
+    refined, exact = _refine(arm, targets.rows(every), q[every])
+    shift = np.where(exact[:, None], refined - q[every], 0.0)
+    place = np.minimum(np.arange(len(q)) / _STRIDE, len(every) - 1.0)
+    before = np.minimum(place.astype(np.intp), len(every) - 2)
+    part = (place - before)[:, None]
+    return _refine(arm, targets, q + (1.0 - part) * shift[before] + part * shift[before + 1])
+
+
+def _refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     q = q.copy()
     exact = np.zeros(len(q), dtype=np.bool_)
     active = np.arange(len(q))
@@ -216,17 +231,17 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
         exact[active[done]] = True
         if step == _STEPS or done.all():
             break
-        change = _newton(frames, errors, squares)
-        change[done] = 0.0
-        q[active] += change
-        if done.any():
-            active, targets = active[~done], targets.rows(np.flatnonzero(~done))
+        rest = np.flatnonzero(~done)
+        columns = jacobian_at(frames, frames.position).T  # by joint, in one piece of memory
+        if len(rest) < len(active):
+            active, targets = active[rest], targets.rows(rest)
+            columns, errors, squares = columns[:, :, rest], errors[:, rest], squares[rest]
+        q[active] += _newton(columns, errors, squares)
     return q, exact
 
 
-def _newton(frames: ChainFramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
+def _newton(columns: Floats, errors: Floats, squares: Floats) -> Floats:
     """Return (J'J + square I)^-1 J' error (n, 6), with a bounded largest joint step."""
-    columns = jacobian_at(frames, frames.position).T  # by joint, in one piece of memory
     normal = np.einsum('ikn,jkn->ijn', columns, columns)
     normal[range(6), range(6)] += np.maximum(squares, MIN_DAMPING)
     gradient = np.einsum('ikn,kn->in', columns, errors)

@@ -88,10 +88,13 @@ def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     :param t: (m,) the time since the piece began [s].
     """
     t = t[:, None]
-    x = coefficients[:, 5]
+    x = coefficients[:, 5].copy()
     v, a = np.zeros_like(x), np.zeros_like(x)
     for power in range(4, -1, -1):  # Horner, with both derivatives
-        a = a * t + 2.0 * v
-        v = v * t + x
-        x = x * t + coefficients[:, power]
+        a *= t
+        a += 2.0 * v
+        v *= t
+        v += x
+        x *= t
+        x += coefficients[:, power]
     return MotionRows(x, v, a)

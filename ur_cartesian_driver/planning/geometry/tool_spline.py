@@ -109,14 +109,13 @@ class ToolSpline:
 
         :param t: (m,) time since the piece began [s].
         """
+        return ToolRows(self.poses(piece, t), *self.rates(piece, t))
+
+    def rates(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
+        """Return the twists and the accelerations of :meth:`rows` (m, 6)."""
         x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
         w, e = angular_rates(turn)
-        turned = multiply_rows(exp_rows(turn.x), self.orientations[piece])
-        return ToolRows(
-            np.concatenate([x.x, normalized_rows(turned)], axis=1),
-            np.concatenate([x.v, w], axis=1),
-            np.concatenate([x.a, e], axis=1),
-        )
+        return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
 
     def poses(self, piece: Ints, t: Floats) -> Floats:
         """Return the poses of :meth:`rows` (m, 7)."""

@@ -92,12 +92,10 @@ def _quantities(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> Iterator[LimitedQuantity]:
     begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
-    tool = path.spline.rows(path.piece, path.u * (end - begin))
-    qd, qdd = joint_rates(
-        kinematics.arm, kinematics.T_flange_tcp, path.q, tool.twists, tool.accelerations
-    )
-    v, a = _norms(tool.twists[:, :3]), _norms(tool.accelerations[:, :3])
-    e = _norms(tool.accelerations[:, 3:])
+    twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
+    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
+    v, a = _norms(twists[:, :3]), _norms(accelerations[:, :3])
+    e = _norms(accelerations[:, 3:])
     if options.max_tool_speed > 0.0:
         yield LimitedQuantity('the tool', v, options.max_tool_speed, 1, 'm/s', 'max_tool_speed')
     for values, name, unit in (

@@ -49,7 +49,7 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
     is_leaving_rows,
     singularity_distance_rows,
     tightest_margins,
-    TightestMargin,
+    TightestMargins,
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
@@ -78,8 +78,8 @@ class SplinePath:
     #: (m,) path length and turn of the tool since the start [m], [rad].
     length: Floats
     angle: Floats
-    #: By point.
-    tightest_margin: dict[int, TightestMargin]
+    #: Of the segments to the points.
+    tightest_margins: TightestMargins
 
     @property
     def times(self) -> Floats:
@@ -129,9 +129,6 @@ def solve_spline_path(
     measures = singularity_distance_rows(kinematics.arm, joint_path.q)
     leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
     _check_path(kinematics, joint_path, np.where(leaving, np.inf, measures), postures, options)
-    margins = tightest_margins(
-        kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
-    )
     return SplinePath(
         spline=spline,
         first=first,
@@ -141,7 +138,9 @@ def solve_spline_path(
         u=np.concatenate([[0.0], joint_path.t]),
         length=length,
         angle=angle,
-        tightest_margin=dict(zip(margins.segments.tolist(), margins, strict=True)),
+        tightest_margins=tightest_margins(
+            kinematics.arm, joint_path.q, measures, joint_path.segments, joint_path.fractions
+        ),
     )
 
 
@@ -227,7 +226,7 @@ def _pose_samples(
     spline: ToolSpline, coarse: tuple[NDArray[np.intp], Floats], first: int
 ) -> PoseSamples:
     n, h = len(spline.positions), np.diff(spline.times)
-    rows = spline.rows(*coarse)
+    twists, accelerations = spline.rates(*coarse)
 
     def largest(vectors: Floats) -> Floats:
         bound: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _COARSE_SAMPLES).max(axis=1)
@@ -235,9 +234,9 @@ def _pose_samples(
 
     steps = _SPEED_MARGIN * np.max(
         [
-            h * largest(rows.twists[:, :3]) / STEP_LENGTH,
-            h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
-            h * np.sqrt(largest(rows.accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR)),
+            h * largest(twists[:, :3]) / STEP_LENGTH,
+            h * largest(twists[:, 3:]) / STEP_ANGLE,
+            h * np.sqrt(largest(accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR)),
         ],
         axis=0,
     )

@@ -150,7 +150,12 @@ def plan_spline(
         kinematics, path, start.rows(), points.quintic, options.spline_tolerance
     )
     segments = _segments(path, polynomials, goal)
-    end = SplineState.after(segments[-1], float(polynomials.times[-1]))
+    end = SplineState(
+        time=float(polynomials.times[-1]),
+        q=vector6(polynomials.q[-1].tolist()),
+        qd=vector6(polynomials.qd[-1].tolist()),
+        qdd=vector6(polynomials.qdd[-1].tolist()) if polynomials.quintic else ZERO6,
+    )
     remarks_made += _clearance_remarks(
         path, end, arm, tool_tips or (T_flange_tcp,), start, options
     )
@@ -257,8 +262,11 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
             np.stack([lengths, angles, durations], axis=1), last + 1 - count, axis=0
         )
         made = [''] * n
-        for row, pieces, sums in zip(last.tolist(), count.tolist(), done.tolist(), strict=True):
-            made[row] = _segment_line(path, goal, int(polynomials.piece[row]), pieces, sums)
+        for k, (row, pieces, sums, margin) in enumerate(
+            zip(last.tolist(), count.tolist(), done.tolist(), path.tightest_margins, strict=True)
+        ):
+            line = _segment_line(goal, path.first, k, pieces, sums)
+            made[row] = f'{line}; margin {margin}'
         return made
 
     return PlannedRows(
@@ -279,16 +287,13 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
     )
 
 
-def _segment_line(
-    path: SplinePath, goal: GoalTable, k: int, count: int, done: Sequence[float]
-) -> str:
-    """Return the line of the segment to a point: ``done`` are its length, turn and time."""
+def _segment_line(goal: GoalTable, first: int, k: int, count: int, done: Sequence[float]) -> str:
+    """Return what a segment does to its point: ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
     speed = (
         f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
     ) + ' mean'
-    point = path.first + k
     passes = (
         'stops there'
         if not goal.waypoints.twists[k].any()
@@ -297,8 +302,8 @@ def _segment_line(
     )
     pieces = '1 piece' if count == 1 else f'{count} pieces'
     return (
-        f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
-        f'{passes}; margin {path.tightest_margin[point]}'
+        f'point {first + k}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
+        f'{passes}'
     )
 
 
@@ -329,11 +334,12 @@ def _reference(path: SplinePath) -> ReferencePath:
 def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]:
     """Return the remarks on the precision and on the tightest margin."""
     kind = 'quintic' if polynomials.quintic else 'cubic'
-    point, margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
+    margins = path.tightest_margins
+    row = int(np.argmin(margins.normalized))
     return (
         f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
         f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
-        f'tightest margin: {margin} of the segment to point {point}',
+        f'tightest margin: {margins[row]} of the segment to point {path.first + row}',
     )
 
 
