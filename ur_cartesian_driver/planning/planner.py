@@ -54,6 +54,7 @@ from ur_cartesian_driver.motion.vectors import subtract6, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
+from ur_cartesian_driver.planning.moves.path_margins import BlendSamples
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
     segment_lines,
@@ -176,22 +177,21 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are joined by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
     geometries = planner.geometries()
-    samples = planner.samples
     lines = clearance_lines(
         arm,
         tool_tips(goal, planner.T_flange_active),
         options,
-        samples.q,
+        planner.samples.q,
         state.actual_q,
-        samples.segment,
-        samples.fraction,
+        planner.samples.segment,
+        planner.samples.fraction,
     )
-    blend_samples = planner.joint_path_planner.path_margins.blend_samples
-    timings = schedule(geometries, options, arm.model, blend_samples, planner.running)
+    timings = schedule(geometries, options, arm.model, planner.blend_samples, planner.running)
+    segments = planner.segments(geometries, timings)
+    del planner.samples, planner.blend_samples  # long goals have many, and so has the reference
     reference = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
-    segments = planner.segments(geometries, timings)
     segments = place_outputs(
         segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
     )
@@ -259,11 +259,9 @@ class GoalPlanner:
                 f'dialect {options.dialect.name} count in milliseconds'
             )
         self.remarks += self._static_error_remarks()
-        self.joint_path_planner = JointPathPlanner(
-            goal, self.targets.rows, self.kinematics, options, self.remarks, self.reasons
-        )
         #: The whole joint path, sampled; set by :meth:`geometries`.
         self.samples: PathSamples
+        self.blend_samples: BlendSamples
         self._check_robot()
         self._check_approach()
 
@@ -302,10 +300,19 @@ class GoalPlanner:
         times = np.diff(self.goal.waypoints.times, prepend=0.0)[first:]
         if not self.timed:
             times = np.full(len(times), nan)
-        geometries = self.joint_path_planner.geometries(
+        joint_paths = JointPathPlanner(
+            self.goal,
+            self.targets.rows,
+            self.kinematics,
+            self.options,
+            self.remarks,
+            self.reasons,
+        )
+        geometries = joint_paths.geometries(
             first, self.state.actual_tcp_pose, self.state.actual_q, times
         )
-        self.samples = self.joint_path_planner.path_margins.samples()
+        self.samples = joint_paths.path_margins.samples()
+        self.blend_samples = joint_paths.path_margins.blend_samples
         return geometries
 
     def plan(
