@@ -31,15 +31,17 @@ def run(quick: bool) -> Iterator[Figure]:
     """Plan straight lines of 5 mm, which is what a scanned or sliced path looks like."""
     arms = {'nominal': Arm(robot_model(paths.MODEL)), 'calibrated': paths.calibrated_arm()}
     corners = {'stops': 0.0, 'blends': RADIUS}
-    for points in (1_000,) if quick else (1_000, 10_000):
+    for points in (1_000,) if quick else (1_000, 10_000, 100_000):
         for corner, arm in product(corners, arms):
+            if points > 10_000 and not corners[corner]:
+                continue
             goal = paths.goal(points, corners[corner])
             state = paths.at_home(arms[arm])
             taken = [
                 1e3
                 * seconds(
                     partial(plan, goal, state, arms[arm], PlanningOptions(self_collision=choice)),
-                    repeat=3 if points == 1_000 else 1,
+                    repeat=5 if points <= 10_000 else 1,
                 )
                 for choice in ('off', 'auto')
             ]
@@ -59,7 +61,7 @@ def run(quick: bool) -> Iterator[Figure]:
                 baseline=taken[0],
                 than='without',
             )
-        for arm in arms:
+        for arm in arms if points <= 10_000 else ():
             yield _spline(points, arm, arms[arm])
 
 
@@ -67,9 +69,7 @@ def _spline(points: int, name: str, arm: Arm) -> Figure:
     """Plan the same points with times and twists, from Cartesian curve to joint pieces."""
     goal, state = _timed(paths.goal(points)), paths.at_home(arm)
     options = PlanningOptions(self_collision='off')
-    taken = 1e3 * seconds(
-        partial(plan, goal, state, arm, options), repeat=3 if points == 1_000 else 1
-    )
+    taken = 1e3 * seconds(partial(plan, goal, state, arm, options), repeat=5)
     pieces = len(plan(goal, state, arm, options).segments)
     return Figure(
         benchmark='planning',

@@ -35,7 +35,7 @@ _IN_TIME = 1e-7
 _MAX_FITS = 60
 #: Steps of a fit, which takes one more from where times differ by less than this (relative).
 _FIT_STEPS = 14
-_SAME_TIME = 1e-11
+_SAME_TIME = 1e-13
 #: The part of the mean speed below which no move is slowed.
 _MIN_RATE = 0.2
 _TINY = 1e-300
@@ -374,9 +374,9 @@ def _fit(
 
     Times are nearly powers of the rate: the secant between two rates with the time in between.
     """
-    low, high, x = tried = np.log([lowest, highest, np.clip(rate, lowest, highest)])
-    took = durations(np.tile(rows, 3), np.exp(tried).ravel())
-    f_low, f_high, f = np.log(took.reshape(tried.shape) / wanted)
+    low, high, x = np.log([lowest, highest, np.clip(rate, lowest, highest)])
+    took = durations(np.tile(rows, 3), np.concatenate([lowest, highest, np.exp(x)]))
+    f_low, f_high, f = np.log(took.reshape(3, -1) / wanted)
     unreachable, side = f_high >= 0.0, np.zeros(len(rate))
     for _ in range(_FIT_STEPS):
         slow = f > 0.0
