@@ -60,8 +60,9 @@ INTENDED = re.compile(r'slowed from (\S+) to \1 |: the arm stops there, because 
 PLACE = re.compile(r' at \d+ %')
 #: By the last name of a field; else 1e-9 (relative to values above 1).
 TOLERANCES = {
-    **dict.fromkeys(('velocities', 'durations', 'velocity', 'duration'), 1e-7),
-    # By the times of blends, some hundredths of a second, squared.
+    **dict.fromkeys(('durations', 'duration'), 1e-7),
+    # That of some milliseconds in a blend; of others times hardly depend.
+    **dict.fromkeys(('velocities', 'velocity'), 1e-5),
     **dict.fromkeys(('accelerations', 'acceleration', 'blend_entries'), 1e-5),
 }
 SHARES = {'fuzz': 0.35, 'mixed': 0.3, 'random': 0.15, 'long': 0.15, 'spline': 0.05}
