@@ -213,12 +213,13 @@ class Controller:
         self.cycles += 1
         if self.faults is not None and self.faults.active:
             self.faults.step()
-        self.power.step(self.time)
-        if self.time >= self._unlock_at:
+        now = self.time
+        self.power.step(now)
+        if now >= self._unlock_at:
             self._unlock_at = inf
             self.safety_event(SafetyEvent.UNLOCK_BY_LINE)
         self.sockets.poll()
-        self._watch_inputs()
+        self._watch_inputs(now)
         if self._stopping_on_path and self.at_rest:
             self._stopping_on_path = False
             self.motion.stop_at_once()
@@ -240,7 +241,7 @@ class Controller:
         """
         paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         target = 0.0 if paused or self._stopping_on_path else self.speed_slider
-        if was_at_rest:
+        if was_at_rest or self.scale == target:
             self.scale = target
             return
         time = PROGRAM_STOP_TIME if self._stopping_on_path else SLIDER_TIME
@@ -263,9 +264,9 @@ class Controller:
         if self.process.has_pause_on(code, argument):
             self.programs.pause()
 
-    def _watch_inputs(self) -> None:
+    def _watch_inputs(self, now: float) -> None:
         """Stop or pause the program whose RTDE client has stopped writing an input."""
-        for variable, action in self.watchdogs.expired(self.time):
+        for variable, action in self.watchdogs.expired(now):
             self.messages.text(f'RTDE watchdog: {variable} was not written in time.')
             if action == 'stop':
                 self.programs.stop()

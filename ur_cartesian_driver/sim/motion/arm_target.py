@@ -14,7 +14,6 @@ from ur_cartesian_driver.sim.motion.ik_branch import IkBranchTracker
 from ur_cartesian_driver.sim.motion.joint_kinematics import (
     difference_rate,
     JointKinematics,
-    max_joint_difference,
     NO_CHANGE,
     STILL,
     twist_between,
@@ -103,9 +102,7 @@ class ArmTarget:
             )
         qd, self.qdd, self.tcp_twist = rates
         self.q, self.qd, self.T_base_tcp = q, qd, pose
-        self._still_for = (
-            0.0 if max_joint_difference(qd, STILL) > NO_CHANGE else self._still_for + self.cycle
-        )
+        self._still_for = 0.0 if max(map(abs, qd)) > NO_CHANGE else self._still_for + self.cycle
 
     def hold(self) -> None:
         """Stay for this cycle."""

@@ -12,7 +12,7 @@ time, the cycles are done one by one.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,20 +31,20 @@ from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 
 #: Most cycles of a batch, and fewest: for less numpy takes longer.
-_MAX_CYCLES = 192
+_MAX_CYCLES = 384
 _MIN_CYCLES = 12
 #: Cycles that are done one by one where the arm cannot keep the time.
 _BACK_OFF = 50
 
 
-class SolvedCycle(NamedTuple):
-    """Where a motion is after one more cycle."""
+class CycleStep(NamedTuple):
+    """Where a motion has got to, and the time of its own that it took [s]."""
 
     q: Vector6
     pose: Pose
-    rates: TargetRates
-    #: The time in the section of its path [s].
-    time: float
+    duration: float
+    #: Its speeds, where they are known already.
+    rates: TargetRates | None = None
 
 
 class CycleBatch:
@@ -57,7 +57,8 @@ class CycleBatch:
     def __init__(self, target: ArmTarget) -> None:
         """Begin with none."""
         self._target = target
-        self._cycles: list[SolvedCycle] = []
+        #: The last one first: joints, pose, rates, and the time in the section of the path [s].
+        self._cycles: list[list[float]] = []
         #: What they were solved for: motion and section, time of a cycle [s], max tool speed.
         self._motion: PathMotion | None = None
         self._solved_for = (0, 0.0, 0.0)
@@ -67,11 +68,9 @@ class CycleBatch:
         self._q: Vector6 = target.q
         self._back_off = 0
 
-    def next(
-        self, motion: PathMotion, duration: float, max_tool_speed: float
-    ) -> SolvedCycle | None:
+    def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Return the next cycle of a motion, None where it has to be found by itself.
+        Move on by the next cycle of a motion; None where it has to be found by itself.
 
         :param duration: the time of the path in a cycle [s]; ``max_tool_speed`` [m/s].
         """
@@ -82,19 +81,22 @@ class CycleBatch:
             return None
         if not self._cycles or self._q is not target.q or not target.tcp_is_active:
             if self._back_off == 0:
-                self._cycles = self._solve(motion, duration, max_tool_speed)[::-1]
+                self._cycles = self._solve(motion, duration, max_tool_speed)
                 self._back_off = _BACK_OFF
             if not self._cycles:
                 self._back_off -= 1
                 return None
             self._back_off = 0
-        cycle = self._cycles.pop()
-        self._q = cycle.q
-        return cycle
+        cycle: Any = tuple(self._cycles.pop())
+        motion.time = cycle[31]
+        self._q = q = cycle[:6]
+        pose = Pose(cycle[6:9], cycle[9:13])
+        rates = TargetRates(cycle[13:19], cycle[19:25], cycle[25:31])
+        return CycleStep(q, pose, duration, rates)
 
     def _solve(
         self, motion: PathMotion, duration: float, max_tool_speed: float
-    ) -> list[SolvedCycle]:
+    ) -> list[list[float]]:
         """Return the cycles that follow within the section and that the arm can keep."""
         target, section = self._target, motion.sections[motion.index]
         stands = section.profile.length <= 0.0
@@ -130,20 +132,13 @@ class CycleBatch:
 
     def _as_cycles(
         self, q: Floats, poses: Floats, times: NDArray[np.float64]
-    ) -> list[SolvedCycle]:
-        """Return cycles with their rates; the first row is where the arm is."""
+    ) -> list[list[float]]:
+        """Return cycles with their rates, the last one first; row 0 is where the arm is."""
         rate = 1.0 / self._target.cycle
         qd = rate * np.diff(q, axis=0)
         qdd = rate * np.diff(qd, axis=0, prepend=np.array([self._target.qd]))
         turns = log_rows(multiply_rows(poses[1:, 3:], conjugate_rows(poses[:-1, 3:])))
-        twist = rate * np.concatenate([np.diff(poses[:, :3], axis=0), turns], axis=1)
-        columns = (rows.tolist() for rows in (q[1:], poses[1:], qd, qdd, twist, times))
-        return [
-            SolvedCycle(
-                tuple(joints),
-                Pose(tuple(pose[:3]), tuple(pose[3:])),
-                TargetRates(tuple(speeds), tuple(accelerations), tuple(twists)),
-                time,
-            )
-            for joints, pose, speeds, accelerations, twists, time in zip(*columns, strict=True)
-        ]
+        travel = np.diff(poses[:, :3], axis=0)
+        columns = (q[1:], poses[1:], qd, qdd, rate * travel, rate * turns, times[:, None])
+        cycles: list[list[float]] = np.concatenate(columns, axis=1)[::-1].tolist()
+        return cycles

@@ -11,12 +11,12 @@ too fast.
 from __future__ import annotations
 
 from math import inf, log
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
-from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
-from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch, CycleStep
 from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
@@ -40,16 +40,6 @@ _STALLED_AFTER = 1.0
 _TURNING = 0.2
 # A joint line does not begin where the tool's path before it ends if it is so much too fast.
 _JUMP_RATIO = 50.0
-
-
-class CycleStep(NamedTuple):
-    """Where a motion has got to, and the time of its own that it took [s]."""
-
-    q: Vector6
-    pose: Pose
-    duration: float
-    #: Its speeds, where they are known already.
-    rates: TargetRates | None = None
 
 
 class CycleStepper:
@@ -79,9 +69,8 @@ class CycleStepper:
         if isinstance(motion, PathMotion):
             solved = self._batch.next(motion, duration, max_tool_speed)
             if solved is not None:
-                motion.accept((motion.index, solved.time, 0.0))
                 self._on_tool_path, self._stalled_for = self._batch.on_tool_path, 0.0
-                return CycleStep(solved.q, solved.pose, duration, solved.rates)
+                return solved
         target = self._target
         setpoint: Setpoint = target.q
         h, before = duration, (duration, 0.0)
