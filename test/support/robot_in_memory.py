@@ -56,15 +56,22 @@ class ProgramRun:
 class RobotInMemory:
     """One robot, on which trajectories are run one after the other from anywhere."""
 
-    def __init__(self, model, frequency=None, geometry=None, edit=wrap_in_program):
+    def __init__(
+        self, model, frequency=None, geometry=None, edit=wrap_in_program, interleaving_seed=None
+    ):
         """
         Start it.
 
         :param edit: makes a program of the text that the driver sends.
+        :param interleaving_seed: of the random switches between its threads; None = no switches.
         """
         self.model, self.geometry = model, geometry
         config = SimulatorConfig(
-            model=model, frequency=frequency, geometry=geometry, unlock_delay=0.0
+            model=model,
+            frequency=frequency,
+            geometry=geometry,
+            unlock_delay=0.0,
+            interleaving_seed=interleaving_seed,
         )
         self._sockets = MemorySockets()
         self._accepted = {
@@ -151,6 +158,16 @@ class RobotInMemory:
     def feed(self, primitives):
         """Let more points come."""
         self._socket(TRAJECTORY).feed(encode_points(primitives))
+
+    def ask_to_idle(self):
+        """Let the message come that ends the mode in which trajectories run."""
+        self._socket(REVERSE).feed(keepalive(0).encode())
+
+    def late_results(self, cycles):
+        """Return the results that come within some cycles after the end of a trajectory."""
+        for _ in range(cycles):
+            self.controller.step()
+        return TrajectoryResultDecoder().feed(self._socket(TRAJECTORY).take())
 
     def send_command(self, command):
         """Let a script command come."""
