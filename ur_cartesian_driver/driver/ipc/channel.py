@@ -293,10 +293,15 @@ def pack(message: Request | Notification) -> bytes:
 
     :raises LocalProtocolError: it contains something that cannot be sent to another process.
     """
+    stream = io.BytesIO()  # written once: a long goal has 50 MB, and each copy would count
+    stream.write(bytes(LENGTH.size))
     try:
-        refusal = pickle.dumps(refusal_of(message, UNREADABLE))
-        body = refusal + pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-        return LENGTH.pack(len(body)) + body
+        pickle.dump(refusal_of(message, UNREADABLE), stream)
+        pickle.dump(message, stream, protocol=pickle.HIGHEST_PROTOCOL)
+        size = stream.tell() - LENGTH.size
+        stream.seek(0)
+        stream.write(LENGTH.pack(size))
+        return stream.getvalue()
     except Exception as error:  # pickling calls methods of what it finds
         raise LocalProtocolError(
             f'{type(message).__name__} cannot be sent to the robot process: {error}.'
