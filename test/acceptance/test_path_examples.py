@@ -181,6 +181,21 @@ def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
     assert wrong == []
 
 
+@pytest.mark.parametrize('is_spun', [True, False])
+def test_a_node_that_is_there_can_be_the_client(cell, is_spun):
+    node = rclpy.create_node('user', context=cell.node.context)
+    if is_spun:
+        cell.node.executor.add_node(node)
+    path = Path(cell.go_home().actual_tcp_pose).at(speed=0.2).by(dy=0.02)
+    try:
+        with GoalClient(node=node) as client:
+            client.wait_ready(10.0)
+            assert client.execute(path).raise_for_error().text.startswith('The point was executed')
+        assert (node.executor is not None) == is_spun
+    finally:
+        node.destroy_node()
+
+
 def test_a_path_that_begins_elsewhere_is_refused_unless_its_first_motion_leads_there(cell):
     x, y, z = cell.go_home().actual_tcp_pose.position
     elsewhere = Path((x, y + 0.02, z), DOWN)

@@ -222,6 +222,34 @@ def test_an_arc_that_is_followed_turns_the_tool_with_its_tangent():
     assert path.goal().segments[0].arc_mode is ArcMode.FIXED
 
 
+def test_a_weave_swings_evenly_along_a_line_and_an_arc():
+    straight = START.at(speed=0.05, acceleration=0.5).by(dy=0.1)
+    path = straight.weave(amplitude=mm(4), wavelength=mm(20))
+    points = path._table().waypoints
+    assert len(path) == 5 * 8
+    aside = points.poses[:, 0] - HERE.position[0]
+    along = points.poses[:, 1] - HERE.position[1]
+    assert np.abs(aside) == pytest.approx(np.abs(0.004 * np.sin(2 * pi * along / 0.02)), abs=1e-9)
+    assert np.abs(aside).max() == pytest.approx(0.004)
+    assert path.end.position == pytest.approx(straight.end.position)
+    # From rest to rest at its speed; a tenth of a second to reach it, and one to stop.
+    assert points.times[-1] == pytest.approx(0.1 / 0.05 + 0.1)
+    middle = (along > 0.02) & (along < 0.08)
+    assert points.twists[middle, 1] == pytest.approx(0.05, abs=1e-6)
+    slope = 2 * pi / 0.02 * np.cos(2 * pi * along[middle] / 0.02)
+    assert np.abs(points.twists[middle, 0]) == pytest.approx(
+        np.abs(0.05 * 0.004 * slope), abs=1e-5
+    )
+    assert path.start == HERE
+
+    bow = START.at(speed=0.05).arc((-0.4, 0.0, 0.5), via=(-0.4 - 0.1 * 0.8, -0.1 + 0.1 * 0.6, 0.5))
+    radii = [
+        np.hypot(pose.position[0] + 0.4, pose.position[1] + 0.1)
+        for pose in bow.weave(mm(4), mm(10)).poses
+    ]
+    assert (min(radii), max(radii)) == pytest.approx((0.096, 0.104), abs=1e-9)
+
+
 # ---- mistakes -----------------------------------------------------------------------------------
 
 
@@ -290,7 +318,7 @@ def test_an_arc_that_is_followed_turns_the_tool_with_its_tangent():
         ),
         (lambda: START.spline((0, 0, 1), duration=1, twist=(1, 2)), 'point 0 (spline): twist is'),
         (
-            lambda: START.by(dx=0.1).then(Path(HERE).by(dx=0.1)),
+            lambda: START.by(dx=0.1).then(Path(HERE)),
             'then() joins a path that ends 100 mm and 0 rad away from where the other begins',
         ),
         (

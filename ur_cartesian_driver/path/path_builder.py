@@ -517,6 +517,17 @@ class Path:
                 raise InvalidGoal(
                     'then()', f'joins the {name}s {mine!r} and {its!r}', 'use one for both'
                 )
+        if (
+            self.end is not None
+            and other.start is not None
+            and not is_same(self._end, other.start)
+        ):
+            raise InvalidGoal(
+                'then()',
+                f'joins a path that ends {_apart(self._end, other.start)} away from where '
+                'the other begins',
+                'add a motion to there',
+            )
         if self._points and other._points:
             first, last = other._points[0], self._points[-1]
             if first.in_spline != last.in_spline:
@@ -525,15 +536,8 @@ class Path:
                 raise InvalidGoal(
                     'then()', 'joins a path with durations and one without', 'give both, or none'
                 )
-            if other.start is not None and not is_same(self._end, other.start):
-                raise InvalidGoal(
-                    'then()',
-                    f'joins a path that ends {_apart(self._end, other.start)} away from where '
-                    'the other begins',
-                    'add a motion to there',
-                )
         return self._with(
-            _start=self._start if self._points or self._start else other._start,
+            _start=self._start if len(self) or self._start else other._start,
             _points=(*self._points, *other._points),
             _feed=other._feed,
             _settings=merged(self._settings, other._settings),

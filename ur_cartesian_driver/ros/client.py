@@ -23,6 +23,7 @@ import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
@@ -118,33 +119,46 @@ def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTraje
 
 class GoalClient:
     """
-    A client with a node and a ROS context of its own; a context manager.
+    A client with a node and a ROS context of its own, or on a given node; a context manager.
 
     ::
 
         with GoalClient() as client:
-            status, result = client.send(load_goal(Path('square.yaml')), print)
+            client.execute(path).raise_for_error()
     """
 
     def __init__(
-        self, driver: str = 'ur_cartesian_driver', node_name: str = 'ur_cartesian_client'
+        self,
+        driver: str = 'ur_cartesian_driver',
+        node_name: str = 'ur_cartesian_client',
+        *,
+        node: Node | None = None,
     ) -> None:
         """
         Create the node.
 
         :param driver: name of the driver's node, with its namespace if it has one.
+        :param node: the one to use instead. If an executor spins it, call the client from another
+            thread than that of the executor; if none does, the client spins it while it waits.
         """
         #: The signal that cancelled the goal sent last; 0 = none.
         self.signal_number = 0
         self._driver = f'/{driver.strip("/")}'
         self.action = f'{self._driver}/follow_cartesian_trajectory'
-        # A context of its own installs no signal handlers: a goal can be cancelled after Ctrl-C.
-        self._context = Context()
-        rclpy.init(args=[], context=self._context)
-        self._node = rclpy.create_node(node_name, context=self._context)
-        self._client = ActionClient(self._node, FollowCartesianTrajectory, self.action)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._closed = False
+        self._own_context: Context | None = None
+        if node is None:
+            # It installs no signal handlers: a goal can be cancelled after Ctrl-C.
+            self._own_context = Context()
+            rclpy.init(args=[], context=self._own_context)
+            node = rclpy.create_node(node_name, context=self._own_context)
+        self._node = node
+        self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
+        #: None: another one spins the node.
+        self._executor: SingleThreadedExecutor | None = None
+        if node.executor is None:
+            self._executor = SingleThreadedExecutor(context=node.context)
+            self._executor.add_node(node)
 
     def __enter__(self) -> GoalClient:
         """Return the client."""
@@ -155,12 +169,17 @@ class GoalClient:
         self.close()
 
     def close(self) -> None:
-        """Destroy the node and shut down the context."""
-        if self._context.ok():
+        """Destroy what the client has made; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        if self._executor is not None:
+            self._node.executor = None  # type: ignore[assignment]  # takes the node out
             self._executor.shutdown()
-            self._client.destroy()
+        self._client.destroy()
+        if self._own_context is not None:
             self._node.destroy_node()
-            rclpy.shutdown(context=self._context)
+            rclpy.shutdown(context=self._own_context)
 
     def send(
         self,
@@ -262,7 +281,7 @@ class GoalClient:
                     raise TimeoutError(
                         f'The driver {self._driver} is not ready after {timeout:g} s: {needed}'
                     )
-                self._executor.spin_once(timeout_sec=0.1)
+                self._spin_or_wait()
         finally:
             self._node.destroy_subscription(subscription)
 
@@ -277,8 +296,10 @@ class GoalClient:
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
         """Spin until a future is done."""
         last_seen = monotonic()
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
         while not future.done():
-            self._executor.spin_once(timeout_sec=0.1)
+            self._spin_or_wait(done)
             between()
             if self._client.server_is_ready():
                 last_seen = monotonic()
@@ -287,6 +308,13 @@ class GoalClient:
                     f'The driver of {self.action} is gone; how the goal ended is not known.'
                 )
         return future.result()
+
+    def _spin_or_wait(self, done: threading.Event | None = None) -> None:
+        """Handle what has come in, or let the node's own executor do that, for 0.1 s at most."""
+        if self._executor is not None:
+            self._executor.spin_once(timeout_sec=0.1)
+        else:
+            (done or threading.Event()).wait(0.1)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
