@@ -55,8 +55,13 @@ def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
     """Yield a simulated robot that listens on free ports, in a thread of this process."""
     from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
-    settings = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
-    with SimulatedRobot(SimulatorConfig(**settings | _marker_values(request, 'ur_sim'))) as robot:
+    settings: dict[str, Any] = {
+        'rtde_port': 0,
+        'primary_port': 0,
+        'dashboard_port': 0,
+        'when_late': 'wait',
+    } | _marker_values(request, 'ur_sim')
+    with SimulatedRobot(SimulatorConfig(**settings)) as robot:
         yield robot
 
 

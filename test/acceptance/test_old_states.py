@@ -13,7 +13,12 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+pytestmark = [
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    # The age of a state is told by the robot's clock.
+    pytest.mark.ur_sim(when_late='skip'),
+]
 
 #: Longest time from a push to standstill: the bound of the age, and braking [s].
 REACTION = 0.6

@@ -152,7 +152,8 @@ def parameters_for():
 
 @pytest.fixture
 def sim():
-    with SimulatedRobot(SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)) as robot:
+    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, when_late='wait')
+    with SimulatedRobot(config) as robot:
         yield robot
 
 

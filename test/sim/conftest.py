@@ -8,9 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from robot_ports import robot_of_all_cycles
+from robot_ports import FREE
 
 from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
@@ -66,5 +67,5 @@ def make_bench() -> type[Bench]:
 @pytest.fixture
 def robot():
     """Run a robot on free ports, 20 times as fast as time."""
-    with robot_of_all_cycles(rate=20.0) as robot:
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=20.0, when_late='wait')) as robot:
         yield robot

@@ -20,7 +20,6 @@ import struct
 from typing import Any
 
 import pytest
-from robot_ports import robot_of_all_cycles
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -164,7 +163,8 @@ class Watcher:
 @pytest.fixture(scope='module')
 def robot(polyscope):
     programs = {'a.urp': SCRIPTS[6].decode()}
-    with robot_of_all_cycles(**FREE, programs=programs, polyscope=polyscope) as robot:
+    config = SimulatorConfig(**FREE, programs=programs, polyscope=polyscope, when_late='wait')
+    with SimulatedRobot(config) as robot:
         yield robot
 
 

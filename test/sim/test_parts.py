@@ -216,3 +216,15 @@ def test_a_simulator_that_stood_still_says_so_in_its_time_stamps(bench):
     bench.controller.skipped_time = clock.skipped
     assert bench.controller.time == before
     assert output_getter('timestamp', 0.0)(bench.controller) == before + clock.skipped
+
+
+def test_a_simulator_that_waits_for_a_busy_computer_leaves_no_time_out():
+    async def cycles(clock):
+        await clock.next_cycle()
+        time.sleep(0.15)  # noqa: ASYNC251  the computer is busy
+        await clock.next_cycle()
+
+    clock = RealClock(0.002, when_late='wait')
+    asyncio.run(cycles(clock))
+    assert clock.slips >= 1
+    assert clock.skipped == 0.0

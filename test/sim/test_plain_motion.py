@@ -14,7 +14,9 @@ from math import pi, sqrt
 
 from plain_clients import PlainPrimary, PlainRealtime
 import pytest
-from robot_ports import robot_of_all_cycles
+from robot_ports import FREE
+
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 CYCLE = 0.002
 #: The first motion of a program loses half of the time in which it sets out [s].
@@ -24,7 +26,7 @@ START = 0.16
 @pytest.fixture(scope='module')
 def robot():
     """Run a robot twice as fast as time."""
-    with robot_of_all_cycles(rate=2.0) as robot:
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=2.0, when_late='wait')) as robot:
         yield robot
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import struct
 
 import pytest
-from robot_ports import FREE, PAUSE, robot_of_all_cycles, setup_inputs, Wire
+from robot_ports import FREE, PAUSE, setup_inputs, Wire
 from rtde_requests import setup_outputs, START, VERSION_2
 from waiting import wait_for
 
@@ -107,7 +107,7 @@ def test_a_frequency_is_kept_by_spreading_packages_over_the_cycles(robot):
 )
 def test_timestamps_advance_by_one_cycle_for_every_client(settings, cycle):
     with (
-        robot_of_all_cycles(**settings) as robot,
+        SimulatedRobot(SimulatorConfig(**FREE, **settings, when_late='wait')) as robot,
         Wire(robot.ports.rtde) as one,
         Wire(robot.ports.rtde) as two,
     ):

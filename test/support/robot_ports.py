@@ -4,25 +4,15 @@
 
 from __future__ import annotations
 
-from math import inf
 import socket
 import struct
 from typing import Any, Self
 
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
-from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.clock import RealClock
 
 #: Settings of a simulated robot, each of a type of its own.
 FREE: dict[str, Any] = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
 HOST = '127.0.0.1'
-
-
-def robot_of_all_cycles(**settings: Any) -> SimulatedRobot:
-    """Return a robot on free ports that a busy computer slows down; it leaves no cycle out."""
-    config = SimulatorConfig(**FREE | settings)
-    clock = RealClock(config.cycle, config.rate, max_lag=inf) if config.rate > 0.0 else None
-    return SimulatedRobot(config, clock=clock)
 
 
 class Wire:

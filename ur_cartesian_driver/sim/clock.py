@@ -13,7 +13,7 @@ import asyncio
 from collections import deque
 from dataclasses import dataclass
 import time
-from typing import Protocol
+from typing import Literal, Protocol
 
 #: The event loop wakes up to this much late [s] (epoll counts in milliseconds). So it has to wake
 #: this much early, and the clock sleeps for the rest.
@@ -21,7 +21,7 @@ _LOOP_GRAIN = 0.001
 #: A clock that is late by more than this [s] (suspended process, overloaded machine) starts anew
 #: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and while cycles race
 #: no client could answer in time.
-MAX_LAG = 0.1
+_MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 
 
@@ -58,16 +58,18 @@ class VirtualClock:
 class RealClock:
     """Absolute deadlines, one cycle apart on the monotonic clock."""
 
-    def __init__(self, cycle: float, rate: float = 1.0, max_lag: float = MAX_LAG) -> None:
+    def __init__(
+        self, cycle: float, rate: float = 1.0, when_late: Literal['skip', 'wait'] = 'skip'
+    ) -> None:
         """
         Begin with the first deadline one cycle from the first call.
 
         :param cycle: [s] of simulated time.
         :param rate: seconds of simulated time per second.
-        :param max_lag: how late a cycle may be [s] before the clock starts anew; `math.inf` = it
-            catches up however late it is, for who measures motions and answers no program.
+        :param when_late: whether a clock that starts anew has skipped the time that it was late.
         """
-        self._period, self._rate, self._max_lag = cycle / rate, rate, max_lag
+        self._period, self._rate = cycle / rate, rate
+        self._skips = when_late == 'skip'
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
@@ -87,9 +89,9 @@ class RealClock:
             time.sleep(rest)  # noqa: ASYNC251
         late = max(0.0, time.monotonic() - deadline)
         self._late.append(late)
-        if late > self._max_lag:
+        if late > _MAX_LAG:
             self._start, self._count, self.slips = time.monotonic(), 0, self.slips + 1
-            self.skipped += late * self._rate
+            self.skipped += late * self._rate * self._skips
 
     def lateness(self) -> Lateness:
         """Return the figures of the last 20,000 cycles."""

@@ -137,7 +137,7 @@ class SimulatedRobot:
         }
         self.inject(*self.config.faults)
         self._clock: Clock = clock or (
-            RealClock(self.config.cycle, self.config.rate)
+            RealClock(self.config.cycle, self.config.rate, self.config.when_late)
             if self.config.rate > 0.0
             else VirtualClock()
         )

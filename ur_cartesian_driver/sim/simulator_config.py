@@ -89,6 +89,10 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
+    #: What the robot's clock does when this computer was too busy for its cycles: 'skip' their
+    #: time, so that it keeps real time as on a real robot; 'wait', so that motions take as long as
+    #: they should by the robot's clock, as tests want it.
+    when_late: Literal['skip', 'wait'] = 'skip'
     #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
@@ -115,6 +119,8 @@ class SimulatorConfig:
             raise ValueError(f'q is {self.q}; give the joint positions in radians.')
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
+        if self.when_late not in ('skip', 'wait'):
+            raise ValueError(f"when_late is {self.when_late!r}; use 'skip' or 'wait'.")
         if self.program and self.program not in self.programs:
             known = ', '.join(self.programs) or 'none'
             raise ValueError(f'program is {self.program!r}; programs has {known}.')
