@@ -224,7 +224,10 @@ class GoalRun:
             self._context.driver.check_can_preempt()
         arbiter.preempt(self.arm_request)
         self._check_wanted()
-        return plan if arbiter.release_count == release_count else self._plan_from_here(goal)
+        if arbiter.release_count == release_count:
+            return plan
+        del plan  # a long one has 100 MB and more, as has the next
+        return self._plan_from_here(goal)
 
     def _plan_from_here(self, goal: Goal) -> Plan:
         """Plan a goal whose frames are where they are now: the arm may have moved since."""
