@@ -45,6 +45,8 @@ REQUIRES = [
 EXTRAS = {
     # Checks for self-collision, with the meshes of the robots.
     'collision': ['pin>=3,<5', 'example-robot-data>=4,<7'],
+    # Drawings as goals (DXF).
+    'import': ['ezdxf>=1.3,<2'],
     # The picture of the path that the demo draws.
     'plot': ['matplotlib>=3.8,<4'],
     'test': [

@@ -20,7 +20,20 @@ import signal
 import sys
 from types import FrameType
 
-from ur_cartesian_driver.cli import check_robot, commands, recording_plot, validate_command
+from ur_cartesian_driver.cli import (
+    check_robot,
+    commands,
+    import_command,
+    recording_plot,
+    validate_command,
+)
+from ur_cartesian_driver.importing.import_options import (
+    CodeOutput,
+    LENGTH_UNITS,
+    parse_code_output,
+    parse_length,
+    ToolOrientation,
+)
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.planning.request.validate import MAX_JOINT_VALUE
@@ -80,6 +93,7 @@ def parser() -> argparse.ArgumentParser:
     _add_sim(sub)
     _add_send(sub)
     _add_validate(sub)
+    _add_import(sub)
     _add_where(sub)
     _add_check_robot(sub)
     _add_plot(sub)
@@ -322,6 +336,86 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
     _add_calibration(validate)
 
 
+def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
+    bring = _add(
+        sub,
+        'import',
+        import_command.import_goal,
+        'make a goal of a file of others: CSV, G-code, DXF, ROS messages, recordings, URScript',
+    )
+    bring.add_argument('file', help='what is read; doc/importing.md says what of each format')
+    bring.add_argument('-o', '--output', help='goal file; by default standard output')
+    bring.add_argument(
+        '--format',
+        default='',
+        choices=import_command.FORMATS,
+        help='by default as the suffix of the name says',
+    )
+    bring.add_argument(
+        '--frame', default='', help='frame of the points; by default that of the file, else base'
+    )
+    bring.add_argument(
+        '--origin',
+        type=_tcp,
+        metavar='X,Y,Z,RX,RY,RZ',
+        help='where the origin of the file is in that frame [m, rad]',
+    )
+    bring.add_argument(
+        '--unit', default='', choices=sorted(LENGTH_UNITS), help='of lengths without a unit'
+    )
+    bring.add_argument('--scale', type=_factor, default=1.0, help='factor on all lengths')
+    bring.add_argument(
+        '--orientation',
+        default='file',
+        choices=[each.value for each in ToolOrientation],
+        help='of the tool: as the file has it, against its normals, or straight down',
+    )
+    bring.add_argument(
+        '--speed', type=_factor, help='[m/s]; by default that of the file, else of the driver'
+    )
+    bring.add_argument('--travel-speed', type=_factor, help='of G0, and between contours [m/s]')
+    bring.add_argument('--acceleration', type=_factor, help='[m/s^2]; by default as the speed')
+    bring.add_argument(
+        '--blend', type=_length, default=0.0, metavar='LENGTH', help='at inner points, like 1mm'
+    )
+    bring.add_argument(
+        '--simplify',
+        type=_length,
+        default=0.0,
+        metavar='LENGTH',
+        help='merge points and find arcs, nowhere farther from the path than this, like 0.1mm',
+    )
+    bring.add_argument(
+        '--tolerance',
+        type=_length,
+        default=5e-5,
+        metavar='LENGTH',
+        help='of the lines that take the place of splines, ellipses and helices',
+    )
+    bring.add_argument(
+        '--lift', type=_length, default=0.0, metavar='LENGTH', help='go back between contours'
+    )
+    bring.add_argument(
+        '--output-of',
+        type=_code_output,
+        action='append',
+        default=[],
+        metavar='CODE=KIND:PIN:VALUE',
+        help='output of an M-code, like M3=standard:2:1, or of S with the number that means 1, '
+        'like S=analog:0:10000; may be given several times',
+    )
+    bring.add_argument(
+        '--ur-type', default='ur5e', choices=sorted(MODELS), help='robot, for joint positions'
+    )
+    bring.add_argument(
+        '--tcp',
+        type=_tcp,
+        metavar='X,Y,Z,RX,RY,RZ',
+        help='active TCP in the flange frame, for joint positions [m, rad]',
+    )
+    _add_calibration(bring)
+
+
 def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
     where = _add(
         sub,
@@ -417,6 +511,27 @@ def _joints(text: str) -> tuple[float, ...]:
 
 def _tcp(text: str) -> tuple[float, ...]:
     return _six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
+
+
+def _length(text: str) -> float:
+    try:
+        return parse_length(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _code_output(text: str) -> tuple[str, CodeOutput]:
+    try:
+        return parse_code_output(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _factor(text: str) -> float:
+    number = float(text)
+    if not 0.0 < number <= 1e6:  # NaN neither
+        raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    return number
 
 
 def _port(text: str) -> int:

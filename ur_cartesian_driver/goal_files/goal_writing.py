@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
+from ur_cartesian_driver.goal_files.goal_packing import packed_fields
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Posture, SafeOutput, Tolerance
 from ur_cartesian_driver.motion.goal_table import goal_table, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -17,13 +19,19 @@ Fields: TypeAlias = dict[str, Any]
 _NANOSECONDS = 1_000_000_000
 
 
-def fields_of_goal(goal: Goal) -> Fields:
+def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
     """
     Return the fields of a goal, as YAML has them and messages are made from.
 
     Frames are written by their names; a stamp is not written.
+
+    :param packed: write points and segments in flat arrays, if these can hold them.
     """
     table = goal_table(goal)
+    if packed and (arrays := packed_fields(table.waypoints, table.segments)) is not None:
+        rest = replace(table, waypoints=(), segments=())
+        columns = {name: list(column) for name, column in arrays.items()}
+        return fields_of_goal(rest) | {'packed': _given(columns)}
     trajectory = _given(
         {
             'header': _given({'frame_id': table.frame_id}),

@@ -1,0 +1,73 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian import``: make a goal file of a file of others."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from ur_cartesian_driver.cli.commands import calibration
+from ur_cartesian_driver.goal_files import fields_of_goal, goal_text
+from ur_cartesian_driver.importing import (
+    BrokenFile,
+    FORMATS,
+    import_file,
+    ImportOptions,
+    ToolOrientation,
+)
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+
+__all__ = ['FORMATS', 'import_goal', 'options_of']
+
+#: From so many points on a goal is written in flat arrays.
+MANY_POINTS = 200
+
+
+def import_goal(arguments: argparse.Namespace) -> int:
+    """Write the goal, and say what was left out."""
+    try:
+        imported = import_file(arguments.file, options_of(arguments), arguments.format)
+    except (BrokenFile, ImportError) as error:
+        raise ValueError(f'{arguments.file}: {error}') from None
+    goal = imported.goal
+    text = goal_text(fields_of_goal(goal, packed=len(goal.waypoints) >= MANY_POINTS))
+    if arguments.output:
+        Path(arguments.output).write_text(text, encoding='utf-8')
+    else:
+        print(text, end='')
+    for remark in imported.remarks:
+        print(remark.text(), file=sys.stderr)
+    count = len(goal.waypoints)
+    target = arguments.output or 'standard output'
+    print(f'{count} point{"s" * (count != 1)} to {target}', file=sys.stderr)
+    return 0
+
+
+def options_of(arguments: argparse.Namespace) -> ImportOptions:
+    """Return the options of a command line."""
+    model = robot_model(arguments.ur_type)
+    return ImportOptions(
+        frame=arguments.frame,
+        origin=_pose(arguments.origin),
+        unit=arguments.unit,
+        scale=arguments.scale,
+        orientation=ToolOrientation(arguments.orientation),
+        speed=arguments.speed,
+        travel_speed=arguments.travel_speed,
+        acceleration=arguments.acceleration,
+        blend=arguments.blend,
+        simplify=arguments.simplify,
+        tolerance=max(arguments.tolerance, 1e-6),
+        lift=arguments.lift,
+        outputs=dict(arguments.output_of),
+        arm=Arm(model, calibration(arguments, model)),
+        T_flange_tcp=_pose(arguments.tcp),
+    )
+
+
+def _pose(numbers: tuple[float, ...] | None) -> Pose:
+    return Pose.from_rotation_vector(numbers) if numbers else IDENTITY

@@ -1,0 +1,141 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The options of an import, the same for all formats, and how outputs are named in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+import re
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.planning.output_names import output_fault, output_name
+
+#: Length units [m].
+LENGTH_UNITS: Mapping[str, float] = {
+    'um': 1e-6,
+    'mm': 1e-3,
+    'cm': 1e-2,
+    'm': 1.0,
+    'in': 0.0254,
+    'ft': 0.3048,
+}
+
+_KINDS = {
+    'standard': OutputKind.STANDARD_DIGITAL,
+    'configurable': OutputKind.CONFIGURABLE_DIGITAL,
+    'tool': OutputKind.TOOL_DIGITAL,
+    'analog': OutputKind.STANDARD_ANALOG,
+}
+_LENGTH = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*)\s*', re.IGNORECASE)
+
+
+class ToolOrientation(Enum):
+    """Where the orientation of the tool comes from."""
+
+    #: The orientations of the file, else its normals, else down.
+    FILE = 'file'
+    #: Against the normals of the file.
+    NORMALS = 'normals'
+    #: The tool's axis z against z of the frame, its x along y.
+    DOWN = 'down'
+
+
+@dataclass(frozen=True, slots=True)
+class CodeOutput:
+    """What a code of a program does to an output."""
+
+    kind: OutputKind
+    pin: int
+    #: Digital 0 or 1; of a code with a number of its own (S) the number that means 1.
+    value: float
+
+    def command(self, value: float) -> IOCommand:
+        """
+        Return the command.
+
+        :raises ValueError: the output does not take the value.
+        """
+        if (fault := output_fault(self.kind, self.pin, value)) is not None:
+            raise ValueError(f'{output_name(self.kind, self.pin)} {fault[1]}')
+        return IOCommand(waypoint=0, offset=0.0, output=self.kind, pin=self.pin, value=value)
+
+
+def parse_code_output(text: str) -> tuple[str, CodeOutput]:
+    """
+    Return code and output of ``M3=standard:2:1`` or ``S=analog:0:10000``.
+
+    :raises ValueError: the text is none of these.
+    """
+    try:
+        code, rest = text.upper().split('=')
+        kind, pin, value = rest.lower().split(':')
+        output = CodeOutput(_KINDS[kind], int(pin), float(value))
+        # M03 and M3 are one code.
+        word = re.fullmatch(r'(M)0*(\d+)|(S)', code)
+        if word is None:
+            raise KeyError(code)
+        code = ''.join(part for part in word.groups() if part)
+        output.command(1.0 if code == 'S' else output.value)
+        if code == 'S' and not output.value > 0.0:
+            raise ValueError
+    except (KeyError, ValueError):
+        raise ValueError(
+            f'{text!r} is not of the form CODE=KIND:PIN:VALUE, such as M3=standard:2:1 or '
+            'S=analog:0:10000; kinds are standard, configurable, tool and analog'
+        ) from None
+    return code, output
+
+
+def parse_length(text: str) -> float:
+    """
+    Return a length with its unit, such as ``0.1mm`` [m].
+
+    :raises ValueError: it is none, or has no unit.
+    """
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2].lower() not in LENGTH_UNITS:
+        raise ValueError(f'{text!r} is no length; give number and unit, such as 0.1mm')
+    length = float(match[1]) * LENGTH_UNITS[match[2].lower()]
+    if not 0.0 <= length < 100.0:
+        raise ValueError(f'{text!r} is not within 0 and 100 m')
+    return length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportOptions:
+    """How a file becomes a goal."""
+
+    #: The frame of the points; empty = that of the file, else the robot's base.
+    frame: str = ''
+    #: Where the origin of the file is in the frame.
+    origin: Pose = IDENTITY
+    #: Unit of lengths of a file that does not say it; empty = such a file is refused.
+    unit: str = ''
+    #: Factor on all lengths, about the origin of the file.
+    scale: float = 1.0
+    orientation: ToolOrientation = ToolOrientation.FILE
+    #: Of all motions but travel [m/s]; None = that of the file, else the driver's parameter.
+    speed: float | None = None
+    #: Of travel (G0, and between two contours) [m/s]; None = the driver's parameter.
+    travel_speed: float | None = None
+    #: Of all motions [m/s^2]; None = that of the file, else the driver's parameter.
+    acceleration: float | None = None
+    #: At inner points [m]; smaller where the lines are short.
+    blend: float = 0.0
+    #: Largest distance of the simplified path [m]; 0 = all points are kept.
+    simplify: float = 0.0
+    #: Largest distance of lines from curves that have no arcs [m].
+    tolerance: float = 5e-5
+    #: How far the tool goes back between two contours [m].
+    lift: float = 0.0
+    #: Outputs by M-code, and S.
+    outputs: Mapping[str, CodeOutput] = field(default_factory=dict)
+    #: The arm, for joint positions.
+    arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
+    #: The active TCP, for joint positions.
+    T_flange_tcp: Pose = IDENTITY

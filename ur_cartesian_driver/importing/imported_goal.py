@@ -1,0 +1,370 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From the points of a file to a goal: units, orientation, speeds, blends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrientation
+from ur_cartesian_driver.importing.imported_path import (
+    BrokenFile,
+    ImportedPath,
+    Remark,
+    Remarks,
+)
+from ur_cartesian_driver.importing.simplification import simplify
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.pose import IDENTITY
+from ur_cartesian_driver.motion.pose_rows import (
+    angle_rows,
+    cross_rows,
+    distance_rows,
+    Floats,
+    keep_hemisphere,
+    normalized_rows,
+    transform_rows,
+)
+
+#: A point that is as near as this to the one before, and turned as little, is the same one.
+SAME_POINT, SAME_TURN = 5e-6, 1e-4
+#: Farther away is no robot arm: millimetres read as metres, say [m].
+MAX_DISTANCE = 20.0
+#: Straight down, x along y of the frame.
+_DOWN = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
+#: The share of a line that one blend takes at most.
+_BLEND_SHARE = 0.45
+#: A blend takes at least so long [s]: the cycle of the slowest controller is 8 ms, and arcs and
+#: processes with a blend that is passed in one are refused. At this speed where it is not known.
+_MIN_BLEND_TIME, _UNKNOWN_SPEED = 0.01, 0.25
+_MIN_BLEND = 1e-4
+#: Lower arcs are straight lines to the robot [m].
+_MIN_ARC_HEIGHT = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportedGoal:
+    """A goal, and what the file has that the goal has not."""
+
+    goal: GoalTable
+    remarks: tuple[Remark, ...]
+    #: (n,) lines of the points; 0 = added by an option.
+    lines: NDArray[np.int64]
+
+
+def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedGoal:
+    """
+    Apply the options.
+
+    :raises BrokenFile: the points cannot be meant, such as one that is 3 km away.
+    """
+    path = _scaled(path, options.scale)
+    path = replace(path, quaternions=_orientations(path, options, remarks))
+    path = _without_repeated(path, remarks)
+    path = _with_times(path, options, remarks)
+    path = _without_flat_arcs(path, remarks)
+    if options.simplify:
+        before = len(path)
+        path = simplify(path, options.simplify, path.quaternions)
+        if len(path) < before:
+            arcs = int((path.types == SegmentType.CIRCULAR).sum())
+            remarks.add(
+                0,
+                f'{before} points became {len(path)}, of which {arcs} end arcs',
+                f'simplify, nowhere farther than {1e3 * options.simplify:g} mm away',
+            )
+    path = _lifted(path, options, remarks)
+    poses = np.hstack((path.positions, path.quaternions))
+    keep_hemisphere(poses)
+    has_via = ~np.isnan(path.vias[:, 0])
+    vias = np.hstack((np.where(has_via[:, None], path.vias, 0.0), path.quaternions))
+    if options.origin != IDENTITY:
+        poses, vias = transform_rows(options.origin, poses), transform_rows(options.origin, vias)
+    speeds, accelerations = _speeds(path, options), _accelerations(path, options)
+    times = np.nan_to_num(path.times)
+    segments = SegmentRows(
+        types=path.types,
+        blend_radii=_blends(path, options, speeds, remarks),
+        velocities=np.zeros(len(path)) if times.any() else speeds,
+        accelerations=np.zeros(len(path)) if times.any() else accelerations,
+        vias=vias,
+        has_via=has_via,
+        arc_modes=path.arc_modes,
+    )
+    still = np.zeros((len(path), 6))
+    goal = GoalTable(
+        waypoints=WaypointRows(
+            times=times,
+            poses=poses,
+            twists=still,
+            accelerations=still,
+            jerks=still,
+            postures=path.postures,
+        ),
+        segments=segments,
+        frame_id=options.frame or path.frame,
+        io_commands=path.outputs,
+    )
+    return ImportedGoal(goal=goal, remarks=remarks.result(), lines=path.lines)
+
+
+def _scaled(path: ImportedPath, scale: float) -> ImportedPath:
+    if scale != 1.0:
+        path = replace(
+            path,
+            positions=path.positions * scale,
+            vias=path.vias * scale,
+            blends=path.blends * scale,
+        )
+    far = np.abs(path.positions).max(axis=1) > MAX_DISTANCE
+    if far.any() or not np.isfinite(path.positions).all():
+        row = int(np.argmax(far))
+        raise BrokenFile(
+            int(path.lines[row]),
+            f'the point {_position(path.positions[row])} m is farther than {MAX_DISTANCE:g} m '
+            'from the origin; check the unit, or give a scale',
+        )
+    return path
+
+
+def _position(values: Floats) -> str:
+    return '(' + ', '.join(f'{value:.6g}' for value in values.tolist()) + ')'
+
+
+def _orientations(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> Floats:
+    """Return the orientations of the tool (n, 4)."""
+    found = np.tile(np.array(_DOWN), (len(path), 1))
+    wanted = options.orientation
+    if wanted is ToolOrientation.DOWN:
+        if not np.isnan(path.quaternions).all():
+            remarks.add(0, 'orientations of the file', 'the tool is to point down')
+        return found
+    normals = ~np.isnan(path.normals[:, 0])
+    if wanted is ToolOrientation.NORMALS and not normals.all():
+        row = int(np.argmin(normals))
+        raise BrokenFile(
+            int(path.lines[row]), 'the point has no normal, from which its orientation is to come'
+        )
+    if normals.any():
+        found[normals] = _against(path.normals[normals], path.lines[normals])
+    if wanted is ToolOrientation.FILE:
+        given = ~np.isnan(path.quaternions[:, 0])
+        found[given] = normalized_rows(path.quaternions[given])
+        if not (given | normals).any():
+            remarks.add(0, 'no orientations in the file', 'the tool points down')
+        elif not (given | normals).all():
+            for line in path.lines[~(given | normals)].tolist():
+                remarks.add(line, 'no orientation', 'the tool points down there')
+    return found
+
+
+def _against(normals: Floats, lines: NDArray[np.int64]) -> Floats:
+    """Return orientations with z against the normals, and x along y of the frame, or x."""
+    lengths = np.linalg.norm(normals, axis=1)
+    if not (lengths > 1e-6).all():
+        raise BrokenFile(int(lines[int(np.argmin(lengths))]), 'the normal is zero')
+    ez = -normals / lengths[:, None]
+    # Away from y, so that x does not jump where the surface turns by a little.
+    reference = np.where((np.abs(ez[:, 1]) > 0.95)[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    ex = reference - np.einsum('ij,ij->i', reference, ez)[:, None] * ez
+    ex = ex / np.linalg.norm(ex, axis=1)[:, None]
+    ey = cross_rows(ez, ex)
+    return _quaternions_of_axes(ex, ey, ez)
+
+
+def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
+    """Return unit quaternions (n, 4) of frames: each by its largest component."""
+    squares = np.stack(
+        (
+            1.0 + ex[:, 0] - ey[:, 1] - ez[:, 2],
+            1.0 - ex[:, 0] + ey[:, 1] - ez[:, 2],
+            1.0 - ex[:, 0] - ey[:, 1] + ez[:, 2],
+            1.0 + ex[:, 0] + ey[:, 1] + ez[:, 2],
+        ),
+        axis=1,
+    )
+    xy, xz, yz = ey[:, 0] + ex[:, 1], ez[:, 0] + ex[:, 2], ez[:, 1] + ey[:, 2]
+    xw, yw, zw = ey[:, 2] - ez[:, 1], ez[:, 0] - ex[:, 2], ex[:, 1] - ey[:, 0]
+    x2, y2, z2, w2 = squares.T
+    rows = np.array(
+        [[x2, xy, xz, xw], [xy, y2, yz, yw], [xz, yz, z2, zw], [xw, yw, zw, w2]]
+    )  # (k, component, n)
+    best = squares.argmax(axis=1)
+    return normalized_rows(rows[best, :, np.arange(len(best))])
+
+
+def _without_repeated(path: ImportedPath, remarks: Remarks) -> ImportedPath:
+    """Leave out lines that lead nowhere: the robot has no motion for them."""
+    still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
+        angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
+    )
+    still &= path.types[1:] != SegmentType.CIRCULAR
+    # An arc that ends where it begins is no arc through a third point.
+    if not still.any():
+        return path
+    # Of slow drifts every now and then one point has to stay.
+    rows, last = [0], 0
+    for row in range(1, len(path)):
+        if still[row - 1] and _is_same(path, row, last):
+            remarks.add(int(path.lines[row]), 'a point', 'it is where the one before is')
+        else:
+            rows.append(row)
+            last = row
+    return path.take(np.array(rows, dtype=np.int64))
+
+
+def _is_same(path: ImportedPath, row: int, other: int) -> bool:
+    pair = slice(row, row + 1), slice(other, other + 1)
+    return bool(
+        distance_rows(path.positions[pair[0]], path.positions[pair[1]])[0] < SAME_POINT
+        and angle_rows(path.quaternions[pair[0]], path.quaternions[pair[1]])[0] < SAME_TURN
+    )
+
+
+def _with_times(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedPath:
+    """Keep times that rise, unless there are speeds."""
+    if np.isnan(path.times).all():
+        return path
+    why = ''
+    if options.speed is not None:
+        why = 'a speed is given'
+    elif options.simplify:
+        why = 'simplify merges points, whose times would no longer fit'
+    else:
+        # The first point is where the arm stands, or where it has to go first: it needs a time.
+        times = path.times - min(0.0, float(path.times[0]))
+        rises = np.diff(times) > 0.0
+        if not (len(path) > 1 and np.isfinite(times).all() and rises.all()):
+            row = 0 if rises.all() else int(np.argmin(rises)) + 1
+            why = f'they do not rise at line {path.lines[row]}'
+            if not path.lines[row]:
+                why = f'they do not rise at point {row}'
+        else:
+            return replace(path, times=times)
+    remarks.add(0, 'the times of the points', why)
+    return replace(path, times=np.full(len(path), np.nan))
+
+
+def _without_flat_arcs(path: ImportedPath, remarks: Remarks) -> ImportedPath:
+    """Make lines of arcs that are lines to the robot, and of those without a point before."""
+    arcs = path.types == SegmentType.CIRCULAR
+    if not arcs.any():
+        return path
+    flat = np.zeros(len(path), dtype=bool)
+    flat[0] = arcs[0]
+    start, via, end = path.positions[:-1], path.vias[1:], path.positions[1:]
+    chord = end - start
+    length = np.linalg.norm(chord, axis=1)
+    height = np.linalg.norm(cross_rows(via - start, chord), axis=1) / np.maximum(length, 1e-12)
+    flat[1:] = arcs[1:] & (height < _MIN_ARC_HEIGHT)
+    if not flat.any():
+        return path
+    for line in path.lines[flat].tolist():
+        remarks.add(line, 'an arc', 'it is lower than 0.01 mm, so it is a line')
+    return replace(
+        path,
+        types=np.where(flat, SegmentType.LINEAR, path.types),
+        vias=np.where(flat[:, None], np.nan, path.vias),
+    )
+
+
+def _lifted(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedPath:
+    """Go back from the surface before a contour that begins elsewhere."""
+    rows = [row for row in rows_where(path.lifts) if row]
+    if not rows:
+        return path
+    if not options.lift:
+        for row in rows:
+            remarks.add(
+                int(path.lines[row]), 'a contour begins elsewhere', 'straight to it, without lift'
+            )
+        return path
+    # Twice the row before and the row itself: up, across, down.
+    count = np.ones(len(path), dtype=np.int64)
+    count[rows] = 3
+    order = np.repeat(np.arange(len(path)), count)
+    first = np.cumsum(count) - count  # where the copies of a row begin
+    raised = np.zeros(len(order), dtype=bool)
+    positions = path.positions[order]
+    outputs = tuple(
+        # What is switched at a point is switched after its last copy, and before the tool goes up.
+        replace(output, waypoint=int(first[output.waypoint] + count[output.waypoint] - 1))
+        for output in path.outputs
+    )
+    for row in rows:
+        up, across = int(first[row]), int(first[row]) + 1
+        positions[up] = path.positions[row - 1]
+        raised[[up, across]] = True
+    lifted = path.quaternions[order]
+    for row in rows:
+        lifted[int(first[row])] = path.quaternions[row - 1]
+    x, y, z, w = lifted.T
+    axis = np.stack((2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)), axis=1)
+    positions = np.where(raised[:, None], positions - options.lift * axis, positions)
+    return replace(
+        path,
+        **{
+            name: getattr(path, name)[order]
+            for name in ('types', 'travels', 'lifts', 'arc_modes', 'vias', 'normals')
+        },
+        **{name: getattr(path, name)[order] for name in ('speeds', 'accelerations', 'blends')},
+        times=np.full(len(order), np.nan),
+        lines=np.where(raised, 0, path.lines[order]),
+        positions=positions,
+        quaternions=lifted,
+        postures={
+            int(first[row] + count[row] - 1): posture for row, posture in path.postures.items()
+        },
+        outputs=outputs,
+    )
+
+
+def _speeds(path: ImportedPath, options: ImportOptions) -> Floats:
+    """Return the speeds (n,), 0 where the driver has to choose."""
+    plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
+    found = path.speeds if options.speed is None else np.where(plain, options.speed, path.speeds)
+    travel = np.nan if options.travel_speed is None else options.travel_speed
+    return np.nan_to_num(np.where(path.travels, travel, found))
+
+
+def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
+    found = path.accelerations
+    if options.acceleration is not None:
+        plain = np.isin(
+            path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS)
+        )
+        found = np.where(plain, options.acceleration, found)
+    return np.nan_to_num(found)
+
+
+def _blends(
+    path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: Remarks
+) -> Floats:
+    """Return radii (n,) that fit between the points; where none fits the arm stops."""
+    radii = np.where(np.isnan(path.blends), options.blend, path.blends)
+    radii[-1] = 0.0
+    if len(path) < 2:
+        return radii
+    lengths = distance_rows(path.positions[1:], path.positions[:-1])
+    fits = radii.copy()
+    fits[1:] = np.minimum(fits[1:], _BLEND_SHARE * lengths)
+    fits[:-1] = np.minimum(fits[:-1], _BLEND_SHARE * lengths)
+    # The first line begins where the arm is, which nobody knows here: its blend may be long.
+    special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
+    special[:-1] |= special[1:]
+    pace = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)
+    least = np.where(special, np.maximum(_MIN_BLEND, _MIN_BLEND_TIME * pace), _MIN_BLEND)
+    fits[fits < least] = 0.0
+    for row in rows_where((fits < radii) & (fits > 0.0)):
+        remarks.add(int(path.lines[row]), 'blend', 'made smaller, its lines are short')
+    for row in rows_where((radii > 0.0) & (fits == 0.0)):
+        remarks.add(int(path.lines[row]), 'blend', 'none fits, the arm stops there')
+    stops = int((fits[:-1] == 0.0).sum())
+    if stops and not options.blend:
+        remarks.add(0, f'the arm stops at {stops} inner points', 'give a blend if it should not')
+    return fits

@@ -1,0 +1,249 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What was read from a file, before the options are applied.
+
+Each point remembers its line, so that all that is said about it can name it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import ArcMode, IOCommand, Posture, SegmentType
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.vectors import Vector3
+
+#: The numbers of a point that a file may leave out, and how many each has.
+_OPTIONAL = {
+    'vias': 3,
+    'quaternions': 4,
+    'normals': 3,
+    'speeds': 1,
+    'accelerations': 1,
+    'blends': 1,
+    'times': 1,
+}
+UNKNOWN3: Vector3 = (nan, nan, nan)
+
+
+class BrokenFile(ValueError):
+    """A file cannot be read; the sentence has the number of the line."""
+
+    def __init__(self, line: int, text: str) -> None:
+        """Put the line before a sentence without a full stop; 0 = no line to blame."""
+        super().__init__(f'line {line}: {text}.' if line else f'{text}.')
+        self.line = line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """Something that was left out, or taken in another form."""
+
+    #: 1-based, in rising order; empty = it concerns the whole file.
+    lines: tuple[int, ...]
+    what: str
+    why: str
+
+    def text(self, max_ranges: int = 8) -> str:
+        """
+        Return one line of text.
+
+        :param max_ranges: ranges of lines that are named; of the others only the number of lines.
+        """
+        if not self.lines:
+            return f'{self.what}: {self.why}'
+        ranges = list(_ranges(self.lines))
+        named = ', '.join(
+            f'{first}' if first == last else f'{first}-{last}'
+            for first, last in ranges[:max_ranges]
+        )
+        rest = sum(1 for line in self.lines if line > ranges[:max_ranges][-1][1])
+        plural = 's' if len(self.lines) > 1 else ''
+        more = f' and {rest} more' if rest else ''
+        return f'line{plural} {named}{more}: {self.what}: {self.why}'
+
+
+def _ranges(lines: Sequence[int]) -> Iterator[tuple[int, int]]:
+    first = last = lines[0]
+    for line in lines[1:]:
+        if line > last + 1:
+            yield first, last
+            first = line
+        last = line
+    yield first, last
+
+
+class Remarks:
+    """Collects remarks; the lines of equal ones come together."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._lines: dict[tuple[str, str], set[int]] = {}
+
+    def add(self, line: int, what: str, why: str) -> None:
+        """Say something about a line; 0 = about the whole file."""
+        lines = self._lines.setdefault((what, why), set())
+        if line:
+            lines.add(line)
+
+    def result(self) -> tuple[Remark, ...]:
+        """Return the remarks in the order in which they came first."""
+        return tuple(
+            Remark(lines=tuple(sorted(lines)), what=what, why=why)
+            for (what, why), lines in self._lines.items()
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ImportedPath:
+    """
+    Points in columns, n rows [m, m/s, s]; NaN where the file says nothing.
+
+    The motion of a row ends at its point.
+    """
+
+    positions: Floats
+    #: (n,) 1-based lines of the file; 0 = unknown.
+    lines: NDArray[np.int64]
+    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.SegmentType`.
+    types: NDArray[np.int64]
+    #: (n,) whether the tool only travels, and whether it has to be lifted for that.
+    travels: NDArray[np.bool_]
+    lifts: NDArray[np.bool_]
+    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.ArcMode`.
+    arc_modes: NDArray[np.int64]
+    #: (n, 3) points on arcs, (n, 4) unit quaternions, (n, 3) normals of the surface.
+    vias: Floats
+    quaternions: Floats
+    normals: Floats
+    #: (n,)
+    speeds: Floats
+    accelerations: Floats
+    blends: Floats
+    times: Floats
+    #: By row.
+    postures: Mapping[int, Posture] = field(default_factory=dict)
+    outputs: tuple[IOCommand, ...] = ()
+    frame: str = ''
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.positions)
+
+    def take(self, rows: NDArray[np.int64]) -> ImportedPath:
+        """Return rows, in rising order; outputs of a row that is gone move to the one before."""
+        new_row = {int(row): i for i, row in enumerate(rows)}
+        return replace(
+            self,
+            **{name: getattr(self, name)[rows] for name in _COLUMNS},
+            postures={new_row[row]: p for row, p in self.postures.items() if row in new_row},
+            outputs=tuple(
+                replace(
+                    output,
+                    waypoint=max(0, int(np.searchsorted(rows, output.waypoint, side='right')) - 1),
+                )
+                for output in self.outputs
+            ),
+        )
+
+
+_COLUMNS = (
+    *('positions', 'lines', 'types', 'travels', 'lifts', 'arc_modes'),
+    *_OPTIONAL,
+)
+
+
+class PathCollector:
+    """Takes the points of a file one by one."""
+
+    def __init__(self) -> None:
+        """Begin without points."""
+        self._positions: list[Sequence[float]] = []
+        self._plain: list[tuple[int, int, bool, bool, int]] = []
+        self._optional: dict[str, dict[int, float | Sequence[float]]] = {
+            name: {} for name in _OPTIONAL
+        }
+        self._postures: dict[int, Posture] = {}
+        self._outputs: list[IOCommand] = []
+        self.remarks = Remarks()
+        self.frame = ''
+
+    def __len__(self) -> int:
+        """Return the number of points so far."""
+        return len(self._positions)
+
+    def add(
+        self,
+        line: int,
+        position: Sequence[float],
+        kind: SegmentType = SegmentType.LINEAR,
+        *,
+        travel: bool = False,
+        lift: bool = False,
+        arc_mode: ArcMode = ArcMode.UNCONSTRAINED,
+        posture: Posture | None = None,
+        via: Sequence[float] | None = None,
+        quaternion: Sequence[float] | None = None,
+        normal: Sequence[float] | None = None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        blend: float | None = None,
+        time: float | None = None,
+    ) -> None:
+        """Add a point; the fields are those of :class:`ImportedPath`, None = unknown."""
+        row = len(self._positions)
+        self._positions.append(position)
+        self._plain.append((line, kind, travel, lift, arc_mode))
+        for name, value in (
+            ('vias', via),
+            ('quaternions', quaternion),
+            ('normals', normal),
+            ('speeds', speed),
+            ('accelerations', acceleration),
+            ('blends', blend),
+            ('times', time),
+        ):
+            if value is not None:
+                self._optional[name][row] = value
+        if posture:
+            self._postures[row] = posture
+
+    def switch(self, output: IOCommand) -> None:
+        """Switch an output at the newest point, at the first one if there is none yet."""
+        self._outputs.append(replace(output, waypoint=max(0, len(self) - 1)))
+
+    def path(self) -> ImportedPath:
+        """
+        Return what was collected.
+
+        :raises BrokenFile: that are no points.
+        """
+        if not self._positions:
+            raise BrokenFile(0, 'there is no point of a path in the file')
+        plain = np.array(self._plain, dtype=np.int64)
+        return ImportedPath(
+            positions=np.array(self._positions, dtype=np.float64),
+            lines=plain[:, 0],
+            types=plain[:, 1],
+            travels=plain[:, 2] > 0,
+            lifts=plain[:, 3] > 0,
+            arc_modes=plain[:, 4],
+            **{name: self._column(name) for name in _OPTIONAL},
+            postures=self._postures,
+            outputs=tuple(self._outputs),
+            frame=self.frame,
+        )
+
+    def _column(self, name: str) -> Floats:
+        width, given = _OPTIONAL[name], self._optional[name]
+        column = np.full((len(self), width), nan)
+        if given:
+            values = np.array(list(given.values()), dtype=np.float64)
+            column[list(given)] = values.reshape(len(given), width)
+        return column[:, 0] if width == 1 else column

@@ -1,0 +1,209 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Fewer points: rows of short lines become long lines and arcs.
+
+The bound holds in both directions: no place of the old path is farther from the new one than the
+tolerance, and no place of the new path is farther from the old one. A line holds it if the points
+between do, because both paths are straight between them. An arc is compared with the points and
+with the place of each short line that is nearest to its centre. Along it the angle only grows, so
+every place of the arc has one of the old path beside it.
+
+Points with an output, a posture, another speed, or a turn of the tool that is not even stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import pi, radians
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.importing.imported_path import ImportedPath
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats, interpolate_rows
+
+#: How far the orientation of a point that is left out may be from the new path [rad].
+MAX_TURN = radians(0.5)
+#: An arc replaces at least so many lines, and turns by no more [rad].
+_MIN_LINES = 4
+_MAX_ARC = 0.9 * pi
+#: Flatter arcs are lines to the robot: their height [m].
+_MIN_HEIGHT = 2e-5
+#: Of the bound, for the rounding of numbers.
+_ROUNDING = 1.0 - 1e-9
+
+
+class _Piece(NamedTuple):
+    """A line or an arc from one row to another."""
+
+    end: int
+    via: Floats | None
+
+
+def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> ImportedPath:
+    """
+    Return a path with fewer points that is nowhere farther from the old one.
+
+    :param tolerance: the largest distance [m].
+    :param orientations: (n, 4) of the tool at the points.
+    """
+    if tolerance <= 0.0 or len(path) < 3:
+        return path
+    solver = _Simplifier(path.positions, orientations, tolerance * _ROUNDING)
+    rows, vias = [0], {}
+    start = 0
+    for stop in _ends_of_runs(path):
+        while start < stop:
+            piece = solver.longest(start, stop)
+            rows.append(piece.end)
+            if piece.via is not None:
+                vias[len(rows) - 1] = piece.via
+            start = piece.end
+    kept = path.take(np.array(rows, dtype=np.int64))
+    if not vias:
+        return kept
+    types, places = kept.types.copy(), kept.vias.copy()
+    types[list(vias)] = SegmentType.CIRCULAR
+    places[list(vias)] = list(vias.values())
+    return replace(kept, types=types, vias=places)
+
+
+def _ends_of_runs(path: ImportedPath) -> list[int]:
+    """Return the rows that have to stay, beside the first: between them are equal lines."""
+    n = len(path)
+    stays = np.zeros(n, dtype=bool)
+    stays[-1] = True
+    lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
+    stays |= ~lines
+    stays[:-1] |= ~lines[1:]
+    for column in (path.speeds, path.accelerations, path.travels.astype(float)):
+        same = (column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1]))
+        stays[:-1] |= ~same
+    for row in (*path.postures, *(output.waypoint for output in path.outputs)):
+        stays[row] = True
+    return [int(row) for row in np.flatnonzero(stays) if row]
+
+
+@dataclass
+class _Simplifier:
+    points: Floats
+    orientations: Floats
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        self.turns = bool((self.orientations != self.orientations[0]).any())
+        self.may_be_line = self._first_test()
+
+    def longest(self, start: int, stop: int) -> _Piece:
+        """Return the piece that replaces the most rows."""
+        end = start + 1
+        if end < stop and self.may_be_line[start]:
+            end = self._gallop(start, start + 2, stop, self._is_line)
+        via: Floats | None = None
+        first = max(end + 1, start + _MIN_LINES)
+        if first <= stop and self._arc(start, first) is not None:
+            end = self._gallop(start, first, stop, lambda a, b: self._arc(a, b) is not None)
+            via = self._arc(start, end)
+        return _Piece(end, via)
+
+    def _gallop(
+        self, start: int, first: int, stop: int, holds: Callable[[int, int], object]
+    ) -> int:
+        """Return an end that holds: twice as far each time, then in between."""
+        if not holds(start, first):
+            return start + 1
+        good, step = first, max(1, first - start)
+        bad = stop + 1
+        while good < stop:
+            trial = min(good + step, stop)
+            if not holds(start, trial):
+                bad = trial
+                break
+            good, step = trial, 2 * step
+        while bad - good > 1:
+            trial = (good + bad) // 2
+            if holds(start, trial):
+                good = trial
+            else:
+                bad = trial
+        return good
+
+    def _first_test(self) -> NDArray[np.bool_]:
+        """Return for each row whether the point after it may be left out: a quick look at all."""
+        a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
+        chord = c - a
+        square = np.einsum('ij,ij->i', chord, chord)
+        share = np.einsum('ij,ij->i', b - a, chord) / np.where(square > 0.0, square, 1.0)
+        foot = a + np.clip(share, 0.0, 1.0)[:, None] * chord
+        near = np.linalg.norm(b - foot, axis=1) <= self.tolerance
+        return np.concatenate((near, (False, False)))
+
+    def _is_line(self, start: int, end: int) -> bool:
+        a, between = self.points[start], self.points[start + 1 : end]
+        chord = self.points[end] - a
+        length = float(np.sqrt(chord @ chord))
+        if length < 1e-9:
+            return False
+        along = (between - a) @ chord / length**2
+        off = between - a - along[:, None] * chord
+        # Past the ends the path would go to and fro.
+        if along.min() < 0.0 or along.max() > 1.0:
+            return False
+        if np.einsum('ij,ij->i', off, off).max() > self.tolerance**2:
+            return False
+        return self._turns_evenly(start, end, along)
+
+    def _arc(self, start: int, end: int) -> Floats | None:
+        """Return the middle of the arc from one row to another; None = it is none."""
+        p = self.points[start : end + 1]
+        a, m, b = p[0], p[(end - start) // 2], p[-1]
+        u, v = m - a, b - a
+        normal = np.cross(u, v)
+        square = float(normal @ normal)
+        if square < 1e-24:
+            return None
+        centre = a + np.cross((u @ u) * v - (v @ v) * u, normal) / (2.0 * square)
+        ez = normal / np.sqrt(square)
+        ex = a - centre
+        radius = float(np.sqrt(ex @ ex))
+        if radius > 100.0:
+            return None
+        ex = ex / radius
+        ey = np.cross(ez, ex)
+        r = p - centre
+        x, y, z = r @ ex, r @ ey, r @ ez
+        angles = np.unwrap(np.arctan2(y, x))
+        sweep = float(angles[-1])
+        if not 0.0 < sweep <= _MAX_ARC or (np.diff(angles) <= 0.0).any():
+            return None
+        if radius * (1.0 - np.cos(sweep / 2.0)) < _MIN_HEIGHT:
+            return None
+        # Each short line comes nearest to the centre between its ends, or at one of them.
+        flat = np.stack((x, y), axis=1)
+        d = flat[1:] - flat[:-1]
+        share = -np.einsum('ij,ij->i', flat[:-1], d) / np.einsum('ij,ij->i', d, d)
+        inner = flat[:-1] + np.clip(share, 0.0, 1.0)[:, None] * d
+        radial = max(
+            float(np.abs(np.hypot(x, y) - radius).max()),
+            float(np.abs(np.hypot(inner[:, 0], inner[:, 1]) - radius).max()),
+        )
+        if np.hypot(radial, np.abs(z).max()) > self.tolerance:
+            return None
+        if not self._turns_evenly(start, end, angles[1:-1] / sweep):
+            return None
+        middle: Floats = centre + radius * (np.cos(sweep / 2.0) * ex + np.sin(sweep / 2.0) * ey)
+        return middle
+
+    def _turns_evenly(self, start: int, end: int, shares: Floats) -> bool:
+        if not self.turns:
+            return True
+        q = self.orientations
+        pose = np.zeros((len(shares), 7))
+        first, last = pose.copy(), pose
+        first[:, 3:], last[:, 3:] = q[start], q[end]
+        between = interpolate_rows(first, last, shares)[:, 3:]
+        return bool(angle_rows(between, q[start + 1 : end]).max() <= MAX_TURN)
