@@ -29,7 +29,7 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
     """
     table = goal_table(goal)
     if packed and (arrays := packed_fields(table.waypoints, table.segments)) is not None:
-        rest = replace(table, waypoints=(), segments=())
+        rest = replace(table, waypoints=WaypointRows.of(()), segments=SegmentRows.of(()))
         columns = {name: list(column) for name, column in arrays.items()}
         return fields_of_goal(rest) | {'packed': _given(columns)}
     trajectory = _given(

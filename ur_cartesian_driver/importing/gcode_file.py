@@ -4,7 +4,8 @@
 G-code of CAM systems, laser cutters and slicers: moves in a plane or in space.
 
 What would change the meaning of later coordinates (cycles, cutter compensation, scaling,
-variables) ends the import. What does not (spindles without an output, coolant, extruders) is left out.
+variables) ends the import. What does not (spindles without an output, coolant, extruders) is left
+out.
 """
 
 from __future__ import annotations
@@ -175,14 +176,14 @@ class _Program:
         codes: list[str] = []
         words: dict[str, float] = {}
         place = 0
+        if '#' in line or '[' in line:
+            raise self._fail(f'{line!r:.60} has variables, which are not read')
         while place < len(line):
             match = _WORD.match(line, place)
             if match is None:
                 if _MACRO.fullmatch(line):
                     self._omit(line.split()[0], 'a command of a printer')
                     return None, {}
-                if '#' in line or '[' in line:
-                    raise self._fail(f'{line!r:.60} has variables, which are not read')
                 raise self._fail(f'{line[place:].strip()!r:.60} is no G-code')
             letter, number = match[1].upper(), match[2]
             place = match.end()
@@ -198,7 +199,9 @@ class _Program:
                 if _MACRO.fullmatch(line):
                     self._omit(line.split()[0], 'a command of a printer')
                     return None, {}
-                if letter in _AXES and any(code in ('G28', 'G29', 'G92') for code in codes):
+                if not codes and not any(character.isdigit() for character in line):
+                    raise self._fail(f'{line!r:.60} is no G-code')
+                if any(code in ('G28', 'G29', 'G92') for code in codes):
                     words[letter] = 0.0
                     continue
                 raise self._fail(f'{letter} has no number')

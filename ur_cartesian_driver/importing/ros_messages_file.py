@@ -23,6 +23,8 @@ from ur_cartesian_driver.motion.goal import Posture, SegmentType
 from ur_cartesian_driver.motion.pose_rows import compose_rows
 
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+#: A message nests five deep.
+_MAX_DEPTH = 50
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
 
 
@@ -96,6 +98,13 @@ def collect_yaml(text: str, options: ImportOptions, into: PathCollector) -> None
     :raises BrokenFile: it is not YAML, or none of the messages.
     """
     try:
+        # The composer of libyaml crashes where a text nests very deeply; its parser does not.
+        depth = 0
+        for event in yaml.parse(text, Loader=_Loader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _MAX_DEPTH:
+                raise BrokenFile(event.start_mark.line + 1, 'it is nested too deeply')
         documents = [node for node in yaml.compose_all(text, Loader=_Loader) if node is not None]
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
