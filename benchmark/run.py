@@ -34,6 +34,7 @@ MODULES = (
     'servo',
     RTDE_RATE,
     'planning',
+    'import_files',
     'kinematics',
     'kinematics_rows',
     'codecs_rtde',

@@ -9,7 +9,7 @@ import pytest
 
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions, ToolOrientation
 
-#: As the export of a line scanner with normals: comments first, units in brackets, and intensities.
+#: As the export of a line scanner with normals: comments first, then units.
 SCANNER = """# scanner export, 2026-03-04
 # sensor 0001
 x [mm],y [mm],z [mm],nx,ny,nz,intensity

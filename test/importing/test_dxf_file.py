@@ -3,6 +3,7 @@
 """Drawings: those that ezdxf writes, and one as Inkscape writes R12."""
 
 import io
+from itertools import pairwise
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -54,10 +55,13 @@ def remarks(found):
 def test_inkscape_lines_are_joined_also_against_their_direction(tmp_path):
     found = imported(tmp_path, INKSCAPE, unit='mm')
     assert millimetres(found) == pytest.approx(
-        np.array([[0, 0, 0], [10, 0, 0], [10, 5, 0], [0, 5, 0]]), abs=1e-9
+        np.array([[0, 0, 0], [10, 0, 0], [10, 5, 0], [5, 10, 0], [0, 5, 0]]), abs=1e-9
     )
-    assert vias(found) == pytest.approx(np.array([[5.0, 10.0, 0.0]]))
-    assert found.lines.tolist() == [13, 13, 29, 45]
+    half = 5.0 * 0.5**0.5
+    assert vias(found) == pytest.approx(
+        np.array([[5 + half, 5 + half, 0.0], [5 - half, 5 + half, 0.0]])
+    )
+    assert found.lines.tolist() == [15, 15, 31, 47, 47]
 
 
 def test_a_polyline_with_bulges_of_all_sizes_is_on_the_arcs_that_ezdxf_finds(tmp_path):
@@ -68,7 +72,7 @@ def test_a_polyline_with_bulges_of_all_sizes_is_on_the_arcs_that_ezdxf_finds(tmp
     types, places = found.goal.segments.types, 1e3 * np.array(found.goal.segments.vias)[:, :3]
     from ezdxf.math import bulge_to_arc
 
-    circles = [bulge_to_arc(a[:2], b[:2], a[2]) for a, b in zip(corners, corners[1:]) if a[2]]
+    circles = [bulge_to_arc(a[:2], b[:2], a[2]) for a, b in pairwise(corners) if a[2]]
     for i in range(1, len(points)):
         if types[i] == SegmentType.CIRCULAR:
             at_all = [
@@ -89,10 +93,10 @@ def test_circles_and_arcs_seen_from_below(tmp_path):
         space.add_arc((20, 0), 2, 30, 200, dxfattribs={'extrusion': (0, 0, -1)})
 
     found = imported(tmp_path, drawing(draw))
-    around = np.vstack((millimetres(found)[:3], vias(found)[:2]))
+    around = np.vstack((millimetres(found)[:5], vias(found)[:4]))
     assert np.hypot(*(around[:, :2] - 5.0).T) == pytest.approx(5.0)
     # Seen from below x points the other direction.
-    start, end = millimetres(found)[3], millimetres(found)[4]
+    start, end = millimetres(found)[5], millimetres(found)[6]
     assert start == pytest.approx([-20 - 2 * cos(radians(30)), 2 * sin(radians(30)), 0.0])
     assert end == pytest.approx([-20 - 2 * cos(radians(200)), 2 * sin(radians(200)), 0.0])
     assert 'straight to it, without lift' in remarks(found)
@@ -144,7 +148,7 @@ def test_what_is_no_path_is_said_with_its_line(tmp_path):
     [
         (lambda t: 'hello\nworld\n', 1, 'no group code'),
         (lambda t: t[: len(t) // 2], None, 'ends here'),
-        (lambda t: t.replace('\n11\n10\n', '\n11\nten\n'), 22, "'ten' is no number"),
+        (lambda t: t.replace('\n11\n10\n', '\n11\nten\n'), 26, "'ten' is no number"),
         (
             lambda t: t.replace('\nARC\n', '\nTEXT\n', 1).replace('\nLINE\n', '\nTEXT\n'),
             0,

@@ -81,7 +81,7 @@ def test_a_path(tmp_path):
     assert poses(found)[:, 0].tolist() == [0.1, 0.2]
     assert poses(found)[0, 3:].tolist() == [0.0, 1.0, 0.0, 0.0]
     assert found.goal.frame_id == 'map'
-    assert found.lines.tolist() == [7, 21]
+    assert found.lines.tolist() == [7, 22]
 
 
 def test_an_array_of_poses_whose_orientations_are_not_set(tmp_path):
@@ -119,8 +119,8 @@ def test_a_message_in_python():
         ('', 1, 'no message'),
         ('a: [1\nb: 2\n', 2, 'not YAML'),
         ('a: 1\n', 1, 'neither a Path'),
-        (PATH.replace('x: 0.2', 'x: far'), 27, "'far'"),
-        (PATH.replace('      z: 0.0\n    or', '    or', 1), 13, 'field z is missing'),
+        (PATH.replace('x: 0.2', 'x: far'), 29, "'far'"),
+        (PATH.replace('      z: 0.0\n    or', '    or', 1), 14, 'field z is missing'),
         (PATH.replace('y: 1.0', 'y: 3.0', 1), 7, 'length 3'),
         (JOINTS.replace('left_elbow', 'left_knee'), 7, 'elbow_joint is 0 times'),
         (JOINTS.replace('  - 0.1\n', '', 1), 14, '5 positions'),

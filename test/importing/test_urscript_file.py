@@ -23,7 +23,7 @@ PROGRAM = """def weld():
     i = i + 1
   end
   set_digital_out(2, True)
-  movec(pose_add(start, p[0, 0.01, -0.05, 0, 0, 0]), pose_add(start, p[0, 0.03, -0.05, 0, 0, 0]), v=0.02)
+  movec(pose_add(start, p[0, .01, -.05, 0, 0, 0]), pose_add(start, p[0, 0.1, 0, 0, 0, 0]), v=0.02)
   set_tool_digital_out(1, False)
 end
 """

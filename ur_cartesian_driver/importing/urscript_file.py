@@ -46,6 +46,9 @@ from ur_cartesian_driver.urscript.script_values import truth, Value
 
 #: A program that takes longer does not end: cycles, and moves.
 MAX_CYCLES, MAX_MOVES = 100_000, 100_000
+#: Of a program that never waits: what it may compute between two moves. A row of statements counts
+#: as a whole, and that of a sliced part is long.
+MAX_NODES = 3_000_000
 #: What only computes or reads; everything else is said to be left out.
 _SILENT = ('get_', 'is_', 'read_', 'pose_', 'interpolate_', 'point_', 'wrench_', 'rpy', 'rotvec')
 _SILENT_NAMES = {'inv', 'sync', 'time', 'tool_contact', 'end_freedrive_mode', 'stopj', 'stopl'}
@@ -64,7 +67,7 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
     moves = _Moves(controller, into)
     builtins = moves.functions()
     try:
-        interpreter = ScriptInterpreter(program, builtins)
+        interpreter = ScriptInterpreter(program, builtins, instruction_budget=MAX_NODES)
     except CompileError as error:
         raise _broken(error, added_lines) from None
     moves.line = lambda: interpreter.location[0] - added_lines

@@ -1,0 +1,78 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Time to make goals of files of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from figures import Figure, seconds
+import numpy as np
+
+from ur_cartesian_driver.goal_files import fields_of_goal, goal_text
+from ur_cartesian_driver.importing import import_file, ImportOptions
+
+LINES = 10_000
+POSE = """- pose:
+    position:
+      x: {}
+      y: {}
+      z: {}
+    orientation:
+      x: 0.0
+      y: 0.0
+      z: 0.0
+      w: 1.0
+"""
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Import a spiral from each format."""
+    lines = LINES // 10 if quick else LINES
+    with TemporaryDirectory() as folder:
+        for name, text in texts(lines).items():
+            file = Path(folder) / name
+            file.write_text(text)
+            for tolerance in (0.0, 1e-4):
+                options = ImportOptions(blend=1e-3, simplify=tolerance, unit='mm')
+                taken = seconds(partial(convert, file, options), repeat=1)
+                yield Figure(
+                    benchmark='import_files',
+                    name=f'{file.suffix}, {lines:,} lines{", simplify" if tolerance else ""}',
+                    value=taken,
+                    unit='s',
+                )
+
+
+def convert(file: Path, options: ImportOptions) -> str:
+    """Return the goal file."""
+    return goal_text(fields_of_goal(import_file(file, options).goal, packed=True))
+
+
+def texts(lines: int) -> dict[str, str]:
+    """Return the files, by their names."""
+    t = np.linspace(0.0, 0.006 * np.pi * lines, lines)
+    spiral = np.stack((50.0 * np.cos(t), 50.0 * np.sin(t), 0.02 * t), axis=1).tolist()
+    found = {
+        'spiral.csv': 'x [mm],y [mm],z [mm],nx,ny,nz\n'
+        + '\n'.join(f'{x:.4f},{y:.4f},{z:.4f},0,0,1' for x, y, z in spiral),
+        'spiral.nc': 'G21 G90\n'
+        + '\n'.join(f'G1 X{x:.4f} Y{y:.4f} Z{z:.4f} F600' for x, y, z in spiral),
+        'spiral.yaml': 'poses:\n'
+        + ''.join(POSE.format(*(value / 1e3 for value in p)) for p in spiral[: lines // 10]),
+        'spiral.script': 'movej([0, -1.57, 1.57, -1.57, -1.57, 0])\np = get_actual_tcp_pose()\n'
+        + '\n'.join(
+            f'movel(pose_add(p, p[{x / 1e3:.6f}, {y / 1e3:.6f}, {z / 1e3:.6f}, 0, 0, 0]))'
+            for x, y, z in spiral
+        ),
+    }
+    vertices = '\n'.join(
+        f'0\nVERTEX\n8\n0\n10\n{x:.4f}\n20\n{y:.4f}' for x, y, _ in spiral[: lines // 8]
+    )
+    found['spiral.dxf'] = (
+        '0\nSECTION\n2\nENTITIES\n0\nPOLYLINE\n8\n0\n66\n1\n' + vertices
+    ) + '\n0\nSEQEND\n0\nENDSEC\n0\nEOF\n'
+    return found

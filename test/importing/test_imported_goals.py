@@ -1,0 +1,127 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Files of each format become goals that can be planned; two are carried out by the simulator."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from robot_in_memory import RobotInMemory
+from synthetic_recording import only_file, packet, record
+
+from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.goal_files import goal_from_fields, read_goal_file
+from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
+ARM = Arm(robot_model('ur5e'))
+#: Where the part lies, in front of the arm.
+PART = Pose((-0.45, -0.1, 0.3))
+
+FILES = {
+    'a.csv': 'x [mm],y [mm],z [mm]\n0,0,0\n100,0,0\n100,100,20\n',
+    'a.nc': 'G21 G90\nG0 X0 Y0 Z20\nG1 Z0 F1200\nG1 X60\nG3 X100 Y40 I0 J40\nG1 Y100\n',
+    'a.dxf': '0 SECTION 2 ENTITIES 0 LINE 8 0 10 0 20 0 11 80 21 0 '
+    '0 CIRCLE 8 0 10 50 20 50 40 30 0 ENDSEC 0 EOF'.replace(' ', '\n'),
+    'a.yaml': 'poses:\n'
+    + ''.join(
+        f'- position: {{x: {x}, y: 0.0, z: 0.0}}\n'
+        '  orientation: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}\n'
+        for x in (0.0, 0.05)
+    ),
+    'a.script': 'movej([0.1, -1.5, 1.5, -1.5, -1.5, 0])\n'
+    'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]), v=0.1, r=0.01)\n'
+    'movel(pose_trans(get_actual_tcp_pose(), p[0.05, 0, 0, 0, 0, 0]), v=0.1)\n',
+}
+
+
+def options_for(name):
+    origin = IDENTITY if name.endswith('.script') else PART
+    return ImportOptions(origin=origin, unit='mm', blend=0.005, speed=0.1)
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return RobotInMemory('ur5e')
+
+
+def planned(goal, robot):
+    return plan(goal, robot.place(HOME, IDENTITY), ARM, PlanningOptions(self_collision='off'))
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_a_file_of_each_format_is_planned(tmp_path, robot, name):
+    if name == 'a.dxf':
+        pytest.importorskip('ezdxf')
+    (tmp_path / name).write_text(FILES[name])
+    found = import_file(tmp_path / name, options_for(name))
+    assert len(planned(found.goal, robot).segments) == len(found.goal.waypoints)
+
+
+@pytest.mark.parametrize('name', ['a.nc', 'a.script'])
+def test_an_imported_path_is_carried_out(tmp_path, robot, name):
+    (tmp_path / name).write_text(FILES[name])
+    goal = import_file(tmp_path / name, options_for(name)).goal
+    ran = robot.run([segment.primitive for segment in planned(goal, robot).segments])
+    assert ran.failure == ''
+    places = np.array([pose.position for pose in ran.poses])
+    radii = np.array(goal.segments.blend_radii)
+    for pose, radius in zip(np.array(goal.waypoints.poses), radii, strict=True):
+        assert np.linalg.norm(places - pose[:3], axis=1).min() < radius + 1e-4
+
+
+def test_a_recording_becomes_a_path(tmp_path, robot):
+    record(tmp_path, [packet(i) for i in range(100)])
+    found = import_file(only_file(tmp_path), ImportOptions(simplify=1e-3))
+    assert 1 <= len(found.goal.waypoints) <= 3
+    assert found.goal.waypoints.postures[0].names
+
+
+def test_a_broken_recording_is_refused(tmp_path):
+    (tmp_path / 'a.npz').write_bytes(b'none')
+    with pytest.raises(ValueError, match=r'a\.npz'):
+        import_file(tmp_path / 'a.npz')
+
+
+def test_an_unknown_format_is_refused(tmp_path):
+    with pytest.raises(BrokenFile, match='give one of csv'):
+        import_file(tmp_path / 'a.step')
+
+
+def test_the_command_writes_a_goal_file_and_says_what_was_left_out(tmp_path, capsys):
+    (tmp_path / 'a.nc').write_text('G21 M8\n' + FILES['a.nc'])
+    goal = tmp_path / 'goal.yaml'
+    status = main(['import', str(tmp_path / 'a.nc'), '-o', str(goal), '--blend', '1mm'])
+    assert status == 0
+    assert 'line 1: M8: no output is given for it' in capsys.readouterr().err
+    direct = import_file(tmp_path / 'a.nc', ImportOptions(blend=0.001)).goal
+    assert goal_from_fields(read_goal_file(goal)).waypoints == direct.waypoints
+
+
+def test_a_long_goal_is_written_packed_and_read_exactly(tmp_path):
+    rows = '\n'.join(f'G1 X{i / 7:.5f} Y{i % 2} Z0 F600' for i in range(300))
+    (tmp_path / 'a.nc').write_text(f'G21\n{rows}\n')
+    goal = tmp_path / 'goal.yaml'
+    assert main(['import', str(tmp_path / 'a.nc'), '-o', str(goal), '--blend', '1mm']) == 0
+    assert 'packed:' in goal.read_text()
+    direct = import_file(tmp_path / 'a.nc', ImportOptions(blend=0.001)).goal
+    read = goal_from_fields(read_goal_file(goal))
+    assert read.waypoints == direct.waypoints
+    assert (read.segments.blend_radii == direct.segments.blend_radii).all()
+
+
+def test_the_command_ends_with_one_sentence_for_a_broken_file(tmp_path, capsys):
+    (tmp_path / 'a.csv').write_text('x,y,z\n')
+    assert main(['import', str(tmp_path / 'a.csv')]) == 1
+    assert 'a.csv: line 1: the column' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('length', ['1', '1 km', 'mm', '-1mm'])
+def test_a_length_without_a_unit_is_refused(length, capsys):
+    with pytest.raises(SystemExit):
+        main(['import', 'a.csv', '--blend', length])
+    assert '--blend' in capsys.readouterr().err
