@@ -25,7 +25,7 @@ from ur_cartesian_driver.importing.import_options import (
     ToolOrientation,
 )
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
-from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector, Remark
+from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
 from ur_cartesian_driver.importing.recording_file import collect_recording
 from ur_cartesian_driver.importing.ros_messages_file import collect_message, collect_yaml
 from ur_cartesian_driver.importing.urscript_file import collect_urscript
@@ -34,9 +34,9 @@ __all__ = [
     'FORMATS',
     'BrokenFile',
     'CodeOutput',
+    'ImportNote',
     'ImportOptions',
     'ImportedGoal',
-    'Remark',
     'ToolOrientation',
     'import_file',
     'import_message',

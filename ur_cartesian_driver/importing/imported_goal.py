@@ -14,8 +14,8 @@ from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrie
 from ur_cartesian_driver.importing.imported_path import (
     BrokenFile,
     ImportedPath,
-    Remark,
-    Remarks,
+    ImportNote,
+    ImportNotes,
 )
 from ur_cartesian_driver.importing.simplification import simplify
 from ur_cartesian_driver.motion.goal import SegmentType
@@ -52,12 +52,12 @@ class ImportedGoal:
     """A goal, and what the file has that the goal has not."""
 
     goal: GoalTable
-    remarks: tuple[Remark, ...]
+    remarks: tuple[ImportNote, ...]
     #: (n,) lines of the points; 0 = added by an option.
     lines: NDArray[np.int64]
 
 
-def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedGoal:
+def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedGoal:
     """
     Apply the options.
 
@@ -136,7 +136,7 @@ def _position(values: Floats) -> str:
     return '(' + ', '.join(f'{value:.6g}' for value in values.tolist()) + ')'
 
 
-def _orientations(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> Floats:
+def _orientations(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> Floats:
     """Return the orientations of the tool (n, 4)."""
     found = np.tile(np.array(_DOWN), (len(path), 1))
     wanted = options.orientation
@@ -198,7 +198,7 @@ def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
     return normalized_rows(rows[best, :, np.arange(len(best))])
 
 
-def _without_repeated(path: ImportedPath, remarks: Remarks) -> ImportedPath:
+def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
     """Leave out lines that lead nowhere: the robot has no motion for them."""
     still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
         angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
@@ -226,7 +226,7 @@ def _is_same(path: ImportedPath, row: int, other: int) -> bool:
     )
 
 
-def _with_times(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedPath:
+def _with_times(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
     """Keep times that rise, unless there are speeds."""
     if np.isnan(path.times).all():
         return path
@@ -250,7 +250,7 @@ def _with_times(path: ImportedPath, options: ImportOptions, remarks: Remarks) ->
     return replace(path, times=np.full(len(path), np.nan))
 
 
-def _without_flat_arcs(path: ImportedPath, remarks: Remarks) -> ImportedPath:
+def _without_flat_arcs(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
     """Make lines of arcs that are lines to the robot, and of those without a point before."""
     arcs = path.types == SegmentType.CIRCULAR
     if not arcs.any():
@@ -273,7 +273,7 @@ def _without_flat_arcs(path: ImportedPath, remarks: Remarks) -> ImportedPath:
     )
 
 
-def _lifted(path: ImportedPath, options: ImportOptions, remarks: Remarks) -> ImportedPath:
+def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
     """Go back from the surface before a contour that begins elsewhere."""
     rows = [row for row in rows_where(path.lifts) if row]
     if not rows:
@@ -343,7 +343,7 @@ def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
 
 
 def _blends(
-    path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: Remarks
+    path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: ImportNotes
 ) -> Floats:
     """Return radii (n,) that fit between the points; where none fits the arm stops."""
     radii = np.where(np.isnan(path.blends), options.blend, path.blends)
@@ -357,8 +357,8 @@ def _blends(
     # The first line begins where the arm is, which nobody knows here: its blend may be long.
     special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
     special[:-1] |= special[1:]
-    pace = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)
-    least = np.where(special, np.maximum(_MIN_BLEND, _MIN_BLEND_TIME * pace), _MIN_BLEND)
+    rates = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)
+    least = np.where(special, np.maximum(_MIN_BLEND, _MIN_BLEND_TIME * rates), _MIN_BLEND)
     fits[fits < least] = 0.0
     for row in rows_where((fits < radii) & (fits > 0.0)):
         remarks.add(int(path.lines[row]), 'blend', 'made smaller, its lines are short')

@@ -42,7 +42,7 @@ class BrokenFile(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Remark:
+class ImportNote:
     """Something that was left out, or taken in another form."""
 
     #: 1-based, in rising order; empty = it concerns the whole file.
@@ -79,7 +79,7 @@ def _ranges(lines: Sequence[int]) -> Iterator[tuple[int, int]]:
     yield first, last
 
 
-class Remarks:
+class ImportNotes:
     """Collects remarks; the lines of equal ones come together."""
 
     def __init__(self) -> None:
@@ -92,10 +92,10 @@ class Remarks:
         if line:
             lines.add(line)
 
-    def result(self) -> tuple[Remark, ...]:
+    def result(self) -> tuple[ImportNote, ...]:
         """Return the remarks in the order in which they came first."""
         return tuple(
-            Remark(lines=tuple(sorted(lines)), what=what, why=why)
+            ImportNote(lines=tuple(sorted(lines)), what=what, why=why)
             for (what, why), lines in self._lines.items()
         )
 
@@ -171,7 +171,7 @@ class PathCollector:
         }
         self._postures: dict[int, Posture] = {}
         self._outputs: list[IOCommand] = []
-        self.remarks = Remarks()
+        self.remarks = ImportNotes()
         self.frame = ''
 
     def __len__(self) -> int:
