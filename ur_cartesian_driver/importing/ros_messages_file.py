@@ -104,7 +104,9 @@ def collect_yaml(text: str, options: ImportOptions, into: PathCollector) -> None
             depth += isinstance(event, yaml.CollectionStartEvent)
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > _MAX_DEPTH:
-                raise BrokenFile(event.start_mark.line + 1, 'it is nested too deeply')
+                raise BrokenFile(
+                    mark.line + 1 if (mark := event.start_mark) else 0, 'it is nested too deeply'
+                )
         documents = [node for node in yaml.compose_all(text, Loader=_Loader) if node is not None]
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
