@@ -116,7 +116,12 @@ def cell(private_ros_graph):
     monkeypatch = pytest.MonkeyPatch()
     monkeypatch.setattr(goal_monitor, 'STALL_TIMEOUT', RATE * goal_monitor.STALL_TIMEOUT)
     config = SimulatorConfig(
-        rtde_port=0, primary_port=0, dashboard_port=0, rate=RATE, frequency=FREQUENCY
+        rtde_port=0,
+        primary_port=0,
+        dashboard_port=0,
+        rate=RATE,
+        frequency=FREQUENCY,
+        when_late='wait',
     )
     parameters: dict[str, Any] = {
         'headless_mode': True,
@@ -192,6 +197,18 @@ def test_a_node_that_is_there_can_be_the_client(cell, is_spun):
             client.wait_ready(10.0)
             assert client.execute(path).raise_for_error().text.startswith('The point was executed')
         assert (node.executor is not None) == is_spun
+    finally:
+        node.destroy_node()
+
+
+def test_clients_come_and_go_on_a_node_whose_executor_waits(cell):
+    node = rclpy.create_node('user', context=cell.node.context)
+    cell.node.executor.add_node(node)
+    try:
+        for _ in range(100):  # a wait that begins meanwhile must not meet a destroyed client
+            GoalClient(node=node).close()
+        with GoalClient(node=node) as client:
+            client.wait_ready(10.0)
     finally:
         node.destroy_node()
 

@@ -43,7 +43,12 @@ class Cell:
             name: stack.enter_context(
                 SimulatedRobot(
                     SimulatorConfig(
-                        model=model, frequency=125.0, rtde_port=0, primary_port=0, dashboard_port=0
+                        model=model,
+                        frequency=125.0,
+                        rtde_port=0,
+                        primary_port=0,
+                        dashboard_port=0,
+                        when_late='wait',
                     )
                 )
             )

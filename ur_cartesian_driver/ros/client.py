@@ -176,7 +176,11 @@ class GoalClient:
         if self._executor is not None:
             self._node.executor = None  # type: ignore[assignment]  # takes the node out
             self._executor.shutdown()
-        self._client.destroy()
+            self._client.destroy()
+        else:
+            # An executor that is about to wait would fail on a client that is destroyed meanwhile;
+            # this one goes with its last reference.
+            self._node.remove_waitable(self._client)
         if self._own_context is not None:
             self._node.destroy_node()
             rclpy.shutdown(context=self._own_context)
