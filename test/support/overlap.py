@@ -33,6 +33,8 @@ COMPUTING = (
     'test/acceptance/test_waiting_in_virtual_time.py',
     'test/driver/test_recorded_motion.py',
     'test/sim/motion/',
+    'test/importing/',
+    'test/path/',
     'test/planning/',
     'test/program/',
     'test/execution/',
