@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import hypot, pi
 import re
 from time import process_time
+from typing import NamedTuple
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -35,8 +36,6 @@ from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Curv
 from ur_cartesian_driver.planning.geometry.curves import (
     ArcCurve,
     JointLineCurve,
-    LineCurve,
-    SegmentCurve,
 )
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
@@ -70,6 +69,20 @@ def fraction_in(text):
     return float(re.search(r'pose, at ([\d.]+) % of its segment', text)[1]) / 100.0
 
 
+class Line(NamedTuple):
+    """A line between two poses."""
+
+    start: Pose
+    end: Pose
+
+    @property
+    def length(self):
+        return self.start.distance_to(self.end)
+
+    def pose(self, u):
+        return self.start.interpolate(self.end, u)
+
+
 def to(pose, **fields):
     return Goal(waypoints=(Waypoint(pose=pose, **fields),))
 
@@ -88,7 +101,7 @@ def across(make_cell, q_middle, aside, half=0.05):
 
 def least_on_line(cell, end, measure, low=0.0, high=1.0):
     """Return where on the line to a pose a measure of the flange is least, by golden section."""
-    line, back = LineCurve.between(cell.home, end), cell.T_flange_tcp.inverse()
+    line, back = Line(cell.home, end), cell.T_flange_tcp.inverse()
 
     def at(u):
         return measure(line.pose(u) @ back)
@@ -152,7 +165,7 @@ def test_a_line_to_a_stretched_arm_is_refused_as_elbow_where_it_is_nearest(make_
 
 def test_a_line_beyond_the_stretched_arm_ends_where_it_is_stretched(make_cell):
     cell, stretched = stretching(make_cell, 0.0)
-    whole = LineCurve.between(cell.home, stretched)
+    whole = Line(cell.home, stretched)
     text = refusal(NearSingularity, cell, to(whole.pose(2.0)), NO_MARGINS)
     assert 'lies behind the elbow singularity' in text
     assert fraction_in(text) == pytest.approx(0.5, abs=0.001)
@@ -192,7 +205,7 @@ def test_a_line_past_the_shoulder_is_refused_by_name_where_it_is_nearest(make_ce
 
 def test_a_line_through_the_column_over_the_base_is_out_of_reach_where_it_enters(make_cell):
     cell, end = column_line(make_cell, -0.02)
-    ideal, line = ideal_arm_of(cell.arm), LineCurve.between(cell.home, end)
+    ideal, line = ideal_arm_of(cell.arm), Line(cell.home, end)
     back = cell.T_flange_tcp.inverse()
     low, high = 0.0, 0.5
     for _ in range(40):
@@ -222,7 +235,7 @@ def test_joint_moves_pass_singularities_and_may_replace_the_line(make_cell, name
 
 def test_a_line_in_a_run_that_becomes_a_joint_move_leaves_the_others_as_they_were(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0), half=0.1)
-    line = LineCurve.between(cell.home, end)
+    line = Line(cell.home, end)
     poses = [line.pose(u) for u in (0.1, 0.2, 0.9, 1.0)]
     goal = Goal(
         waypoints=tuple(Waypoint(pose=pose) for pose in poses),
@@ -249,7 +262,7 @@ def test_a_posture_behind_a_flip_says_which(make_cell):
 
 def test_a_robot_that_stands_near_a_singularity_may_leave_it_and_not_come_back(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0))
-    line = LineCurve.between(cell.home, end)
+    line = Line(cell.home, end)
     near = line.pose(0.55) @ cell.T_flange_tcp.inverse()
     cell = make_cell(nearest(cell.arm, near, (0.0, -1.0, 1.0, -6.0, -0.01, 5.0)))
     assert 0.002 < abs(cell.state.actual_q[4]) < 0.02
@@ -261,10 +274,10 @@ def test_a_robot_that_stands_near_a_singularity_may_leave_it_and_not_come_back(m
 
 def test_the_first_millimetre_from_a_rest_does_not_count(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0))
-    line = LineCurve.between(cell.home, end)
+    line = Line(cell.home, end)
     near = line.pose(0.56) @ cell.T_flange_tcp.inverse()
     cell = make_cell(nearest(cell.arm, near, (0.0, -1.0, 1.0, -6.0, -0.01, 5.0)))
-    towards = LineCurve.between(cell.home, line.pose(0.5))
+    towards = Line(cell.home, line.pose(0.5))
     plan(to(towards.pose(0.0009 / towards.length)), cell.state, cell.arm, FREE)
     refusal(NearSingularity, cell, to(towards.pose(0.002 / towards.length)))
 
@@ -309,7 +322,7 @@ def test_a_joint_that_comes_to_the_end_of_its_range_is_named_with_the_place(make
 def test_a_blended_corner_is_looked_at_and_not_the_point_that_it_leaves_out(make_cell):
     """The point lies in the column over the base; the corner stays clear of it, or does not."""
     cell, end = column_line(make_cell, 0.03)
-    line = LineCurve.between(cell.home, end)
+    line = Line(cell.home, end)
     ideal = ideal_arm_of(cell.arm)
     middle = line.pose(0.5)
     centre = np.array(wrist_centre(ideal, middle @ cell.T_flange_tcp.inverse()))
@@ -360,7 +373,8 @@ def test_a_peak_of_the_joints_between_coarse_places_counts(make_cell):
 def path_of(curves, radius=0.0, fillet=False):
     """Return the path of two curves, with a blend between them if there is a radius."""
     start, end = (pose_rows([getattr(curve, at) for curve in curves]) for at in ('start', 'end'))
-    path = BlendedPath(CurveRows(start, end, dict(enumerate(curves))))
+    others = {k: curve for k, curve in enumerate(curves) if not isinstance(curve, Line)}
+    path = BlendedPath(CurveRows(start, end, others))
     if radius > 0.0:
         path.make_blends(np.array([0]), np.array([radius]), np.array([fillet]))
     return path
@@ -376,8 +390,8 @@ spots = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 @settings(max_examples=20, deadline=None)
 @given(a=spots, b=spots, radius=st.floats(0.001, 0.02), fillet=st.booleans())
 def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
-    first = LineCurve.between(cell.home, cell.pose(*a[:3], turn=a[3:]))
-    second = LineCurve.between(first.end, cell.pose(*b[:3], turn=b[3:]))
+    first = Line(cell.home, cell.pose(*a[:3], turn=a[3:]))
+    second = Line(first.end, cell.pose(*b[:3], turn=b[3:]))
     if min(first.length, second.length) <= 2.5 * radius:
         return
     path = path_of([first, second], radius, fillet)
@@ -389,23 +403,25 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
     dots = np.abs(np.einsum('ij,ij->i', rows[1:, 3:], rows[:-1, 3:]))
     assert 2.0 * np.arccos(np.minimum(1.0, dots)).max() <= 2.5 * STEP_ANGLE
     for k, t, pose in zip(samples.piece, samples.t, samples.poses, strict=True):
-        one = pieces.curve(k).pose(float(t))
-        assert np.allclose(one.row(), pose, atol=1e-9) or np.allclose(
-            one.row()[3:], -pose[3:], atol=1e-9
-        )
+        if k == 1:
+            assert np.linalg.norm(pose[:3] - first.end.position) <= radius + 1e-9
+            continue
+        on_line = (first, second)[k // 2].pose(float(t)).row()
+        assert np.allclose(on_line[:3], pose[:3], atol=1e-9)
+        assert abs(np.dot(on_line[3:], pose[3:])) == pytest.approx(1.0)
 
 
 @settings(max_examples=15, deadline=None)
 @given(a=spots, b=spots)
 def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b):
     middle, end = (cell.pose(*spot[:3], turn=spot[3:]) for spot in (a, b))
-    paths: list[SegmentCurve] = [LineCurve.between(cell.home, middle)]
+    paths: list[Line | ArcCurve] = [Line(cell.home, middle)]
     try:
         paths.append(
             ArcCurve.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, ArcMode(0))
         )
     except ValueError:
-        paths.append(LineCurve.between(middle, end))
+        paths.append(Line(middle, end))
     pieces = pieces_of(path_of(paths), [0, 2], [0.0, 0.0], [1.0, 1.0])
     found = solve_joint_path(
         TcpKinematics(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q
@@ -414,7 +430,7 @@ def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b)
         return
     q, back = cell.state.actual_q, cell.T_flange_tcp.inverse()
     for k, t, row in zip(found.piece, found.t, found.q, strict=True):
-        q = nearest(cell.arm, pieces.curve(k).pose(float(t)) @ back, q)
+        q = nearest(cell.arm, pieces.pose(k, float(t)) @ back, q)
         assert np.abs(np.array(q) - row).max() < 1e-6
 
 
@@ -427,11 +443,11 @@ def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
         tuple(q + 0.3),
         tuple(q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))),
     )
-    blend = path_of([way, back], 0.02)[1]
-    rows = blend.joint_rows(np.array((0.0, 1.0)))
-    assert rows[0] == pytest.approx(way.joints(blend.leave))
-    assert rows[1] == pytest.approx(back.joints(blend.join))
-    assert 0.0 < blend.length < 0.05
+    path = path_of([way, back], 0.02)
+    rows = path.joint_rows(1, np.array((0.0, 1.0)))
+    assert rows[0] == pytest.approx(way.joints(path.u_leave[0]))
+    assert rows[1] == pytest.approx(back.joints(path.u_join[1]))
+    assert 0.0 < path.blend_length[0] < 0.05
 
 
 # -- the report -----------------------------------------------------------------------------------

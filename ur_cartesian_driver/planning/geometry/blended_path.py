@@ -4,20 +4,18 @@
 The path of a goal in columns: the curve of each segment, and the blends between them.
 
 Goals have up to 100,000 segments, and nearly all of them are lines. So lines and blends are rows.
-The other curves (arcs, joint lines) stand beside the rows as objects. Any of them is also made an
-object when somebody asks for it.
+The other curves (arcs, joint lines) stand beside the rows as objects.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import (
     angle_rows,
     distance_rows,
@@ -31,13 +29,10 @@ from ur_cartesian_driver.planning.geometry.blend_shapes import (
     fillet_rows,
 )
 from ur_cartesian_driver.planning.geometry.curves import (
-    Curve,
     JointLineCurve,
-    LineCurve,
     MAX_TURN_PER_SAMPLE,
     SegmentCurve,
     tcp_rows,
-    trim_end,
 )
 
 Integers = NDArray[np.intp]
@@ -50,9 +45,6 @@ _CHORDS = 16
 class CurveSequence(Protocol):
     """Consecutive curves, by their numbers, as the checks along a path need them."""
 
-    def __getitem__(self, number: int) -> Curve:
-        """Return one of the curves."""
-
     def rows(self, number: Integers, t: Floats) -> Floats:
         """
         Return poses (n, 7) on many curves.
@@ -60,6 +52,9 @@ class CurveSequence(Protocol):
         :param number: (n,) of the curve of each row, not decreasing.
         :param t: (n,) in [0, 1].
         """
+
+    def extents(self, number: Integers) -> tuple[Floats, Floats]:
+        """Return the lengths (n,) [m], and the turns (n,) of tool or leading joint [rad]."""
 
     def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
         """Return the segments (n,) that places count to, and the fractions (n,) of them."""
@@ -89,19 +84,6 @@ class CurveRows:
     def __len__(self) -> int:
         return len(self.length)
 
-    def __getitem__(self, row: int) -> SegmentCurve:
-        return next(self.objects(slice(row, row + 1)))
-
-    def objects(self, rows: slice) -> Iterator[SegmentCurve]:
-        """Make the curves of some rows."""
-        columns = (self.start, self.end, self.length, self.angle)
-        for row, start, end, length, angle in zip(
-            range(len(self))[rows], *(column[rows].tolist() for column in columns), strict=True
-        ):
-            yield self.others.get(row) or LineCurve(
-                pose_from_row(start), pose_from_row(end), length, angle
-            )
-
     def joint_line(self, row: int) -> JointLineCurve:
         """Return the curve of a joint move."""
         curve = self.others[row]
@@ -113,11 +95,18 @@ class CurveRows:
         self.start[row], self.end[row] = curve.start.row(), curve.end.row()
         self.length[row], self.angle[row] = curve.length, curve.angle
         self.joint_travel[row] = curve.joint_travel
-        self.is_line[row] = isinstance(curve, LineCurve)
-        self.is_joint_line[row] = isinstance(curve, JointLineCurve)
+        self.is_line[row], self.is_joint_line[row] = False, isinstance(curve, JointLineCurve)
+        self.others[row] = curve
+
+    def put_line(self, row: int, start: Pose) -> None:
+        """Replace a curve by the line from a pose to its end."""
+        self.start[row] = start.row()
+        one = slice(row, row + 1)
+        self.length[one] = distance_rows(self.start[one], self.end[one])
+        self.angle[one] = angle_rows(self.start[one, 3:], self.end[one, 3:])
+        self.joint_travel[row] = 0.0
+        self.is_line[row], self.is_joint_line[row] = True, False
         self.others.pop(row, None)
-        if not self.is_line[row]:
-            self.others[row] = curve
 
     @property
     def samples(self) -> Integers:
@@ -140,23 +129,14 @@ class CurveRows:
             rows[first:last] = self.others[k].rows(u[first:last])
         return rows
 
-    def trim(self, row: Integers, radius: Floats) -> Floats:
-        """Return the ``u`` (n,) at which curves have left balls around their starts."""
-        u = self._line_trim(row, radius)
-        for k in np.flatnonzero(~self.is_line[row]).tolist():
-            u[k] = self.others[int(row[k])].trim(float(radius[k]))
-        return u
-
-    def trim_end(self, row: Integers, radius: Floats) -> Floats:
-        """Return the ``u`` (n,) at which curves come into balls around their ends."""
-        u = 1.0 - self._line_trim(row, radius)
-        for k in np.flatnonzero(~self.is_line[row]).tolist():
-            u[k] = trim_end(self.others[int(row[k])], float(radius[k]))
-        return u
-
-    def _line_trim(self, row: Integers, radius: Floats) -> Floats:
+    def trim(self, row: Integers, radius: Floats, *, at_end: bool = False) -> Floats:
+        """Return the ``u`` (n,) at which curves leave balls around their starts, or ends [m]."""
         length = self.length[row]
         u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
+        if at_end:
+            u = 1.0 - u
+        for k in np.flatnonzero(~self.is_line[row]).tolist():
+            u[k] = self.others[int(row[k])].trim(float(radius[k]), at_end=at_end)
         return u
 
 
@@ -184,10 +164,6 @@ class BlendedPath:
         #: turn of the tool may run ahead of its position, or behind it.
         self.blend_tolerance = np.zeros((n, 2))
 
-    def __getitem__(self, number: int) -> SegmentCurve | Blend:
-        row, is_blend = divmod(number, 2)
-        return Blend(self, row) if is_blend else self.curves[row]
-
     @property
     def has_blend_after(self) -> Flags:
         """Whether there is a blend after each curve."""
@@ -205,7 +181,7 @@ class BlendedPath:
 
     def leave(self, row: Integers, radius: Floats) -> None:
         """Leave curves where blends will begin, the second curves of which are not known yet."""
-        self.u_leave[row] = self.curves.trim_end(row, radius)
+        self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
     def make_blends(self, row: Integers, radius: Floats, fillet: Flags) -> None:
         """Make the blends after curves."""
@@ -226,7 +202,8 @@ class BlendedPath:
         self.blend_samples[row] = shapes.samples()
         self.blend_tolerance[row] = shapes.tolerances()
         for k in row[~(curves.is_line[row] & curves.is_line[after])].tolist():
-            positions = Blend(self, k).rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
+            s = np.linspace(0.0, 1.0, _CHORDS + 1)
+            positions = self.blend_rows(np.full(len(s), k), s)[:, :3]
             self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
 
     def extents(self, number: Integers) -> tuple[Floats, Floats]:
@@ -256,14 +233,32 @@ class BlendedPath:
 
     def blend_rows(self, row: Integers, s: Floats) -> Floats:
         """Return poses (n, 7) in the blends after curves; ``row`` must not decrease."""
-        in_joint_space = self.curves.is_joint_line[row] & self.curves.is_joint_line[row + 1]
+        curves = self.curves
+        in_joint_space = curves.is_joint_line[row] & curves.is_joint_line[row + 1]
         if not in_joint_space.any():
             return self._crossfaded(row, s)
         rows = np.empty((len(s), 7))
         rows[~in_joint_space] = self._crossfaded(row[~in_joint_space], s[~in_joint_space])
         for k in np.unique(row[in_joint_space]).tolist():
             first, last = np.searchsorted(row, (k, k + 1))
-            rows[first:last] = Blend(self, k).rows(s[first:last])
+            line, q = curves.joint_line(k), self.joint_rows(2 * k + 1, s[first:last])
+            rows[first:last] = tcp_rows(line.arm, line.T_flange_tcp, q)
+        return rows
+
+    def is_in_joint_space(self, number: int) -> bool:
+        """Tell whether a curve is a joint line, or a blend between two."""
+        row, is_blend = divmod(number, 2)
+        return bool(self.curves.is_joint_line[row : row + is_blend + 1].all())
+
+    def joint_rows(self, number: int, t: Floats) -> Floats:
+        """Return the joint positions (n, 6) [rad] on a curve in joint space."""
+        row, is_blend = divmod(number, 2)
+        first = self.curves.joint_line(row)
+        if not is_blend:
+            return first.joint_rows(t)
+        second = self.curves.joint_line(row + 1)
+        a, b = crossfade(self.u_leave[row : row + 1], self.u_join[row + 1 : row + 2], t)
+        rows: Floats = first.joint_rows(a) + second.joint_rows(b) - np.array(second.q_start)
         return rows
 
     def _crossfaded(self, row: Integers, s: Floats) -> Floats:
@@ -290,87 +285,3 @@ class BlendedPath:
         after = on_blend & (t > 0.5)
         first, second = crossfade(self.u_leave[row], self.u_join[row + on_blend], t)
         return row + after, np.where(on_blend, np.where(after, second, first), t)
-
-
-@dataclass(frozen=True, slots=True)
-class Blend:
-    """The blend after a curve of a path, over ``s`` in [0, 1]."""
-
-    path: BlendedPath
-    row: int
-    can_start_at_rest: ClassVar[bool] = False
-
-    @property
-    def first(self) -> SegmentCurve:
-        """The curve that it leaves."""
-        return self.path.curves[self.row]
-
-    @property
-    def second(self) -> SegmentCurve:
-        """The curve that it joins."""
-        return self.path.curves[self.row + 1]
-
-    @property
-    def radius(self) -> float:
-        """Distance from the waypoint at which both curves are left [m]."""
-        return float(self.path.radius[self.row])
-
-    @property
-    def fillet(self) -> bool:
-        """Whether it is a circular arc (``movep``)."""
-        return bool(self.path.fillet[self.row])
-
-    @property
-    def leave(self) -> float:
-        """The ``u`` where it leaves the first curve."""
-        return float(self.path.u_leave[self.row])
-
-    @property
-    def join(self) -> float:
-        """The ``u`` where it joins the second curve."""
-        return float(self.path.u_join[self.row + 1])
-
-    @property
-    def length(self) -> float:
-        """Length [m]."""
-        return float(self.path.blend_length[self.row])
-
-    @property
-    def angle(self) -> float:
-        """Turn of the tool [rad]."""
-        return float(self.path.blend_angle[self.row])
-
-    @property
-    def samples(self) -> int:
-        """Number of chords that follow it closely enough."""
-        return int(self.path.blend_samples[self.row])
-
-    @property
-    def end(self) -> Pose:
-        """The pose at which it joins the second curve."""
-        return self.pose(1.0)
-
-    def pose(self, s: float) -> Pose:
-        """Return the pose at ``s``."""
-        return pose_from_row(self.rows(np.array([s]))[0])
-
-    @property
-    def in_joint_space(self) -> bool:
-        """Whether it crossfades joint positions instead of tool poses."""
-        return isinstance(self.first, JointLineCurve) and isinstance(self.second, JointLineCurve)
-
-    def joint_rows(self, s: Floats) -> Floats:
-        """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a blend in joint space."""
-        first, second = self.first, self.second
-        assert isinstance(first, JointLineCurve)
-        assert isinstance(second, JointLineCurve)
-        a, b = crossfade(np.array(self.leave), np.array(self.join), s)
-        rows: Floats = first.joint_rows(a) + second.joint_rows(b) - np.array(second.q_start)
-        return rows
-
-    def rows(self, s: Floats) -> Floats:
-        """Return the poses (n, 7) at ``s`` (n,) in [0, 1]."""
-        first = self.first
-        if isinstance(first, JointLineCurve) and self.in_joint_space:
-            return tcp_rows(first.arm, first.T_flange_tcp, self.joint_rows(s))
-        return self.path.blend_rows(np.full(len(s), self.row), s)

@@ -11,9 +11,9 @@ transitions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import asin, atan2, ceil, degrees, hypot, pi, sqrt
-from typing import ClassVar, Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -23,12 +23,11 @@ from ur_cartesian_driver.motion.pose import (
     distance,
     multiply,
     Pose,
-    Quaternion,
     quaternion_from_rotation_vector,
-    slerp,
 )
 from ur_cartesian_driver.motion.pose_rows import (
     compose_rows,
+    distance_rows,
     Floats,
     interpolate_rows,
     multiply_rows,
@@ -57,63 +56,8 @@ ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
-
-
-class Curve(Protocol):
-    """A path of the TCP over one parameter in [0, 1], as the checks along a path need it."""
-
-    @property
-    def length(self) -> float:
-        """Path length [m]."""
-
-    @property
-    def angle(self) -> float:
-        """Turn of the tool [rad]."""
-
-    @property
-    def can_start_at_rest(self) -> bool:
-        """Whether the arm may be at rest where the curve starts."""
-
-    @property
-    def end(self) -> Pose:
-        """The pose at 1."""
-
-    def pose(self, u: float) -> Pose:
-        """Return the pose at ``u``."""
-
-
-@dataclass(frozen=True, slots=True)
-class LineCurve:
-    """The tool on a straight line, its orientation along the shortest rotation."""
-
-    start: Pose
-    end: Pose
-    length: float
-    angle: float
-    joint_travel: ClassVar[float] = 0.0
-    can_start_at_rest: ClassVar[bool] = True
-
-    @classmethod
-    def between(cls, start: Pose, end: Pose) -> LineCurve:
-        """Return the line from one pose to another."""
-        return cls(start, end, start.distance_to(end), start.angle_to(end))
-
-    @property
-    def samples(self) -> int:
-        """Into how many pieces to cut it so that chords follow it: 1 unless it turns."""
-        return max(1, ceil(self.angle / MAX_TURN_PER_SAMPLE))
-
-    def pose(self, u: float) -> Pose:
-        """Return the pose at ``u``."""
-        return self.start.interpolate(self.end, u)
-
-    def rows(self, u: Floats) -> Floats:
-        """Return the poses (n, 7) at many ``u`` (n,)."""
-        return interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
-
-    def trim(self, radius: float) -> float:
-        """Return the ``u`` at which the line has left a ball of that radius around its start."""
-        return min(1.0, radius / self.length) if self.length > 0.0 else 0.0
+#: Where a joint line leaves a ball is narrowed down to one of so many parts, again and again.
+_TRIM_DIVISIONS = (32,) * 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +80,6 @@ class ArcCurve:
     #: Where the via lies, (0, 1).
     u_via: float
     joint_travel: ClassVar[float] = 0.0
-    can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
@@ -175,12 +118,6 @@ class ArcCurve:
         step = sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
         return max(1, ceil(self.sweep / step), ceil(self.angle / MAX_TURN_PER_SAMPLE))
 
-    def pose(self, u: float) -> Pose:
-        """Return the pose at ``u``."""
-        turn = quaternion_from_rotation_vector(scale(self.axis, u * self.sweep))
-        swing = Pose(self.center, turn) @ Pose(subtract(self.start.position, self.center))
-        return Pose(swing.position, self._orientation(turn, u))
-
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
         rows = interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
@@ -192,14 +129,10 @@ class ArcCurve:
             rows[:, 3:] = normalized_rows(multiply_rows(turn, np.array([self.start.quaternion])))
         return rows
 
-    def trim(self, radius: float) -> float:
-        """Return the ``u`` at which the arc has left a ball of that radius around its start."""
-        return min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
-
-    def _orientation(self, turn: Quaternion, u: float) -> Quaternion:
-        if self.mode is ArcMode.FIXED:
-            return multiply(turn, self.start.quaternion)
-        return slerp(self.start.quaternion, self.end.quaternion, u)
+    def trim(self, radius: float, *, at_end: bool) -> float:
+        """Return the ``u`` at which the arc crosses a ball [m] around its start, or its end."""
+        u = min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
+        return 1.0 - u if at_end else u
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +150,6 @@ class JointLineCurve:
     samples: int
     #: Peak speed of the tool over its mean speed.
     unevenness: float
-    can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def between(
@@ -278,39 +210,19 @@ class JointLineCurve:
         """Return the poses (n, 7) at many ``u`` (n,)."""
         return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
-    def trim(self, radius: float) -> float:
-        """Return the first ``u`` at which the tool has left a ball of that radius."""
-        step = 1.0 / max(16, self.samples)
-        u = step
-        while u < 1.0 and self.pose(u).distance_to(self.start) < radius:
-            u += step
-        low, high = u - step, min(1.0, u)
-        for _ in range(30):
-            middle = 0.5 * (low + high)
-            inside = self.pose(middle).distance_to(self.start) < radius
-            low, high = (middle, high) if inside else (low, middle)
-        return high
-
-    def reversed(self) -> JointLineCurve:
-        """Return the same line from its end to its start."""
-        return replace(
-            self, q_start=self.q_end, q_end=self.q_start, start=self.end, end=self.start
-        )
+    def trim(self, radius: float, *, at_end: bool) -> float:
+        """Return the ``u`` at which the tool first leaves a ball [m] around its start, or end."""
+        center = np.array([(self.end if at_end else self.start).row()])
+        low, high = 0.0, 1.0
+        for n in (max(16, self.samples), *_TRIM_DIVISIONS):
+            v = np.linspace(low, high, n + 1)
+            between = self.rows(1.0 - v[1:-1] if at_end else v[1:-1])
+            k = int(np.argmin(np.append(distance_rows(center, between) < radius, False)))
+            low, high = v[k : k + 2].tolist()
+        return 1.0 - high if at_end else high
 
 
-SegmentCurve: TypeAlias = LineCurve | ArcCurve | JointLineCurve
-
-
-def trim_end(path: SegmentCurve, radius: float) -> float:
-    """Return the ``u`` at which a path comes into a ball of that radius [m] around its end."""
-    if isinstance(path, JointLineCurve):
-        return 1.0 - path.reversed().trim(radius)
-    return 1.0 - path.trim(radius)
-
-
-def pose_at(curve: Curve, u: float) -> Pose:
-    """Return the pose at ``u``, exactly the end at 1."""
-    return curve.end if u == 1.0 else curve.pose(u)
+SegmentCurve: TypeAlias = ArcCurve | JointLineCurve
 
 
 def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:

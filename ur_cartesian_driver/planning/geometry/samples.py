@@ -19,6 +19,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
@@ -28,7 +29,6 @@ from ur_cartesian_driver.planning.geometry.blended_path import (
     Flags,
     Integers,
 )
-from ur_cartesian_driver.planning.geometry.curves import Curve
 
 Ints = NDArray[np.int32]
 T = TypeVar('T', bound=np.generic)
@@ -104,6 +104,8 @@ class CurvePieces:
     #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
     index: Ints
     is_blend: Flags
+    #: Whether the arm rests where it begins.
+    begins_at_rest: Flags
 
     @classmethod
     def of(
@@ -126,14 +128,20 @@ class CurvePieces:
             sample_count=count.astype(np.intp),
             index=(first + number // 2).astype(np.int32),
             is_blend=is_blend,
+            begins_at_rest=~is_blend & (begin == 0.0),
         )
 
     def __len__(self) -> int:
         return len(self.number)
 
-    def curve(self, k: int) -> Curve:
-        """Return the whole curve of a piece."""
-        return self.path[int(self.number[k])]
+    def extent(self, k: int) -> tuple[float, float]:
+        """Return length [m] and turn [rad] of the whole curve of a piece."""
+        length, turn = self.path.extents(self.number[k : k + 1])
+        return float(length[0]), float(turn[0])
+
+    def pose(self, k: int, t: float) -> Pose:
+        """Return a pose on the curve of a piece."""
+        return pose_from_row(self.rows(np.array([k]), np.array([t]))[0].tolist())
 
     def rows(self, piece: Integers, t: Floats) -> Floats:
         """Return poses (n, 7) on pieces (n,), which must not decrease."""

@@ -11,7 +11,7 @@ quintic where accelerations are given too. Both are met exactly at the points.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ from ur_cartesian_driver.motion.polynomials import (
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import (
     conjugate_rows,
     Floats,
@@ -145,30 +144,6 @@ class ToolSpline:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ToolCurve:
-    """One piece as a :class:`~.curves.Curve` over the fraction of its time."""
-
-    spline: ToolSpline
-    piece: int
-    #: Length [m] and turn [rad].
-    length: float
-    angle: float
-    can_start_at_rest: ClassVar[bool] = False
-
-    def pose(self, u: float) -> Pose:
-        """Return the pose at ``u``."""
-        begin, end = self.spline.times[self.piece : self.piece + 2]
-        return pose_from_row(
-            self.spline.poses(np.array([self.piece]), np.array([u * (end - begin)]))[0]
-        )
-
-    @property
-    def end(self) -> Pose:
-        """The pose at its end."""
-        return self.pose(1.0)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolSplinePath:
     """The pieces of a spline as a :class:`~.blended_path.CurveSequence`, each a segment."""
@@ -178,14 +153,13 @@ class ToolSplinePath:
     lengths: Floats
     angles: Floats
 
-    def __getitem__(self, number: int) -> ToolCurve:
-        return ToolCurve(
-            self.spline, number, float(self.lengths[number]), float(self.angles[number])
-        )
-
     def rows(self, number: Ints, t: Floats) -> Floats:
         """Return poses (n, 7) on many pieces."""
         return self.spline.poses(number, t * np.diff(self.spline.times)[number])
+
+    def extents(self, number: Ints) -> tuple[Floats, Floats]:
+        """Return the lengths and the turns of pieces."""
+        return self.lengths[number], self.angles[number]
 
     def locate(self, number: Ints, t: Floats) -> tuple[Ints, Floats]:
         """Return each place as it is."""

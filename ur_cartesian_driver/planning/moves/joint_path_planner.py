@@ -26,11 +26,11 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Posture, Segment, SegmentType
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
-from ur_cartesian_driver.planning.geometry.blended_path import Blend, Flags
+from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.geometry.samples import CurvePieces
 from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
@@ -231,7 +231,11 @@ class JointPathPlanner:
         """Return the refusal of a line or an arc that misses its posture."""
         point = self._drafts.begin + row
         clause = self.kinematics.explain_missed_posture(
-            self._path.curves[row].end, posture, q, point, self.options.tf_prefix
+            pose_from_row(self._path.curves.end[row].tolist()),
+            posture,
+            q,
+            point,
+            self.options.tf_prefix,
         )
         if not clause:
             return None
@@ -276,7 +280,7 @@ class JointPathPlanner:
         self._make_blends(k, k + 1)
         self._solve_entry(k, line)
         begin, end = float(self._path.u_join[k]), float(self._path.u_leave[k])
-        self._add_joint_move(np.array([(2.0 * k, begin, end)]), line)
+        self._add_joint_move(np.array([(2.0 * k, begin, end)]))
         drafts.solved_until[k] = end
 
     def _start_joints(self, k: int) -> Joints:
@@ -299,11 +303,8 @@ class JointPathPlanner:
         entry = self._entry(k)
         if not len(entry):
             return
-        before = self._path[int(entry[0, 0])]
-        if isinstance(before, JointLineCurve) or (
-            isinstance(before, Blend) and before.in_joint_space
-        ):
-            self._add_joint_move(entry, before)
+        if self._path.is_in_joint_space(int(entry[0, 0])):
+            self._add_joint_move(entry)
             return
         joint_path = solve_joint_path(self.kinematics, self._curve_pieces(entry), self._q)
         if joint_path.refusal is not None:
@@ -324,8 +325,8 @@ class JointPathPlanner:
                 f'{segment_field(self._drafts.begin + k - 1, "blend_radius")}',
             )
 
-    def _add_joint_move(self, piece: Floats, curve: JointLineCurve | Blend) -> None:
-        joint_path = sample_joint_move(self.kinematics, self._curve_pieces(piece), curve)
+    def _add_joint_move(self, piece: Floats) -> None:
+        joint_path = sample_joint_move(self.kinematics, self._curve_pieces(piece), self._path)
         # Singularities do not matter here.
         self._add(joint_path, np.full((len(joint_path.t), 3), np.inf))
 

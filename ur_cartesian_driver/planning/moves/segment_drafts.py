@@ -20,11 +20,10 @@ from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import distance_rows, Floats
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows, Flags
 from ur_cartesian_driver.planning.geometry.curves import (
+    ArcCurve,
     HALF_TURN,
     is_same_pose,
-    LineCurve,
     SAME_POSITION,
-    SegmentCurve,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
@@ -121,20 +120,25 @@ class SegmentDrafts:
         self._find_blends()
         after = row + 1
         if after < len(self) and not self.is_joint_move[after]:
-            curve, remark = self._line_or_arc(after, self.target(row))
-            self.path.curves.put(after, curve)
-            self._remarks += [remark] if remark else []
+            start = self.target(row)
+            if self.kinds[after] == SegmentType.CIRCULAR:
+                arc, remark = self._arc(after, start)
+                self.path.curves.put(after, arc)
+                self._remarks += [remark] if remark else []
+            else:
+                self._check_turn(after, start)
+                self.path.curves.put_line(after, start)
 
     # -- curves ----------------------------------------------------------------------------------
 
     def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
         """Return the lines and arcs; rows of joint moves have no meaning."""
         starts = np.concatenate([[start.row()], self.targets[:-1]])
-        arcs: dict[int, SegmentCurve] = {}
+        arcs: dict[int, ArcCurve] = {}
         refusal, end = None, len(self)
         for row in rows_where(self.kinds == SegmentType.CIRCULAR):
             try:
-                arc, remark = self._line_or_arc(row, pose_from_row(starts[row].tolist()))
+                arc, remark = self._arc(row, pose_from_row(starts[row].tolist()))
             except InvalidGoal as error:
                 refusal, end = error, row
                 break
@@ -151,12 +155,9 @@ class SegmentDrafts:
             raise refusal
         return curves
 
-    def _line_or_arc(self, row: int, start: Pose) -> tuple[SegmentCurve, str]:
-        """Return the line or the arc of a segment from a pose, and a remark on it or ''."""
+    def _arc(self, row: int, start: Pose) -> tuple[ArcCurve, str]:
+        """Return the arc of a segment from a pose, and a remark on it or ''."""
         segments, index, target = self.segments, self.begin + row, self.target(row)
-        if self.kinds[row] != SegmentType.CIRCULAR:
-            self._check_turn(row, start)
-            return LineCurve.between(start, target), ''
         mode = ArcMode(int(segments.arc_modes[row]))
         if mode != ArcMode.FIXED:
             self._check_turn(row, start)

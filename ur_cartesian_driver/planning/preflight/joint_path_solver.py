@@ -24,8 +24,8 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.blended_path import Blend
-from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, pose_at, tcp_rows
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
     Ints,
@@ -106,11 +106,11 @@ class _Refinement:
 
 
 def sample_joint_move(
-    kinematics: TcpKinematics, pieces: CurvePieces, curve: JointLineCurve | Blend
+    kinematics: TcpKinematics, pieces: CurvePieces, path: BlendedPath
 ) -> JointPath:
     """Return the samples on the one piece of a curve in joint space."""
     piece, t = sample_parameters(pieces)
-    q = curve.joint_rows(t)
+    q = path.joint_rows(int(pieces.number[0]), t)
     return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
 
 
@@ -177,17 +177,15 @@ def _refine(
 ) -> _Refinement:
     """Return the samples from the row before to a row, as dense as the joints need them."""
     k = int(samples.piece[row])
-    curve = pieces.curve(k)
+    length, turn = pieces.extent(k)
     is_first = row == 0 or samples.piece[row - 1] != k
     t = float(pieces.begin[k]) if is_first else float(samples.t[row - 1])
-    min_step = min(
-        1.0, _MIN_LENGTH / max(curve.length, 1e-300), _MIN_ANGLE / max(curve.angle, 1e-300)
-    )
+    min_step = min(1.0, _MIN_LENGTH / max(length, 1e-300), _MIN_ANGLE / max(turn, 1e-300))
     found = _Refinement([], [], [])
     ends = [float(samples.t[row])]
     while ends:
         end = ends[-1]
-        pose = pose_at(curve, end)
+        pose = pieces.pose(k, end)
         q_next = kinematics.solution(pose, q)
         if end - t > min_step and (q_next is None or _may_leave_line(kinematics, q, q_next)):
             ends.append(0.5 * (t + end))
@@ -214,22 +212,23 @@ def _refusal_at(
     kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
     """Return why the arm cannot continue from a configuration, and on which segment."""
-    stop, curve = refinement.stop, pieces.curve(k)
+    stop = refinement.stop
     assert stop is not None
     index, fraction = pieces.locate_one(k, stop)
-    pose = pose_at(curve, stop)
+    pose = pieces.pose(k, stop)
     where = describe_location(index, fraction)
     if refinement.jump is not None:
         poses_beyond = (
-            pose_at(curve, t)
+            pieces.pose(k, t)
             for t in np.linspace(stop, float(pieces.end[k]), _SAMPLES_BEYOND).tolist()
         )
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
         # Here the value is just beyond its bound; the one at the point says how far beyond.
-        at_end = kinematics.no_solution_error(curve.end, where, 'at the point ')
-        if type(at_end) is type(refusal) and kinematics.solution(curve.end, q) is None:
+        end = pieces.pose(k, 1.0)
+        at_end = kinematics.no_solution_error(end, where, 'at the point ')
+        if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:
             refusal = at_end
     return refusal, index
 

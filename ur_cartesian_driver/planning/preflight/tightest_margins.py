@@ -194,16 +194,11 @@ def _is_leaving(
     does one that only grows from there.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
-    curve = pieces.curve(number)
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
-    if not curve.can_start_at_rest or pieces.begin[number] > 0.0:
-        return excused  # it comes out of a blend, or is a spline, see is_leaving_rows
-    length, angle = curve.length, curve.angle
-    on_it = joint_path.piece[rows] == number
-    t = joint_path.t[rows]
-    excused |= (on_it & (t * length <= START_LENGTH) & (t * angle <= START_ANGLE))[:, None]
-    grows = np.diff(measures[rows], axis=0, prepend=0.0) >= -_ROUNDING
-    excused |= np.logical_and.accumulate((grows & on_it[:, None]) | excused, axis=0)
+    if pieces.begins_at_rest[number]:
+        on_it = rows[joint_path.piece[rows] == number]
+        t, (length, turn) = joint_path.t[on_it], pieces.extent(number)
+        excused[: len(on_it)] = is_leaving_rows(measures[on_it], t * length, t * turn, rests=True)
     return excused
 
 

@@ -160,7 +160,7 @@ def _check_path(
         row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
         q = vector6(joint_path.q[row].tolist())
         if clause := kinematics.explain_missed_posture(
-            joint_path.pieces.curve(k).end, posture, q, point, options.tf_prefix
+            joint_path.pieces.pose(k, 1.0), posture, q, point, options.tf_prefix
         ):
             raise InvalidPosture(
                 f'{point_field(point, "posture")} cannot be reached along the spline: '
@@ -275,6 +275,7 @@ def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> CurvePieces
         sample_count=np.bincount(samples.piece),
         index=np.arange(first, first + n, dtype=np.int32),
         is_blend=np.zeros(n, dtype=np.bool_),
+        begins_at_rest=np.zeros(n, dtype=np.bool_),
     )
 
 
