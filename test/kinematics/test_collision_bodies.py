@@ -247,3 +247,16 @@ def test_the_height_of_a_cylinder_is_that_of_its_lowest_point(rng):
             points = np.concatenate([start + rim, end + rim])
             assert heights[row, 0, k] == pytest.approx((points @ normal).min(), abs=1e-5)
             assert heights[row, 1, k] == pytest.approx(-(points @ normal).max(), abs=1e-5)
+
+
+@pytest.mark.parametrize('step', [0.001, 0.02, 0.2])
+@pytest.mark.parametrize('model', ['ur3', 'ur5e', 'ur20'])
+def test_distances_that_are_enough_are_exact_where_they_count(rng, model, step):
+    bodies = CollisionBodies(Arm(MODELS[model]), TCP, 0.03)
+    for _ in range(5):
+        q = random_joints(rng, 1) + np.cumsum(rng.normal(0.0, step, (500, 6)), axis=0)
+        exact, found = bodies.distances(q), bodies.distances(q, enough=0.01)
+        counts = exact < max(0.01, exact.min() + 1e-12)
+        assert (found[counts] == exact[counts]).all()
+        assert (found <= exact + 1e-12).all()
+        assert (found[~counts] >= max(0.01, exact.min())).all()

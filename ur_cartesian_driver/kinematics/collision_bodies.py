@@ -25,11 +25,11 @@ the housings. The UR10's are the middles of its tubes in the meshes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cache
-from math import hypot
+from math import hypot, inf
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -40,6 +40,7 @@ from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
 
 
 class Link(IntEnum):
@@ -161,6 +162,10 @@ _RADIUS_FACTOR = 1.1
 _END_FACTOR = (_RADIUS_FACTOR**2 - 1.0) ** 0.5
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 256
+# Of so many rows that lie close together the middle one says how near the others may be.
+# Calibration makes no arm longer than its model by more than the slack [m].
+_STRIDE = 16
+_REACH_SLACK = 0.02
 # Segments count as parallel below this squared sine of their angle: error 1e-6 of a length.
 _PARALLEL = 1e-12
 _TINY = 1e-300
@@ -219,28 +224,71 @@ class CollisionBodies:
         self.links, self.radii = tuple(links), np.array(radii)
         self._cut, self.capsule_radii = np.array(capsules_of).T
         self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._has_tool)
-        self._first, self._second, self._begins = _pair_indices(self.links, self.pairs)
+        self._first, self._second, self._pair = _comparisons(self.links, self.pairs)
+        self._reach = self._reaches(bodies)
 
-    def distances(self, q: Floats) -> Floats:
+    def distances(self, q: Floats, enough: float = inf) -> Floats:
         """
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
-        :param q: (n, 6) [rad].
+        :param q: (n, 6) [rad]; faster with ``enough`` if rows that follow each other are close.
+        :param enough: where a distance is neither less than this [m] nor the smallest of all, a
+            smaller number may stand for it, which is no less than both.
         :returns: (n, pairs) distance of their capsules [m]; negative where these overlap.
         """
-        result = np.empty((len(q), len(self.pairs)))
-        sums = (self.capsule_radii[self._first] + self.capsule_radii[self._second])[:, None]
+        every = np.ones(len(self.pairs), dtype=np.bool_)
+        if enough == inf or len(q) <= _STRIDE:
+            return self._pair_distances(q, every)
+        block = np.arange(len(q)) // _STRIDE
+        begins = np.arange(0, len(q), _STRIDE)
+        middles = q[np.minimum(begins + _STRIDE // 2, len(q) - 1)]
+        least = self._pair_distances(middles, every)
+        enough = max(enough, float(least.min()))
+        least -= np.maximum.reduceat(np.abs(q - middles[block]), begins) @ self._reach
+        near: Flags = np.less(least, enough)
+        result = least[block]
+        rows = np.flatnonzero(np.any(near, axis=1)[block])
+        for begin in range(0, len(rows), _BLOCK):
+            some = rows[begin : begin + _BLOCK]
+            pairs: Flags = np.any(near[block[some[0]] : block[some[-1]] + 1], axis=0)
+            result[some[:, None], np.flatnonzero(pairs)] = self._pair_distances(q[some], pairs)
+        return result
+
+    def _pair_distances(self, q: Floats, pairs: Flags) -> Floats:
+        """Return the distances (n, m) of some pairs."""
+        wanted = pairs[self._pair]
+        first, second = self._first[wanted], self._second[wanted]
+        begins = np.flatnonzero(np.diff(self._pair[wanted], prepend=-1))
+        sums = (self.capsule_radii[first] + self.capsule_radii[second])[:, None]
+        result = np.empty((len(q), len(begins)))
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
             start, vector = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
             distances = segment_distance(
-                start[:, self._first],
-                vector[:, self._first],
-                start[:, self._second],
-                vector[:, self._second],
+                start[:, first], vector[:, first], start[:, second], vector[:, second]
             )
-            result[rows] = np.minimum.reduceat(distances - sums, self._begins).T
+            result[rows] = np.minimum.reduceat(distances - sums, begins).T
         return result
+
+    def _reaches(self, bodies: Sequence[_LinkCylinder]) -> Floats:
+        """
+        Return how far a turn of each joint moves one link of each pair towards the other.
+
+        :returns: (6, pairs) [m/rad]: the largest distance of the second link from the joint, for
+            the joints between the two.
+        """
+        g = self.arm.model.geometry
+        # Of the origins of the joints' frames, and of the flange, along the arm.
+        along = np.append(0.0, np.cumsum(np.hypot(g.a, g.d)))
+        ends = [(body.link, axis, s) for body in bodies for axis, s in (body.start, body.end)]
+        ends += [(Link.TOOL, 6, hypot(*self._tcp)), (Link.TOOL, 6, 0.0)]
+        reach = np.zeros((6, len(self.pairs)))
+        for k, (first, second) in enumerate(self.pairs):
+            for joint in range(first, min(second, 6)):
+                reach[joint, k] = _REACH_SLACK + max(
+                    along[axis] - along[joint] + abs(s) for link, axis, s in ends if link == second
+                )
+        return reach
 
     def heights(self, q: Floats, normals: Floats) -> Floats:
         """
@@ -378,21 +426,21 @@ def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
 
 
 @cache
-def _pair_indices(
+def _comparisons(
     links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Return first and second body of each comparison, and the first index per pair of links."""
+    """Return first and second body of each comparison, and the number of its pair of links."""
     first: list[int] = []
     second: list[int] = []
-    begins: list[int] = []
-    for a, b in pairs:
-        begins.append(len(first))
+    numbers: list[int] = []
+    for number, (a, b) in enumerate(pairs):
         for i, of in enumerate(links):
             same = [j for j, other in enumerate(links) if of == a and other == b]
             first += [i] * len(same)
             second += same
+            numbers += [number] * len(same)
     return (
         np.array(first, dtype=np.intp),
         np.array(second, dtype=np.intp),
-        np.array(begins, dtype=np.intp),
+        np.array(numbers, dtype=np.intp),
     )

@@ -231,7 +231,7 @@ class _SelfCollisionChecker:
         :param pending: the columns that need exact distances; the others only need to be known as
             below the bound (then they are 0), which is faster.
         """
-        lower = self._bodies.distances(q)
+        lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         if self._meshes is None:
             return lower, lower
         distances = lower.copy()
