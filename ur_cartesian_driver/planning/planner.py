@@ -59,7 +59,6 @@ from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
     segment_lines,
     stop_remarks,
-    tightest_remark,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
@@ -201,7 +200,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         *blend_remarks(goal, geometries, timings),
         *lines,
         *stop_remarks(geometries),
-        tightest_remark(geometries),
+        geometries.tightest_margins.remark,
     ]
     return planner.plan(goal, segments, reference, remarks)
 

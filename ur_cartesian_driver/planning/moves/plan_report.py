@@ -7,8 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import degrees
 
-import numpy as np
-
 from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE, Goal, SegmentType
 from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import LateLines
@@ -61,13 +59,6 @@ def _lines(
         parts.append(timings.requests.source(row))
         lines.append(f'{", ".join(parts)}; margin {margin}')
     return lines
-
-
-def tightest_remark(geometries: SegmentGeometries) -> str:
-    """Return the remark about the tightest margin of the goal."""
-    margins = geometries.tightest_margins
-    row = int(np.argmin(margins.normalized))
-    return f'tightest margin: {margins[row]} of the segment to point {geometries.begin + row}'
 
 
 def stop_remarks(geometries: SegmentGeometries) -> list[str]:

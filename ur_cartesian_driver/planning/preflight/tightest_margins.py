@@ -66,28 +66,12 @@ _QUANTITIES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class TightestMargin:
-    """The smallest distance of a segment from a singularity or a joint limit."""
-
-    name: str
-    unit: str
-    value: float
-    fraction: float
-    #: The value as a fraction of the scale of its quantity.
-    normalized: float
-
-    def __str__(self) -> str:
-        """Return the words of the report."""
-        return f'{self.value:.3g} {self.unit} to {self.name} at {100.0 * self.fraction:.0f} %'
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class TightestMargins(Rows[TightestMargin]):
-    """The tightest margins of segments."""
+class TightestMargins(Rows[str]):
+    """The smallest distances of segments from singularities and joint limits, in words."""
 
-    #: (n,) each: the segment; the number of the singularity, or 3 + that of the joint; the other
-    #: columns are those of :class:`TightestMargin`.
+    #: (n,) each: the segment; the number of the singularity, or 3 + that of the joint; the
+    #: distance; the fraction of the segment; the distance as a fraction of its scale.
     segments: NDArray[np.int32]
     kinds: NDArray[np.intp]
     values: Floats
@@ -97,10 +81,17 @@ class TightestMargins(Rows[TightestMargin]):
     def __len__(self) -> int:
         return len(self.segments)
 
-    def __iter__(self) -> Iterator[TightestMargin]:
-        columns = (self.kinds, self.values, self.fractions, self.normalized)
-        for kind, *numbers in zip(*(column.tolist() for column in columns), strict=True):
-            yield TightestMargin(*_QUANTITIES[kind], *numbers)
+    def __iter__(self) -> Iterator[str]:
+        columns = (self.kinds, self.values, self.fractions)
+        for kind, value, fraction in zip(*(column.tolist() for column in columns), strict=True):
+            name, unit = _QUANTITIES[kind]
+            yield f'{value:.3g} {unit} to {name} at {100.0 * fraction:.0f} %'
+
+    @property
+    def remark(self) -> str:
+        """The remark on the tightest of all."""
+        row = int(np.argmin(self.normalized))
+        return f'tightest margin: {self[row]} of the segment to point {self.segments[row]}'
 
 
 def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:

@@ -334,12 +334,10 @@ def _reference(path: SplinePath) -> ReferencePath:
 def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]:
     """Return the remarks on the precision and on the tightest margin."""
     kind = 'quintic' if polynomials.quintic else 'cubic'
-    margins = path.tightest_margins
-    row = int(np.argmin(margins.normalized))
     return (
         f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
         f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
-        f'tightest margin: {margins[row]} of the segment to point {path.first + row}',
+        path.tightest_margins.remark,
     )
 
 
