@@ -35,48 +35,36 @@ def run(quick: bool) -> Iterator[Figure]:
         for corner, arm in product(corners, arms):
             if points > 10_000 and not corners[corner]:
                 continue
-            goal = paths.goal(points, corners[corner])
-            state = paths.at_home(arms[arm])
-            taken = [
-                1e3
-                * seconds(
-                    partial(plan, goal, state, arms[arm], PlanningOptions(self_collision=choice)),
-                    repeat=5 if points <= 10_000 else 1,
-                )
-                for choice in ('off', 'auto')
-            ]
-            name = f'{points:,} points 5 mm apart, {corner}, {arm}'
-            yield Figure(
-                benchmark='planning',
-                name=name,
-                value=taken[0],
-                unit='ms',
-                note=f'{1e3 * taken[0] / points:.0f} us a point, no collisions',
-            )
-            yield Figure(
-                benchmark='planning',
-                name=f'{name}, collisions',
-                value=taken[1],
-                unit='ms',
-                baseline=taken[0],
-                than='without',
+            yield from _figures(
+                f'{points:,} points 5 mm apart, {corner}, {arm}',
+                paths.goal(points, corners[corner]),
+                arms[arm],
+                repeat=5 if points <= 10_000 else 1,
             )
         for arm in arms if points <= 10_000 else ():
-            yield _spline(points, arm, arms[arm])
+            goal = _timed(paths.goal(points))
+            yield from _figures(f'{points:,} timed points with twists, {arm}', goal, arms[arm])
 
 
-def _spline(points: int, name: str, arm: Arm) -> Figure:
-    """Plan the same points with times and twists, from Cartesian curve to joint pieces."""
-    goal, state = _timed(paths.goal(points)), paths.at_home(arm)
-    options = PlanningOptions(self_collision='off')
-    taken = 1e3 * seconds(partial(plan, goal, state, arm, options), repeat=5)
-    pieces = len(plan(goal, state, arm, options).segments)
-    return Figure(
+def _figures(name: str, goal: Goal, arm: Arm, repeat: int = 5) -> Iterator[Figure]:
+    """Plan a goal without the collision check, and with it."""
+    state = paths.at_home(arm)
+    alone, with_check = (
+        1e3
+        * seconds(
+            partial(plan, goal, state, arm, PlanningOptions(self_collision=choice)), repeat=repeat
+        )
+        for choice in ('off', 'auto')
+    )
+    note = f'{1e3 * alone / len(goal.waypoints):.0f} us a point, no collisions'
+    yield Figure(benchmark='planning', name=name, value=alone, unit='ms', note=note)
+    yield Figure(
         benchmark='planning',
-        name=f'{points:,} timed points with twists, {name}',
-        value=taken,
+        name=f'{name}, collisions',
+        value=with_check,
         unit='ms',
-        note=f'{1e3 * taken / points:.0f} us a point, {pieces:,} spline pieces',
+        baseline=alone,
+        than='without',
     )
 
 

@@ -189,6 +189,8 @@ class _InitialViolations:
         :param distances: those that count.
         """
         near = distances < self._bounds
+        if not (near.any() or self.pending.any()):
+            return near
         free = np.logical_or.accumulate(np.vstack([~self.pending, ~near]))
         self._lower, of_capsules = _is_receding(lower, self._lower)
         self._reached, exact = _is_receding(distances, self._reached)
