@@ -52,9 +52,8 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import subtract6, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
-from ur_cartesian_driver.planning.geometry.samples import PathSamples
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
-from ur_cartesian_driver.planning.moves.path_margins import BlendSamples
+from ur_cartesian_driver.planning.moves.path_margins import BlendSamples, PathSamples
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
     segment_lines,
@@ -310,8 +309,7 @@ class GoalPlanner:
         geometries = joint_paths.geometries(
             first, self.state.actual_tcp_pose, self.state.actual_q, times
         )
-        self.samples = joint_paths.path_margins.samples()
-        self.blend_samples = joint_paths.path_margins.blend_samples
+        self.samples, self.blend_samples = joint_paths.margins.samples, joint_paths.blend_samples
         return geometries
 
     def plan(
@@ -512,7 +510,9 @@ class GoalPlanner:
         """
         assert isinstance(arc, ArcCurve)
         location = segment_field(point, 'via')
-        passing = self.samples.joints_at(point, arc.u_via)
+        first, last = np.searchsorted(self.samples.segment, (point, point + 1))
+        row = int(first + np.argmin(np.abs(self.samples.fraction[first:last] - arc.u_via)))
+        passing = vector6(self.samples.q[row].tolist())
         # The orientation of the via does not shape the arc: continue from the arc to its pose.
         q = self.kinematics.nearest(via, passing, location)
         named = named_joints(posture, self.options.tf_prefix)

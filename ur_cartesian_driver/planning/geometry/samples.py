@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blended_path import (
     BlendedPath,
     CurveSequence,
@@ -67,26 +65,6 @@ def first_least(values: Floats, segments: Ints) -> Integers:
 def last_greatest(values: Floats, segments: Ints) -> Integers:
     """Return the row of the greatest value of each segment; see :func:`first_least`."""
     return len(values) - 1 - first_least(-values[::-1], -segments[::-1])[::-1]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathSamples:
-    """All samples of a goal, in order of time."""
-
-    #: (n,) the index of the waypoint to which the motion leads.
-    segment: Ints
-    #: (n,) the fraction of that segment, (0, 1].
-    fraction: Floats
-    #: (n, 6) joint positions [rad].
-    q: Floats
-    #: (n, 7) the TCP in base.
-    poses: Floats
-
-    def joints_at(self, segment: int, fraction: float) -> Joints:
-        """Return the joint positions at the sample of a segment closest to a fraction."""
-        first, last = np.searchsorted(self.segment, (segment, segment + 1))
-        row = int(first) + int(np.argmin(np.abs(self.fraction[first:last] - fraction)))
-        return vector6(self.q[row].tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

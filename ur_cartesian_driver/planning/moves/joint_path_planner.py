@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.geometry.samples import CurvePieces
-from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
+from ur_cartesian_driver.planning.moves.path_margins import PathMargins
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -93,7 +93,6 @@ class JointPathPlanner:
         """Begin with no segment."""
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
-        self.path_margins = PathMargins(kinematics.arm)
         self._max_path_length = max_path_length(kinematics)
         self._replaces = options.on_posture_change == 'movej'
 
@@ -109,6 +108,7 @@ class JointPathPlanner:
         :raises GoalRefused: the arm cannot go there.
         """
         self._q_start = self._q = q
+        self.margins = PathMargins(self.kinematics.arm, q)
         self._drafts = SegmentDrafts(
             self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
         )
@@ -164,7 +164,7 @@ class JointPathPlanner:
 
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
         """Add what is solved from where the arm is, and move the arm to its end."""
-        self.path_margins.add(SolvedPieces(joint_path, measures, self._q))
+        self.margins.add(joint_path, measures)
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
 
@@ -342,6 +342,7 @@ class JointPathPlanner:
 
     def _geometries(self, times: Floats) -> SegmentGeometries:
         drafts = self._drafts
+        speed_bounds, self.blend_samples = self.margins.speeds()
         geometries = SegmentGeometries(
             begin=drafts.begin,
             kinds=drafts.kinds,
@@ -350,8 +351,8 @@ class JointPathPlanner:
             path=self._path,
             joints=drafts.joints,
             times=times,
-            speed_bounds=self.path_margins.joint_speed_bounds(),
-            tightest_margins=self.path_margins.tightest_margins(),
+            speed_bounds=speed_bounds,
+            tightest_margins=self.margins.tightest_margins(),
         )
         for row in rows_where(self._has_no_motion()):
             if drafts.begin + row > 0:

@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Path samples of a goal; per segment the joint speed bound and the tightest margin."""
+"""The samples of a goal; of each segment the joint speed bounds and the tightest margin."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +14,12 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.samples import (
     group_begins,
     Ints,
     joined,
     last_greatest,
-    PathSamples,
 )
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
@@ -58,119 +59,105 @@ class BlendSamples:
     tool_distance: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class SolvedPieces:
-    """The samples on consecutive pieces that the arm can follow."""
+class PathSamples(NamedTuple):
+    """Samples that the arm can follow, in order of time; columns (n,)."""
 
-    joint_path: JointPath
-    #: (n, 3) distances from singularities, inf where they do not count.
+    segment: Ints
+    fraction: Floats
+    #: (n, 6) [rad], (n, 7), and (n, 3) distances from singularities, inf where they do not count.
+    q: Floats
+    poses: Floats
     measures: Floats
-    #: The configuration before the first sample [rad].
-    q_start: Joints
+    #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
+    waypoint: Ints
+    is_blend: Flags
+    #: The parameter on the curve, and its change from the sample before.
+    t: Floats
+    step: Floats
+
+    @classmethod
+    def of(cls, path: JointPath, measures: Floats) -> PathSamples:
+        """Return the samples of a joint path."""
+        pieces, piece, t = path.pieces, path.piece, path.t
+        is_first = np.diff(piece, prepend=-1) != 0
+        before = np.where(is_first, pieces.begin[piece], np.append(0.0, t[:-1]))
+        index, is_blend = pieces.index[piece], pieces.is_blend[piece]
+        return cls(
+            path.segments,
+            path.fractions,
+            path.q,
+            path.poses,
+            measures,
+            index,
+            is_blend,
+            t,
+            t - before,
+        )
 
 
 class PathMargins:
-    """Collects the samples of a goal in order of time."""
+    """
+    Collects the samples of a goal in order of time.
 
-    def __init__(self, arm: Arm) -> None:
+    :param q_start: the configuration before the first sample [rad].
+    """
+
+    def __init__(self, arm: Arm, q_start: Joints) -> None:
         """Begin without samples."""
-        self._arm = arm
-        self._solved: list[SolvedPieces] = []
-        #: The samples in blends; set by :meth:`joint_speed_bounds`.
-        self.blend_samples: BlendSamples
+        self._arm, self._q_start = arm, q_start
+        self._parts: list[PathSamples] = []
 
-    def add(self, solved: SolvedPieces) -> None:
-        """Add the next pieces."""
-        self._solved.append(solved)
+    def add(self, joint_path: JointPath, measures: Floats) -> None:
+        """
+        Add the next samples.
 
+        :param measures: (n, 3) distances from singularities, inf where they do not count.
+        """
+        self._parts.append(PathSamples.of(joint_path, measures))
+
+    @cached_property
     def samples(self) -> PathSamples:
-        """Return all samples."""
-        paths = [solved.joint_path for solved in self._solved]
-        return PathSamples(
-            segment=joined([path.segments for path in paths]),
-            fraction=joined([path.fractions for path in paths]),
-            q=joined([path.q for path in paths]),
-            poses=joined([path.poses for path in paths]),
-        )
+        """All samples."""
+        return PathSamples(*map(joined, zip(*self._parts, strict=True)))
 
     def tightest_margins(self) -> TightestMargins:
         """Return the tightest margin of each segment."""
-        samples = self.samples()
-        measures = joined([solved.measures for solved in self._solved])
-        return tightest_margins(self._arm, samples.q, measures, samples.segment, samples.fraction)
+        of = self.samples
+        return tightest_margins(self._arm, of.q, of.measures, of.segment, of.fraction)
 
-    def joint_speed_bounds(self) -> JointSpeedBounds:
-        """Return the time that the joints need for each whole segment."""
-        limits = np.array(self._arm.model.max_joint_speed)
-        blends, parts = zip(
-            *(_speed_samples(solved, limits) for solved in self._solved), strict=True
+    def speeds(self) -> tuple[JointSpeedBounds, BlendSamples]:
+        """Return what bounds the speeds of whole segments, and those in blends."""
+        of = self.samples
+        change = np.abs(np.diff(of.q, axis=0, prepend=np.array([self._q_start])))
+        joint_times = change / np.array(self._arm.model.max_joint_speed)
+        joint = np.argmax(joint_times, axis=1)
+        joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
+        moves, step = of.step > _MIN_STEP, np.maximum(of.step, _MIN_STEP)
+        rate = np.where(moves, joint_time / step, 0.0)
+        local_time = np.where(moves, rate, np.inf)
+        distance = np.linalg.norm(np.diff(of.poses[:, :3], axis=0), axis=1)
+        on_blend = np.flatnonzero(of.is_blend)
+        blend_samples = BlendSamples(
+            index=of.waypoint[on_blend],
+            s=(of.t - 0.5 * of.step)[on_blend],
+            joint_time=rate[on_blend],
+            joint=joint[on_blend],
+            tool_distance=(np.append(0.0, distance) / step)[on_blend],
         )
-        self.blend_samples = BlendSamples(
-            **{
-                field.name: joined([getattr(found, field.name) for found in blends])
-                for field in fields(BlendSamples)
-            }
-        )
-        segment, time, joint, fraction, joint_time, local_time = (
-            joined(column) for column in zip(*parts, strict=True)
-        )
-        order = np.argsort(segment, kind='stable')  # a few sorted runs
-        last = order[last_greatest(time[order], segment[order])]
-        shortest_time = np.minimum.reduceat(local_time[order], group_begins(segment[order]))
-        return JointSpeedBounds(
-            times=time[last],
+        # A sample in a blend counts for both segments. Joints may reverse there.
+        joint_time[on_blend] *= 0.5
+        local_time[on_blend], rate[on_blend] = np.inf, 0.0
+        rows = np.concatenate([np.arange(len(rate)), on_blend])
+        segment = np.concatenate([of.waypoint, of.waypoint[on_blend] + 1])
+        order = np.argsort(segment, kind='stable')  # two sorted runs
+        rows, segment = rows[order], segment[order]
+        last = rows[at := last_greatest(rate[rows], segment)]
+        shortest = np.minimum.reduceat(local_time[rows], group_begins(segment))
+        bounds = JointSpeedBounds(
+            times=rate[last],
             joints=joint[last],
-            fractions=fraction[last],
-            shortest_times=np.minimum(shortest_time, time[last]),
-            times_at_limits=np.bincount(segment, joint_time)[segment[last]],
+            fractions=of.fraction[last],
+            shortest_times=np.minimum(shortest, rate[last]),
+            times_at_limits=np.bincount(segment, joint_time[rows])[segment[at]],
         )
-
-
-class _SpeedSamples(NamedTuple):
-    """What samples say about their segments, each (n,); a sample in a blend counts for two."""
-
-    segment: Ints
-    #: Time of the whole segment at the rate there [s], 0 in blends; the joint that takes longest.
-    time: Floats
-    joint: NDArray[np.intp]
-    fraction: Floats
-    #: Time since the sample before [s]; half of it where the sample counts for two segments.
-    joint_time: Floats
-    #: The same as ``time``, but inf in blends, where joints may reverse.
-    local_time: Floats
-
-
-def _speed_samples(solved: SolvedPieces, limits: Floats) -> tuple[BlendSamples, _SpeedSamples]:
-    """Return the samples in blends, and how fast a segment may be at each sample."""
-    joint_path, pieces = solved.joint_path, solved.joint_path.pieces
-    begin = pieces.begin[joint_path.piece]
-    before = np.concatenate([[0.0], joint_path.t[:-1]])
-    is_first = np.diff(joint_path.piece, prepend=-1) != 0
-    step = joint_path.t - np.where(is_first, begin, before)
-    change = np.abs(np.diff(joint_path.q, axis=0, prepend=np.array([solved.q_start])))
-    joint_times = change / limits
-    joint = np.argmax(joint_times, axis=1)
-    joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
-    rate = np.where(step > _MIN_STEP, joint_time / np.maximum(step, _MIN_STEP), 0.0)
-    local_time = np.where(step > _MIN_STEP, rate, np.inf)
-    index = pieces.index[joint_path.piece]
-    on_blend = np.flatnonzero(pieces.is_blend[joint_path.piece])
-    places = joint_path.poses[:, :3]
-    distance = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1)
-    blend_samples = BlendSamples(
-        index=index[on_blend],
-        s=(joint_path.t - 0.5 * step)[on_blend],
-        joint_time=rate[on_blend],
-        joint=joint[on_blend],
-        tool_distance=(distance / np.maximum(step, _MIN_STEP))[on_blend],
-    )
-    joint_time[on_blend] *= 0.5
-    local_time[on_blend], rate[on_blend] = np.inf, 0.0
-    return blend_samples, _SpeedSamples(
-        np.concatenate([index, index[on_blend] + 1]),
-        np.concatenate([rate, rate[on_blend]]),
-        *(
-            np.concatenate([column, column[on_blend]])
-            for column in (joint, joint_path.fractions, joint_time, local_time)
-        ),
-    )
+        return bounds, blend_samples
