@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf
 from typing import TypeAlias
 
@@ -77,7 +78,7 @@ class Clearance:
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
         """Prepare bodies and planes, and load the meshes if they are needed."""
-        bodies = CollisionBodies(arm, T_flange_tcp, options.tool_radius)
+        bodies = _bodies(arm, T_flange_tcp, options.tool_radius)
         self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
         if options.self_collision != 'off':
             self._checkers.append(_SelfCollisionChecker(bodies, options))
@@ -116,6 +117,12 @@ class Clearance:
         return ClearanceResult(
             violation=violation, warning=warning, margin=margin, description=description
         )
+
+
+@lru_cache(maxsize=8)
+def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies:
+    """Return the bodies of an arm, which is planned for again and again."""
+    return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
 def clearance_remarks(
