@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import cache
 
 from ur_cartesian_driver.driver.appender import Appender, AppendResult
 from ur_cartesian_driver.driver.callbacks import run_callback
@@ -24,11 +25,15 @@ class MotionHandle:
     """A running motion; it always ends with an outcome, whatever happens to the robot."""
 
     def __init__(
-        self, number: int, outcome: Future[Outcome], send: Callable[[Request], None]
+        self,
+        number: int,
+        outcome: Future[Outcome],
+        send: Callable[[Request], None],
+        make_report: Callable[[], object],
     ) -> None:
         """Wrap a motion; :meth:`~.api.Driver.start` returns handles."""
         self.number = number
-        self._outcome, self._send = outcome, send
+        self._outcome, self._send, self._make_report = outcome, send, make_report
         #: Appends points; None = the goal was sent without keep_open. Set by the driver.
         self.appender: Appender | None = None
         #: The newest report, None before the first.
@@ -86,6 +91,8 @@ class MotionHandle:
 
         :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
         """
+        if timeout is None:
+            self._make_report()  # while the arm moves
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
@@ -110,9 +117,10 @@ class ActiveMotion:
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress = on_progress
-        self._plan_report = plan.report
+        #: The plan's report, made when it is first wanted: that takes longer than to send a plan.
+        self._plan_report = cache(lambda: plan.report)
         #: What the owner holds.
-        self.motion = MotionHandle(number, self._outcome, send)
+        self.motion = MotionHandle(number, self._outcome, send, self._plan_report)
         #: The TCP that the robot has as long as this motion runs.
         self.temporary_tcp = (
             None
@@ -134,5 +142,5 @@ class ActiveMotion:
             self.motion.appender.end()
         if not self._outcome.done():
             self._outcome.set_result(
-                replace(outcome, report=(*self._plan_report, *outcome.report))
+                replace(outcome, report=(*self._plan_report(), *outcome.report))
             )
