@@ -38,6 +38,8 @@ from ur_cartesian_driver.planning.geometry.curves import (
 Integers = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
+# Rows per block, so that the intermediate arrays stay in the CPU cache.
+_BLOCK = 8192
 # Chords that measure the length of a blend without a formula.
 _CHORDS = 16
 
@@ -223,6 +225,13 @@ class BlendedPath:
 
     def rows(self, number: Integers, t: Floats) -> Floats:
         """See :class:`CurveSequence`."""
+        rows = np.empty((len(t), 7))
+        for begin in range(0, len(t), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            rows[block] = self._rows(number[block], t[block])
+        return rows
+
+    def _rows(self, number: Integers, t: Floats) -> Floats:
         row, on_blend = number // 2, number % 2 == 1
         if not on_blend.any():
             return self.curves.rows(row, t)

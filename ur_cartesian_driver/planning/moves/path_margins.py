@@ -128,8 +128,9 @@ class PathMargins:
     def speeds(self) -> tuple[JointSpeedBounds, BlendSamples]:
         """Return what bounds the speeds of whole segments, and those in blends."""
         of = self.samples
-        change = np.abs(np.diff(of.q, axis=0, prepend=np.array([self._q_start])))
-        joint_times = change / np.array(self._arm.model.max_joint_speed)
+        joint_times = np.diff(of.q, axis=0, prepend=np.array([self._q_start]))
+        np.abs(joint_times, out=joint_times)  # in place: long goals have many samples
+        joint_times /= self._arm.model.max_joint_speed
         joint = np.argmax(joint_times, axis=1)
         joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
         moves, step = of.step > _MIN_STEP, np.maximum(of.step, _MIN_STEP)
