@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache
+import threading
 
 from ur_cartesian_driver.driver.appender import Appender, AppendResult
 from ur_cartesian_driver.driver.callbacks import run_callback
@@ -117,10 +117,12 @@ class ActiveMotion:
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress = on_progress
-        #: The plan's report, made when it is first wanted: that takes longer than to send a plan.
-        self._plan_report = cache(lambda: plan.report)
+        #: Guards the plan, which a motion lets go of when its report is made, and the report.
+        self._report_lock = threading.Lock()
+        self._plan: Plan | None = plan
+        self._plan_report: tuple[str, ...] = ()
         #: What the owner holds.
-        self.motion = MotionHandle(number, self._outcome, send, self._plan_report)
+        self.motion = MotionHandle(number, self._outcome, send, self.plan_report)
         #: The TCP that the robot has as long as this motion runs.
         self.temporary_tcp = (
             None
@@ -129,6 +131,13 @@ class ActiveMotion:
                 T_flange_original=plan.T_flange_active, T_flange_temporary=plan.T_flange_tcp
             )
         )
+
+    def plan_report(self) -> tuple[str, ...]:
+        """Return the report of the plan, made now: that takes longer than to send the plan."""
+        with self._report_lock:
+            if self._plan is not None:
+                self._plan_report, self._plan = self._plan.report, None
+            return self._plan_report
 
     def report(self, progress: Progress) -> None:
         """Take a report of the robot loop."""
@@ -142,5 +151,5 @@ class ActiveMotion:
             self.motion.appender.end()
         if not self._outcome.done():
             self._outcome.set_result(
-                replace(outcome, report=(*self._plan_report(), *outcome.report))
+                replace(outcome, report=(*self.plan_report(), *outcome.report))
             )
