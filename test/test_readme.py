@@ -130,28 +130,28 @@ def test_send_goal_is_the_goal_of_the_square_example(send_goal):
 
 
 def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
-    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
     from ur_cartesian_driver.motion.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
     from ur_cartesian_driver.sim import HOME
 
     arm = Arm(robot_model('ur5e'))
     goal = goal_from_message(load_goal(send_goal[5]), Frames(), now=0)
-    found = plan(goal, stationary_state(arm, HOME), arm, PlanningOptions())
+    found = plan(goal, state_at_rest(arm, HOME), arm, PlanningOptions())
     assert found.duration == pytest.approx(10.0)
     assert [segment.length for segment in found.segments] == pytest.approx([0.2] * 4)
 
 
 def test_plain_goal_passes_planning_from_home():
-    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
     from ur_cartesian_driver.motion.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
     from ur_cartesian_driver.sim import HOME
@@ -159,19 +159,19 @@ def test_plain_goal_passes_planning_from_home():
     (body,) = blocks(CHECKOUT / 'doc' / 'goals.md', 'yaml')
     arm = Arm(robot_model('ur5e'))
     goal = goal_from_message(load_goal(body), Frames(), now=0)
-    assert plan(goal, stationary_state(arm, HOME), arm, PlanningOptions()).duration == 2.0
+    assert plan(goal, state_at_rest(arm, HOME), arm, PlanningOptions()).duration == 2.0
 
 
 def test_the_output_of_where_is_a_point_of_a_goal():
     from ur_cartesian_driver.cli.commands import point_as_yaml
-    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.sim import HOME
 
     arm = Arm(robot_model('ur5e'))
-    printed = point_as_yaml(stationary_state(arm, HOME)).replace('-0.000000', '0.000000')
+    printed = point_as_yaml(state_at_rest(arm, HOME)).replace('-0.000000', '0.000000')
     goal = load_goal(f'trajectory:\n  points:\n{indent(printed, "    ")}')
     position = goal.trajectory.points[0].pose.position
     assert (position.x, position.y, position.z) == pytest.approx(

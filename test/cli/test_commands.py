@@ -14,9 +14,9 @@ import yaml
 
 from ur_cartesian_driver.cli import feedback_plot, main
 from ur_cartesian_driver.cli.commands import goal_file
-from ur_cartesian_driver.cli.validate_command import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros.client import load_goal
 
 EXAMPLES = ['postures', 'seam', 'square']
@@ -144,7 +144,7 @@ def test_where_nobody_is_says_so(capsys, closed_port):
 
 def test_an_arm_that_is_said_to_stand_somewhere_stands_there():
     arm = Arm(robot_model('ur10e'))
-    state = stationary_state(arm, HOME)
+    state = state_at_rest(arm, HOME)
     assert state.actual_q == HOME
     assert state.actual_tcp_pose == arm.forward(HOME)
 

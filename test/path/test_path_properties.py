@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.cli.validate_command import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
@@ -32,13 +31,14 @@ from ur_cartesian_driver.path import (
     tool_digital,
 )
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 PATHS = int(os.environ.get('PATHS', '500'))
 few = settings(max_examples=PATHS // 5, deadline=None, suppress_health_check=list(HealthCheck))
 
 ARM = Arm(robot_model('ur5e'))
-STATE = stationary_state(ARM, HOME)
+STATE = state_at_rest(ARM, HOME)
 HERE = STATE.actual_tcp_pose
 OUTPUTS = (
     digital(2),

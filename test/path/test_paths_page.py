@@ -7,7 +7,6 @@ import re
 
 import pytest
 
-from ur_cartesian_driver.cli.validate_command import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -15,6 +14,7 @@ from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.ros import client
 from ur_cartesian_driver.sim.simulator_config import HOME
 
@@ -23,7 +23,7 @@ PAGE = CHECKOUT / 'doc' / 'paths.md'
 pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
 
 ARM = Arm(robot_model('ur5e'))
-STATE = stationary_state(ARM, HOME)
+STATE = state_at_rest(ARM, HOME)
 FRAMES = Frames(
     static_frames=[
         StaticFrame('part', 'base', Pose((0.02, -0.01, 0.0))),

@@ -20,7 +20,6 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.sim import SimulatorConfig
 
@@ -29,6 +28,7 @@ def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from the given joint positions, and print the plan or the refusal."""
     from ur_cartesian_driver.motion.known_frames import ArmSnapshot
     from ur_cartesian_driver.planning import plan
+    from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.preview import postures, table
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
@@ -37,7 +37,7 @@ def validate(arguments: argparse.Namespace) -> int:
     model = robot_model(arguments.ur_type or settings.driver.ur_type)
     arm = Arm(model, calibration(arguments, model))
     T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
-    state = stationary_state(arm, arguments.joints or SimulatorConfig().q, T_flange_tcp)
+    state = state_at_rest(arm, vector6(arguments.joints or SimulatorConfig().q), T_flange_tcp)
     dialect = settings.driver.dialect
     options = replace(
         settings.planning,
@@ -66,20 +66,6 @@ def validate(arguments: argparse.Namespace) -> int:
         print(postures(found))
     print(*found.report, sep='\n')
     return 0
-
-
-def stationary_state(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
-    """Return the state of an arm at rest."""
-    joints = vector6(q)
-    pose = arm.forward(joints) @ T_flange_tcp
-    return RobotState(
-        timestamp=0.0,
-        actual_q=joints,
-        target_q=joints,
-        actual_tcp_pose=pose,
-        target_tcp_pose=pose,
-        T_flange_tcp=T_flange_tcp,
-    )
 
 
 def _numbers(values: Iterable[float]) -> str:

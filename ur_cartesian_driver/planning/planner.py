@@ -15,10 +15,8 @@ path and report. The first reason for a refusal is raised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-import gc
 from math import inf, nan
 from pkgutil import resolve_name
 from typing import TypeAlias
@@ -50,7 +48,7 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import subtract6, vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.path_margins import BlendSamples, PathSamples
@@ -98,11 +96,10 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
     SplineState,
     stretch_times,
 )
+from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
 #: How far a CB3 arm may stand beside its target: 0.2 to 0.4 mrad were recorded of a UR10 [m].
 CB3_STATIC_ERROR = 3e-4
-#: How far friction may leave a joint beside its set-point [rad]: 0.2 to 0.4 mrad were recorded.
-MAX_STATIC_ERROR = 0.005
 #: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration shifts
 #: it by some millimetres; another model or another TCP shifts it much more.
 MAX_MISMATCH_POSITION = 0.015
@@ -137,35 +134,9 @@ def plan(
     :param running: the motion to the first point as it was planned, where it has been sent.
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
-    with _garbage_collection_paused():
-        return _plan(goal, at_set_point(state, arm), arm, options, running)
-
-
-def at_set_point(state: RobotState, arm: Arm) -> RobotState:
-    """
-    Return the state of an arm that stands exactly where its controller wants it to.
-
-    The controller's moves begin at its set-point, and friction leaves the arm 0.2 to 0.4 mrad
-    beside it (recordings of real arms). An arm further away was moved by something else; it stays.
-    """
-    q = state.target_q
-    if max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
-        return state
-    # By the change of the pose: an arm whose calibration is unknown is off its model anyway.
-    T_flange_tcp_now = arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose
-    return replace(state, actual_q=q, actual_tcp_pose=arm.forward(q) @ T_flange_tcp_now)
-
-
-def _plan(
-    goal: Goal,
-    state: RobotState,
-    arm: Arm,
-    options: PlanningOptions,
-    running: PlannedSegment | None,
-) -> Plan:
     table = check(goal, options)
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
-    retargeted = retarget_to_tcp(table, state, options)
+    retargeted = retarget_to_tcp(table, at_set_point(state, arm), options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
     return plan_goal(planner)
@@ -524,20 +495,3 @@ class GoalPlanner:
                 'configuration.'
             )
         return chosen
-
-
-@contextmanager
-def _garbage_collection_paused() -> Iterator[None]:
-    """
-    Keep the garbage collector from running.
-
-    A plan of ten thousand points is hundreds of thousands of objects. None of them becomes garbage
-    before the plan is made, but the collector would scan them again and again.
-    """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -53,6 +53,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
     SplineState,
 )
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
 #: Number of points that are planned again with the next ones: the last, which is held back, and
 #: the one whose blend leads into its motion.
@@ -191,7 +192,7 @@ class _PartPlanner:
         # The last but one is under way: the robot goes on from its state in the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
-            plan = plan_goal(goal, self._state_at_rest(q_start), self._arm, self._options, running)
+            plan = plan_goal(goal, self._at_rest(q_start), self._arm, self._options, running)
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), first)) from None
         start_time += _blend_half(plan.segments[0]) - _blend_half(running) if running else 0.0
@@ -333,7 +334,7 @@ class _PartPlanner:
         )
         try:
             table = check(goal, self._options)
-            table = retarget_to_tcp(table, self._state_at_rest(start.q), self._options).goal
+            table = retarget_to_tcp(table, self._at_rest(start.q), self._options).goal
         except GoalRefused as refusal:
             raise refusal.reworded(_renumber_text(str(refusal), before.points)) from None
         points = table.waypoints
@@ -460,18 +461,9 @@ class _PartPlanner:
             ),
         )
 
-    def _state_at_rest(self, q: Joints) -> RobotState:
+    def _at_rest(self, q: Joints) -> RobotState:
         """Return the state of a robot at rest in a configuration of the goal."""
-        T_flange_active = self._before.T_flange_active
-        pose = self._arm.forward(q) @ T_flange_active
-        return RobotState(
-            timestamp=0.0,
-            actual_q=q,
-            target_q=q,
-            actual_tcp_pose=pose,
-            target_tcp_pose=pose,
-            T_flange_tcp=T_flange_active,
-        )
+        return state_at_rest(self._arm, q, self._before.T_flange_active)
 
     def _text(self) -> str:
         """Return the answer, with remarks on fields of appended points that have no effect."""

@@ -119,7 +119,7 @@ class CurvePieces:
 
     def pose(self, k: int, t: float) -> Pose:
         """Return a pose on the curve of a piece."""
-        return pose_from_row(self.rows(np.array([k]), np.array([t]))[0].tolist())
+        return pose_from_row(self.rows(np.array([k]), np.array([t]))[0])
 
     def rows(self, piece: Integers, t: Floats) -> Floats:
         """Return poses (n, 7) on pieces (n,), which must not decrease."""

@@ -231,7 +231,7 @@ class JointPathPlanner:
         """Return the refusal of a line or an arc that misses its posture."""
         point = self._drafts.begin + row
         clause = self.kinematics.explain_missed_posture(
-            pose_from_row(self._path.curves.end[row].tolist()),
+            pose_from_row(self._path.curves.end[row]),
             posture,
             q,
             point,

@@ -101,7 +101,7 @@ class SegmentDrafts:
 
     def target(self, row: int) -> Pose:
         """Return the pose of a waypoint in base."""
-        return pose_from_row(self.targets[row].tolist())
+        return pose_from_row(self.targets[row])
 
     def _find_blends(self) -> None:
         can_blend = np.append(_CAN_BLEND[self.kinds[:-1], self.kinds[1:]], True)
@@ -138,7 +138,7 @@ class SegmentDrafts:
         refusal, end = None, len(self)
         for row in rows_where(self.kinds == SegmentType.CIRCULAR):
             try:
-                arc, remark = self._arc(row, pose_from_row(starts[row].tolist()))
+                arc, remark = self._arc(row, pose_from_row(starts[row]))
             except InvalidGoal as error:
                 refusal, end = error, row
                 break
@@ -150,7 +150,7 @@ class SegmentDrafts:
         curves = CurveRows(starts, self.targets.copy(), arcs)
         is_line = ~self.is_joint_move & curves.is_line
         for row in rows_where((curves.angle > pi - 2.0 * HALF_TURN)[:end] & is_line[:end]):
-            self._check_turn(row, pose_from_row(starts[row].tolist()))
+            self._check_turn(row, pose_from_row(starts[row]))
         if refusal is not None:
             raise refusal
         return curves

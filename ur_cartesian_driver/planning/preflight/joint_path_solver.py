@@ -14,17 +14,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import hypot, pi
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_path
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
@@ -76,21 +77,14 @@ class JointPath:
         object.__setattr__(self, 'fractions', fractions)
 
 
-class _JointPathBuilder:
-    """Collects solved samples in blocks."""
-
-    def __init__(self, pieces: CurvePieces) -> None:
-        self._pieces = pieces
-        #: Piece, parameter, pose and joints.
-        self._blocks: list[tuple[NDArray[np.intp], Floats, Floats, Floats]] = []
-
-    def append(self, samples: PoseSamples, rows: slice, q: Floats) -> None:
-        self._blocks.append((samples.piece[rows], samples.t[rows], samples.poses[rows], q))
-
-    def build(self, refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:
-        none = np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 7)), np.empty((0, 6))
-        piece, t, poses, q = map(joined, zip(*(self._blocks or [none]), strict=True))
-        return JointPath(self._pieces, piece, t, poses, q, refusal, segment)
+#: Samples with their joints: piece, parameter, pose and joint positions.
+_Samples: TypeAlias = tuple[Integers, Floats, Floats, Floats]
+_NO_SAMPLES: _Samples = (
+    np.empty(0, dtype=np.intp),
+    np.empty(0),
+    np.empty((0, 7)),
+    np.empty((0, 6)),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +97,15 @@ class _Refinement:
     #: Parameter at which no configuration follows; the one that would jump there, if any.
     stop: float | None = None
     jump: Joints | None = None
+
+    def samples(self, piece: int) -> _Samples:
+        """Return the samples of a piece."""
+        return (
+            np.full(len(self.t), piece),
+            np.array(self.t),
+            pose_rows(self.poses),
+            np.array(self.q),
+        )
 
 
 def sample_joint_move(
@@ -127,7 +130,13 @@ def solve_joint_path(
     :param samples: those on the pieces; None = evenly along each of them.
     """
     samples = sample_poses(pieces) if samples is None else samples
-    found, q = _JointPathBuilder(pieces), q_start
+    found: list[_Samples] = []
+
+    def joint_path(refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:
+        piece, t, poses, q = map(joined, zip(*(found or [_NO_SAMPLES]), strict=True))
+        return JointPath(pieces, piece, t, poses, q, refusal, segment)
+
+    q = q_start
     row, block = 0, len(samples.t)
     while row < len(samples.t):
         solved, bad = _solve_block(kinematics, samples.poses[row : row + block], q)
@@ -135,7 +144,10 @@ def solve_joint_path(
         for index in (*bad, len(solved)):
             stop = begin + index
             if stop > row:
-                found.append(samples, slice(row, stop), solved[row - begin : index])
+                rows, solved_rows = slice(row, stop), solved[row - begin : index]
+                found.append(
+                    (samples.piece[rows], samples.t[rows], samples.poses[rows], solved_rows)
+                )
                 q, row = vector6(solved[index - 1].tolist()), stop
             if index == len(solved):
                 block *= _GROWTH
@@ -143,15 +155,15 @@ def solve_joint_path(
             refinement = _refine(kinematics, pieces, samples, row, q)
             k = int(samples.piece[row])
             if refinement.q:
-                found.append(_as_samples(k, refinement), slice(None), np.array(refinement.q))
+                found.append(refinement.samples(k))
                 q = refinement.q[-1]
             if refinement.stop is not None:
-                return found.build(*_refusal_at(kinematics, pieces, k, refinement, q))
+                return joint_path(*_refusal_at(kinematics, pieces, k, refinement, q))
             row += 1
             if not np.abs(solved[index] - q).max() < _SAME:  # NaN if there was none
                 block = _FIRST_BLOCK
                 break
-    return found.build()
+    return joint_path()
 
 
 def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
@@ -198,14 +210,6 @@ def _refine(
         found.q.append(q)
         ends.pop()
     return found
-
-
-def _as_samples(piece: int, refinement: _Refinement) -> PoseSamples:
-    return PoseSamples(
-        np.full(len(refinement.t), piece),
-        np.array(refinement.t),
-        np.array([pose.row() for pose in refinement.poses]),
-    )
 
 
 def _refusal_at(

@@ -17,17 +17,12 @@ from math import degrees, isnan
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.goal_table import (
-    GoalTable,
-    rows_where,
-    SegmentRows,
-    WaypointRows,
-)
-from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
-from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose_rows import compose_rows, cross_rows, normalized_rows
+from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import add, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -162,48 +157,27 @@ def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
 
 
 def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
-    return replace(
+    """Return the same motion of the TCP; the orientation of a via does not shape its arc."""
+    points, segments = goal.waypoints, goal.segments
+    poses = points.poses.copy()
+    poses[:, 3:] = normalized_rows(poses[:, 3:])
+    moved = compose_rows(poses, T_controlled_tcp)
+    offsets = moved[:, :3] - poses[:, :3]
+    twists, accelerations = (
+        np.concatenate([rates[:, :3], np.nan_to_num(rates[:, 3:])], axis=1)
+        for rates in (points.twists, points.accelerations)
+    )
+    w = twists[:, 3:]
+    swing = cross_rows(w, offsets)
+    twists[:, :3] += swing
+    accelerations[:, :3] += cross_rows(accelerations[:, 3:], offsets) + cross_rows(w, swing)
+    goal = replace(
         goal,
-        waypoints=WaypointRows.of(
-            [_retarget_waypoint(point, T_controlled_tcp) for point in goal.waypoints]
-        ),
-        segments=SegmentRows.of(
-            [
-                _retarget_segment(segment, point, T_controlled_tcp)
-                for segment, point in zip(goal.segments, goal.waypoints, strict=True)
-            ]
-            if goal.segments
-            else ()
-        ),
+        waypoints=replace(points, poses=moved, twists=twists, accelerations=accelerations),
     )
-
-
-def _retarget_waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
-    pose = Pose(point.pose.position, normalize(point.pose.quaternion))
-    offset = rotate(pose.quaternion, T_controlled_tcp.position)
-    twist, acceleration = (
-        _without_angular_nan(point.twist),
-        _without_angular_nan(point.acceleration),
-    )
-    return replace(
-        point,
-        pose=pose @ T_controlled_tcp,
-        twist=twist_at(twist, offset),
-        acceleration=acceleration_at(acceleration, twist, offset),
-    )
-
-
-def _without_angular_nan(rates: Vector6) -> Vector6:
-    """Return rates whose angular NaN are replaced by 0."""
-    x, y, z, *angular = rates
-    a, b, c = (0.0 if isnan(value) else value for value in angular)
-    return (x, y, z, a, b, c)
-
-
-def _retarget_segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segment:
-    """Return the segment to a point; the orientation of a via does not shape its arc."""
-    if segment.via is None:
-        return segment
-    offset = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
-    via = Pose(add(segment.via.position, offset), (segment.via @ T_controlled_tcp).quaternion)
-    return replace(segment, via=via)
+    if not len(segments):
+        return goal
+    vias = compose_rows(segments.vias, T_controlled_tcp)
+    vias[:, :3] = segments.vias[:, :3] + offsets
+    vias = np.where(segments.has_via[:, None], vias, segments.vias)
+    return replace(goal, segments=replace(segments, vias=vias))
