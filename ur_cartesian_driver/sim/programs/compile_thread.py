@@ -11,8 +11,8 @@ done in the event loop, between two cycles.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 import gc
 from queue import SimpleQueue
 import sys
@@ -82,14 +82,42 @@ class CompileThread:
 
     def _run(self) -> None:
         while (job := self._jobs.get()) is not None and not self._closed:
-            interval, collects = sys.getswitchinterval(), gc.isenabled()
-            sys.setswitchinterval(SWITCH_INTERVAL)
-            gc.disable()
-            try:
+            with _interpreter_for_cycles():
                 job()
                 if gc.get_count()[0] > MAX_NEW_OBJECTS:
                     gc.freeze()
-            finally:
-                sys.setswitchinterval(interval)
-                if collects:
-                    gc.enable()
+
+
+class _InterpreterForCycles:
+    """
+    While something compiles: switches between threads in time for a cycle, and collects nothing.
+
+    Simulators in one process may compile at once: the first one to begin changes the interpreter,
+    the last one to end changes it back.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._users = 0
+
+    @contextmanager
+    def __call__(self) -> Iterator[None]:
+        with self._lock:
+            if not self._users:
+                self._before = sys.getswitchinterval(), gc.isenabled()
+                sys.setswitchinterval(SWITCH_INTERVAL)
+                gc.disable()
+            self._users += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._users -= 1
+                if not self._users:
+                    interval, collects = self._before
+                    sys.setswitchinterval(interval)
+                    if collects:
+                        gc.enable()
+
+
+_interpreter_for_cycles = _InterpreterForCycles()
