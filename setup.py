@@ -43,8 +43,8 @@ REQUIRES = [
     'urllib3>=2.0,<3',
 ]
 EXTRAS = {
-    # Checks for self-collision, with the meshes of the robots.
-    'collision': ['pin>=3,<5', 'example-robot-data>=4,<7'],
+    # The meshes of the robots, and self-collision with them.
+    'collision': ['airo-models>=0.0.12,<0.1', 'example-robot-data>=4,<7', 'pin>=3,<5'],
     # Drawings as goals (DXF).
     'import': ['ezdxf>=1.3,<2'],
     # The picture of the path that the demo draws.

@@ -4,7 +4,7 @@
 
 from math import pi
 
-from collision_shapes import capsules, cylinders
+from collision_shapes import capsules
 import numpy as np
 import pytest
 
@@ -102,7 +102,7 @@ def test_the_last_link_ends_in_the_flange_and_the_tool_in_the_tcp(name, rng):
     arm = Arm(MODELS[name])
     bodies = CollisionBodies(arm, TCP, tool_radius=0.02)
     q = random_joints(rng, 4)
-    ends = cylinders(bodies, q)
+    ends = bodies.cylinder_ends(q)
     for row, joints in enumerate(q):
         flange = arm.forward(joints)
         wrist_3 = ends[row, bodies.links.index(Link.WRIST_3)]
@@ -118,14 +118,14 @@ def test_a_calibrated_arm_is_within_millimetres_of_its_model(name, calibrated_ar
     real, nominal = calibrated_arm(name), Arm(MODELS[name])
     assert max(map(abs, real.geometry.d)) > 1.0  # origins far from the arm
     apart = np.abs(
-        cylinders(CollisionBodies(real), q) - cylinders(CollisionBodies(nominal), q)
+        CollisionBodies(real).cylinder_ends(q) - CollisionBodies(nominal).cylinder_ends(q)
     ).max()
     assert 1e-5 < apart < 0.015
 
 
 def test_tubes_join_the_housings_of_their_joints(rng):
     for model in MODELS.values():
-        ends = cylinders(CollisionBodies(Arm(model)), random_joints(rng, 1))[0]
+        ends = CollisionBodies(Arm(model)).cylinder_ends(random_joints(rng, 1))[0]
         links = CollisionBodies(Arm(model)).links
         for link, length in (
             (Link.UPPER_ARM, model.geometry.a[1]),
@@ -141,7 +141,7 @@ def test_tubes_join_the_housings_of_their_joints(rng):
 def test_capsules_contain_their_cylinders(rng):
     bodies = CollisionBodies(Arm(MODELS['ur3']), TCP, tool_radius=0.03)
     q = random_joints(rng, 2)
-    for ends, covers in zip(cylinders(bodies, q), capsules(bodies, q), strict=True):
+    for ends, covers in zip(bodies.cylinder_ends(q), capsules(bodies, q), strict=True):
         for (start, end), radius, cover, thick in zip(
             ends, bodies.radii, covers, bodies.capsule_radii, strict=True
         ):
@@ -238,7 +238,7 @@ def test_the_height_of_a_cylinder_is_that_of_its_lowest_point(rng):
     normal /= np.linalg.norm(normal)
     heights = bodies.heights(q, np.array([normal, -normal]))
     angle = np.linspace(0, 2 * pi, 721)[:, None]
-    for row, ends in enumerate(cylinders(bodies, q)):
+    for row, ends in enumerate(bodies.cylinder_ends(q)):
         for k, (start, end) in enumerate(ends):
             axis = (end - start) / np.linalg.norm(end - start)
             u = np.cross(axis, normal)

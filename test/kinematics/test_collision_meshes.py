@@ -5,7 +5,7 @@
 from math import pi
 import sys
 
-from collision_shapes import capsules, cylinders, T_base_meshes
+from collision_shapes import capsules, T_base_meshes
 import numpy as np
 import pytest
 
@@ -87,7 +87,7 @@ def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pi
 def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
     """All vertices; the base without the plug of its cable, which sticks out of it."""
     bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(1)
-    cylinder_ends, capsule_ends = cylinders(bodies, q)[0], capsules(bodies, q)[0]
+    cylinder_ends, capsule_ends = bodies.cylinder_ends(q)[0], capsules(bodies, q)[0]
     for link, T in enumerate(T_base_meshes(all_meshes[name], q[0])):
         points = np.unique(vertices(all_meshes[name], link), axis=0)
         if link == Link.BASE:

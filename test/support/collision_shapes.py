@@ -11,12 +11,6 @@ from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 Floats = NDArray[np.float64]
 
 
-def cylinders(bodies: CollisionBodies, q: Floats) -> Floats:
-    """Both ends of every cylinder (n, k, 2, 3) in base [m], at joints (n, 6)."""
-    ends: Floats = bodies._ends(bodies.arm.frames_rows(q)).transpose(3, 2, 0, 1)
-    return ends
-
-
 def capsules(bodies: CollisionBodies, q: Floats) -> Floats:
     """The ends (n, k, 2, 3) [m] of the capsules that contain the cylinders."""
     start, vector = bodies._capsules(bodies._ends(bodies.arm.frames_rows(q)))

@@ -311,6 +311,11 @@ class CollisionBodies:
                 result[rows, m] = (low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
         return result
 
+    def cylinder_ends(self, q: Floats) -> Floats:
+        """Return both ends of every cylinder in base [m], (n, k, 2, 3), at joints (n, 6) [rad]."""
+        ends: Floats = self._ends(self.arm.frames_rows(q)).transpose(3, 2, 0, 1)
+        return ends
+
     def _ends(self, frames: ChainFramesOf[Floats]) -> Floats:
         """Return both ends of every cylinder, (2 ends, 3 coordinates, k cylinders, n rows)."""
         origins, axes = np.array(frames.origins), np.array(frames.axes)  # (6, 3, n)

@@ -1,0 +1,290 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The links of an arm as shapes: where their frames are, and a mesh or cylinders for each.
+
+Link frames are those of the robot descriptions for ROS: z is the axis of the joint that moves the
+link, and wrist 3 has the flange's origin and axes. On a calibrated arm each frame stands on the
+joint's real axis, as near as possible to where it is on the nominal arm while all joints are at 0.
+
+The meshes are the manufacturer's. Those of UR3, UR5 and UR10 come from the package
+example-robot-data (BSD), those of UR3e and UR5e (also a UR7e) from the package airo-models (MIT).
+Both are optional; links without a mesh are the cylinders of :mod:`~.collision_bodies`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import atan2, cos, hypot, sin
+import os
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    IDENTITY,
+    multiply,
+    Pose,
+    Quaternion,
+    quaternion_from_rotation_vector,
+    rotate,
+)
+from ur_cartesian_driver.motion.pose_rows import compose_rows, multiply_rows
+from ur_cartesian_driver.motion.vectors import Vector3
+
+Floats: TypeAlias = NDArray[np.float64]
+#: `visual` has tens of thousands of triangles a link, `collision` about a thousand.
+Detail: TypeAlias = Literal['visual', 'collision']
+
+#: The links in the order of the joints that move them; the tool is not one of the arm's.
+ARM_LINKS: tuple[Link, ...] = tuple(link for link in Link if link is not Link.TOOL)
+
+_ZERO = (0.0,) * 6
+_HALF = 0.5**0.5
+# How the meshes are turned in the frames of their links; the same in both packages.
+_TURNS = (
+    (0.0, 0.0, 1.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0),
+    (0.5, -0.5, -0.5, 0.5),
+    (0.5, -0.5, -0.5, 0.5),
+    (_HALF, 0.0, 0.0, _HALF),
+    (0.0, 0.0, 0.0, 1.0),
+    (_HALF, 0.0, 0.0, _HALF),
+)
+_FILES = ('base', 'shoulder', 'upperarm', 'forearm', 'wrist1', 'wrist2', 'wrist3')
+
+
+def _airo_models() -> Iterator[Path]:
+    """Return where airo-models keeps its files; the package itself is not imported."""
+    spec = find_spec('airo_models')
+    if spec is not None and spec.origin is not None:
+        yield Path(spec.origin).parent
+
+
+def _example_robot_data() -> Iterator[Path]:
+    """Return where wheels and ROS installations may keep example-robot-data."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    parents = [Path(prefix) for prefix in prefixes if prefix]
+    spec = find_spec('pinocchio')  # its wheel has the same prefix
+    if spec is not None and spec.origin is not None:
+        parents.extend(Path(spec.origin).parents)
+    for parent in parents:
+        yield parent / 'share' / 'example-robot-data'
+
+
+_PACKAGE_ROOTS = {'airo-models': _airo_models, 'example-robot-data': _example_robot_data}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MeshSource:
+    """Where a package keeps the meshes of one model, and how they stand in their frames."""
+
+    package: str
+    #: Folder of the model inside the package.
+    folder: str
+    #: File name extensions of visual and collision meshes.
+    visual: str
+    collision: str
+    #: Origins of the meshes of upper arm, forearm, wrists 1 to 3 along z of their frames [m].
+    offsets: tuple[float, float, float, float, float]
+
+    def file(self, link: Link, detail: Detail) -> Path:
+        """
+        Return the file with the mesh of a link.
+
+        :raises FileNotFoundError: the package is not installed.
+        """
+        suffix = self.visual if detail == 'visual' else self.collision
+        inside = Path(self.folder, detail, f'{_FILES[link]}.{suffix}')
+        for root in _PACKAGE_ROOTS[self.package]():
+            if (root / inside).is_file():
+                return root / inside
+        raise FileNotFoundError(
+            f'The package {self.package} with the meshes of the arm is not installed; the extra '
+            '`collision` brings it.'
+        )
+
+    def placement(self, link: Link) -> Pose:
+        """Return ``T_link_mesh``."""
+        along = (0.0, 0.0, *self.offsets)[link]
+        return Pose((0.0, 0.0, along), _TURNS[link])
+
+
+def _cb3(name: str, *offsets: float) -> _MeshSource:
+    a, b, c, d, e = offsets
+    return _MeshSource(
+        package='example-robot-data',
+        folder=f'robots/ur_description/meshes/{name}',
+        visual='dae',
+        collision='stl',
+        offsets=(a, b, c, d, e),
+    )
+
+
+def _e_series(name: str, *offsets: float) -> _MeshSource:
+    a, b, c, d, e = offsets
+    return _MeshSource(
+        package='airo-models',
+        folder=f'arms/{name}',
+        visual='obj',
+        collision='obj',
+        offsets=(a, b, c, d, e),
+    )
+
+
+_UR5E = _e_series('ur5e', 0.138, 0.007, -0.127, -0.0997, -0.0989)
+#: The meshes of each model that has any. Offsets: the robot descriptions in these packages.
+_SOURCES: Mapping[str, _MeshSource] = MappingProxyType(
+    {
+        'ur3': _cb3('ur3', 0.1198, 0.0273, -0.08505, -0.08535, -0.0819),
+        'ur5': _cb3('ur5', 0.13585, 0.01615, -0.093, -0.09465, -0.0823),
+        'ur10': _cb3('ur10', 0.220941, 0.049041, -0.1149, -0.1157, -0.0922),
+        'ur3e': _e_series('ur3e', 0.12, 0.027, -0.104, -0.08535, -0.0921),
+        'ur5e': _UR5E,
+        'ur7e': _UR5E,
+    }
+)
+#: Models that have meshes.
+MODELS_WITH_MESHES: tuple[str, ...] = tuple(_SOURCES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkShape:
+    """
+    A mesh, or a cylinder, that moves with a link.
+
+    :param T_link_shape: the frame of the mesh's vertices [m], or the middle of the cylinder, whose
+        axis is z, in the frame of the link.
+    :param mesh: the file; None: a cylinder of this radius and length [m].
+    """
+
+    link: Link
+    T_link_shape: Pose
+    mesh: Path | None = None
+    radius: float = 0.0
+    length: float = 0.0
+
+
+def link_shapes(arm: Arm, detail: Detail = 'visual') -> tuple[LinkShape, ...]:
+    """Return the meshes of an arm, or cylinders if it has none or their package is missing."""
+    try:
+        return link_meshes(arm.model.name, detail)
+    except (ValueError, FileNotFoundError):
+        return link_cylinders(arm)
+
+
+def link_meshes(name: str, detail: Detail) -> tuple[LinkShape, ...]:
+    """
+    Return the meshes of a model, one for each of :data:`ARM_LINKS`.
+
+    :raises ValueError: the model has none.
+    :raises FileNotFoundError: their package is not installed.
+    """
+    if name not in _SOURCES:
+        raise ValueError(f'There are no meshes of a {name}.')
+    source = _SOURCES[name]
+    return tuple(
+        LinkShape(link=link, T_link_shape=source.placement(link), mesh=source.file(link, detail))
+        for link in ARM_LINKS
+    )
+
+
+def link_cylinders(arm: Arm) -> tuple[LinkShape, ...]:
+    """Return the cylinders of an arm, which contain its links."""
+    bodies, frames = CollisionBodies(arm), LinkFrames(arm).at_zero
+    ends = bodies.cylinder_ends(np.zeros((1, 6)))[0]
+    shapes = []
+    for link, radius, (start, end) in zip(bodies.links, bodies.radii, ends, strict=True):
+        vector = end - start
+        length = float(np.linalg.norm(vector))
+        x, y, z = (0.5 * (start + end)).tolist()
+        T_base_shape = Pose((x, y, z), _turn_z_to(*(vector / length).tolist()))
+        shapes.append(
+            LinkShape(
+                link=link,
+                T_link_shape=frames[link].inverse() @ T_base_shape,
+                radius=float(radius),
+                length=length,
+            )
+        )
+    return tuple(shapes)
+
+
+class LinkFrames:
+    """
+    The frames of :data:`ARM_LINKS` on one arm. Immutable.
+
+    :param arm: nominal or calibrated.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        """Place the frames on the axes of the arm."""
+        nominal = _nominal_frames(arm)
+        true = arm.frames(_ZERO)
+        #: ``T_base_link`` of each link while all joints are at 0.
+        self.at_zero: tuple[Pose, ...] = (
+            IDENTITY,
+            *(
+                _on_axis(frame, origin, axis)
+                for frame, origin, axis in zip(nominal[1:], true.origins, true.axes, strict=True)
+            ),
+        )
+        #: Each joint's frame in that of the link before, at 0; it turns about its z.
+        self.joints: tuple[Pose, ...] = tuple(
+            before.inverse() @ after
+            for before, after in zip(self.at_zero[:-1], self.at_zero[1:], strict=True)
+        )
+        #: ``T_wrist3_flange``; the identity on a nominal arm.
+        self.flange: Pose = self.at_zero[-1].inverse() @ arm.forward(_ZERO)
+
+    def poses(self, q: Floats) -> Floats:
+        """
+        Return ``T_base_link`` of every link.
+
+        :param q: (n, 6) [rad].
+        :returns: (n, 7, 7) x y z [m], unit quaternion x y z w; a row for each link.
+        """
+        rows = np.tile(IDENTITY.row(), (len(q), 1))
+        result = [rows]
+        zero = np.zeros(len(q))
+        for T_link_joint, angle in zip(self.joints, q.T, strict=True):
+            rows = compose_rows(rows, T_link_joint)
+            turn = np.stack((zero, zero, np.sin(0.5 * angle), np.cos(0.5 * angle)), axis=1)
+            rows[:, 3:] = multiply_rows(rows[:, 3:], turn)
+            result.append(rows)
+        return np.stack(result, axis=1)
+
+
+def _nominal_frames(arm: Arm) -> list[Pose]:
+    """Return ``T_base_link`` of the nominal arm, all joints at 0: in each DH row, behind d."""
+    g, T, frames = arm.model.geometry, IDENTITY, [IDENTITY]
+    for theta, d, a, alpha in zip(g.theta, g.d, g.a, g.alpha, strict=True):
+        T = T @ Pose((0.0, 0.0, d), (0.0, 0.0, sin(0.5 * theta), cos(0.5 * theta)))
+        frames.append(T)
+        T = T @ Pose((a, 0.0, 0.0), (sin(0.5 * alpha), 0.0, 0.0, cos(0.5 * alpha)))
+    return frames
+
+
+def _on_axis(frame: Pose, origin: Vector3, axis: Vector3) -> Pose:
+    """Return the frame moved and turned by the shortest way so that its z lies on an axis."""
+    a, p = np.array(axis), np.array(frame.position)
+    x, y, z = (np.array(origin) + a * (a @ (p - np.array(origin)))).tolist()
+    turn = _turn_z_to(*rotate(conjugate(frame.quaternion), axis))
+    return Pose((x, y, z), multiply(frame.quaternion, turn))
+
+
+def _turn_z_to(x: float, y: float, z: float) -> Quaternion:
+    """Return the shortest rotation from z to a unit vector."""
+    across = hypot(x, y)
+    if across == 0.0:
+        return (0.0, 0.0, 0.0, 1.0) if z > 0.0 else (1.0, 0.0, 0.0, 0.0)
+    angle = atan2(across, z)
+    return quaternion_from_rotation_vector((-y / across * angle, x / across * angle, 0.0))
