@@ -49,6 +49,8 @@ EXTRAS = {
     'import': ['ezdxf>=1.3,<2'],
     # The picture of the path that the demo draws.
     'plot': ['matplotlib>=3.8,<4'],
+    # The page of a motion.
+    'show': ['trimesh>=4,<6', 'viser>=1.1,<1.2'],
     'test': [
         'hypothesis>=6.100,<7',
         'pytest>=8.2,<10',

@@ -35,6 +35,7 @@ MODULES = (
     RTDE_RATE,
     'planning',
     'import_files',
+    'motion_page',
     'kinematics',
     'kinematics_rows',
     'codecs_rtde',

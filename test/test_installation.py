@@ -109,7 +109,7 @@ def test_the_typing_marker_is_installed():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', ['demo', 'send', 'sim', 'validate', 'where'])
+@pytest.mark.parametrize('name', ['demo', 'send', 'show', 'sim', 'validate', 'where'])
 def test_an_executable_prints_its_help(name):
     done = run([*executable(name), '--help'])
     assert done.returncode == 0, done.stderr

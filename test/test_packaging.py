@@ -21,7 +21,7 @@ needs_checkout = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
 )
 
-EXECUTABLES = ['driver', 'demo', 'send', 'sim', 'validate', 'where']
+EXECUTABLES = ['driver', 'demo', 'send', 'show', 'sim', 'validate', 'where']
 LAUNCH_ARGUMENTS = {
     'driver.launch.py': {
         'ur_type',

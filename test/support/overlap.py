@@ -36,6 +36,7 @@ COMPUTING = (
     'test/importing/',
     'test/path/',
     'test/planning/',
+    'test/preview/',
     'test/program/',
     'test/execution/',
     'test/kinematics/',

@@ -24,8 +24,8 @@ from ur_cartesian_driver.cli import (
     check_robot,
     commands,
     import_command,
+    plan_commands,
     recording_plot,
-    validate_command,
 )
 from ur_cartesian_driver.importing.import_options import (
     CodeOutput,
@@ -93,6 +93,7 @@ def parser() -> argparse.ArgumentParser:
     _add_sim(sub)
     _add_send(sub)
     _add_validate(sub)
+    _add_show(sub)
     _add_import(sub)
     _add_where(sub)
     _add_check_robot(sub)
@@ -286,33 +287,28 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
-    validate = _add(
-        sub,
-        'validate',
-        validate_command.validate,
-        'check and plan a goal without a robot, and print the plan',
-    )
-    _add_goal(validate)
-    validate.add_argument(
+def _add_planning(command: argparse.ArgumentParser) -> None:
+    """Add the goal, and what the driver reads from the robot."""
+    _add_goal(command)
+    command.add_argument(
         '--ur-type',
         choices=sorted(MODELS),
         help='model of the robot; by default the parameter ur_type',
     )
-    validate.add_argument(
+    command.add_argument(
         '--joints',
         type=_joints,
         metavar='Q1,...,Q6',
         help='initial joint positions [rad]; by default home',
     )
-    validate.add_argument(
+    command.add_argument(
         '--tcp',
         type=_tcp,
         metavar='X,Y,Z,RX,RY,RZ',
         help='active TCP in the flange frame, as the pendant shows it [m, rad]; by default the '
         'flange',
     )
-    validate.add_argument(
+    command.add_argument(
         '--params-file',
         type=Path,
         action='append',
@@ -320,7 +316,7 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
         metavar='FILE',
         help='parameter file of the driver, like driver.yaml',
     )
-    validate.add_argument(
+    command.add_argument(
         '-p',
         '--param',
         action='append',
@@ -328,12 +324,35 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
         metavar='NAME:=VALUE',
         help='one parameter of the driver; may be given several times',
     )
+    _add_calibration(command)
+
+
+def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
+    validate = _add(
+        sub,
+        'validate',
+        plan_commands.validate,
+        'check and plan a goal without a robot, and print the plan',
+    )
+    _add_planning(validate)
     validate.add_argument(
         '--postures',
         action='store_true',
         help='print the joint positions at each point',
     )
-    _add_calibration(validate)
+
+
+def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
+    show = _add(
+        sub,
+        'show',
+        plan_commands.show,
+        'plan a goal without a robot, and show the arm on its path in the browser',
+    )
+    _add_planning(show)
+    show.add_argument(
+        '-o', '--output', metavar='PAGE', help='HTML file to write instead of opening a browser'
+    )
 
 
 def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:

@@ -86,6 +86,7 @@ def run(arms: Sequence[DemoArm]) -> int:
         )
         for arm, record in records.items():
             _draw(arm, record)
+            _show(arm, environment)
         return status
 
 
@@ -170,6 +171,14 @@ def _draw(arm: DemoArm, record: Path) -> None:
     if record.is_file() and record.stat().st_size:
         feedback_plot.draw(record, arm.drawing, title=f'{arm.label}{arm.model}: {arm.goal.stem}')
         print(f'picture of planned and executed path: {arm.drawing}')
+
+
+def _show(arm: DemoArm, environment: dict[str, str]) -> None:
+    """Write the page with the arm on its planned path."""
+    options = ('--tf-prefix', arm.tf_prefix, '--ur-type', arm.model)
+    page = str(arm.drawing.with_suffix('.html'))
+    with process('show', str(arm.goal), *options, '-o', page, environment=environment) as running:
+        running.wait()
 
 
 @contextmanager

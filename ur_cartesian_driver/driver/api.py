@@ -82,10 +82,12 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
+from ur_cartesian_driver.preview import ArmPlan
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
 from ur_cartesian_driver.robot.connection_status import (
@@ -264,9 +266,11 @@ class Driver(RobotServices, InteractiveMotions):
 
     # ---- motion -------------------------------------------------------------------------------
 
-    def plan(self, goal: Goal | Path) -> Plan:
+    def plan(self, goal: Goal | Path) -> ArmPlan:
         """
         Check a goal and choose its primitives, starting from :attr:`rest_state`; nothing moves.
+
+        ``plan(goal).show()`` opens a page with the arm on its path.
 
         :param goal: or a path: its frames are resolved now, and the arm has to stand at its start
             unless its first motion is a joint motion.
@@ -275,7 +279,9 @@ class Driver(RobotServices, InteractiveMotions):
         state = self._require(self.rest_state)
         if isinstance(goal, Path):
             goal = self._goal_of(goal, state)
-        return plan(goal, state, self.arm, self._options_for(state))
+        arm = self.arm
+        planned = plan(goal, state, arm, self._options_for(state))
+        return ArmPlan.of(planned, arm, parse_planes(self.options.workspace_planes))
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
         """

@@ -114,6 +114,13 @@ def joint_limit_distances(arm: Arm, q: Floats) -> Floats:
     return distances
 
 
+def normalized_margins(arm: Arm, q: Floats) -> Floats:
+    """Return the smallest distances (n,) of configurations (n, 6), as parts of their scales."""
+    measures = singularity_distance_rows(arm, q) / _SCALES
+    nearest: Floats = np.minimum(measures.min(axis=1), joint_limit_distances(arm, q).min(axis=1))
+    return nearest
+
+
 def first_refusal(
     joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[GoalRefused | None, int]:

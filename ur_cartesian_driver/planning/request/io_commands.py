@@ -10,6 +10,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, SafeOutput
 from ur_cartesian_driver.motion.goal_table import GoalTable
+from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_names import (
     output_fault,
@@ -103,8 +104,8 @@ def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
     return replace(goal, safe_outputs=goal.safe_outputs + added) if added else goal
 
 
-def describe_command(command: IOCommand) -> str:
-    """Return a command in words."""
+def describe_command(command: IOCommand | SwitchOutput) -> str:
+    """Return a command, or the record that carries it out, in words."""
     name = output_name(command.output, command.pin)
     if command.output is OutputKind.STANDARD_ANALOG:
         return f'{name} to {command.value:g} ({command.domain.name.lower()})'

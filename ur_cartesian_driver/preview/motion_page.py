@@ -1,0 +1,414 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One HTML page that shows the arm on its path: it opens in any browser, without a network.
+
+viser draws the scene, plays it over time, and makes the page. The scene is there once for each
+colouring of the path; beside it stand the legend and the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from html import escape
+import io
+import json
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_shapes, LinkFrames
+from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
+from ur_cartesian_driver.planning.request.io_commands import describe_command
+from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
+
+Colours = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+#: Time between two pictures of the arm at least, and how many there are at most [s].
+MIN_PERIOD = 0.04
+MAX_PICTURES = 600
+#: Largest number of points that are numbered.
+MAX_NUMBERED_POINTS = 60
+#: A margin of this fraction or more is drawn as ample; see :func:`normalized_margins`.
+AMPLE_MARGIN = 0.5
+
+_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED = (
+    (176, 184, 194),
+    (90, 100, 110),
+    (50, 60, 70),
+    (20, 140, 60),
+    (200, 120, 0),
+    (120, 170, 220),
+    (210, 30, 30),
+)
+_TYPES: dict[str, tuple[str, Colour]] = {
+    'MoveL': ('line', (30, 110, 220)),
+    'MoveP': ('process', (20, 150, 90)),
+    'MoveC': ('arc', (230, 130, 20)),
+    'MoveJ': ('joint motion', (150, 60, 190)),
+    'OptimoveL': ('optimized line', (0, 160, 190)),
+    'OptimoveJ': ('optimized joint motion', (200, 60, 140)),
+    'Spline': ('spline', (60, 80, 200)),
+}
+#: Where the camera is, where the path says nothing about it.
+_ASIDE = np.array((0.65, 0.65, 0.4))
+_BLEND: Colour = (240, 200, 60)
+_LOW, _MIDDLE, _HIGH = np.array([(205, 40, 40), (235, 190, 40), (40, 150, 70)], dtype=np.float64)
+#: Where a refusal happens: the point, and how far on the path to it.
+_DATA = re.compile(r'window\.__VISER_EMBED_DATA__="([^"]*)";')
+_CONFIG = 'window.__VISER_EMBED_CONFIG__'
+_PLACE = re.compile(r'(?:points|segments)\[(\d+)\]|point (\d+)')
+_FRACTION = re.compile(r'at ([\d.]+) % of its segment')
+
+_STYLE = """
+<style>
+aside { position: fixed; left: 0; top: 0; bottom: 42px; width: 31em; max-width: 45%;
+  box-sizing: border-box; overflow: auto; padding: 1em; background: #ffffffee; z-index: 20;
+  font: 13px/1.4 system-ui, sans-serif; color: #222; }
+aside pre { font: 10px/1.5 ui-monospace, monospace; overflow-x: auto; }
+aside pre + pre { white-space: pre-wrap; }
+aside nav a { margin-right: .8em; }
+aside .refused { color: #c01818; font-weight: 600; }
+aside i { display: inline-block; width: .8em; height: .8em; margin: 0 .4em 0 .8em; }
+</style>
+"""
+#: The scene that the address names is put where viser's page looks for it.
+_CHOICE = """
+<script>
+window.__VISER_EMBED_DATA__ = (SCENES => SCENES[location.hash.slice(1)] || SCENES.type)(%s);
+window.addEventListener('hashchange', () => location.reload());
+</script>
+"""
+
+
+class _Colouring(NamedTuple):
+    """What a colour of the path says: a colour for each edge, and a legend."""
+
+    name: str
+    colours: Colours
+    legend: Sequence[tuple[str, Colour]]
+
+
+def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
+    """
+    Return the page of a plan.
+
+    :param arm: the arm for which it was made.
+    :raises ImportError: viser is not installed; the text says how to get it.
+    """
+    preview = sample(plan, arm, plan.T_flange_active, _period(plan.duration))
+    colourings = (_by_type(plan), _by_speed(plan), _by_margin(plan, arm, preview))
+    pages = {}
+    with _scene(planes) as server:
+        scene = _Scene(server, arm, plan.T_flange_tcp or plan.T_flange_active)
+        scene.add_points(_waypoints(plan))
+        scene.add_outputs(_outputs(plan))
+        for colouring in colourings:
+            scene.add_path(plan.reference.poses[:, :3], colouring.colours)
+            pages[colouring.name] = scene.record(preview.time, preview.joints)
+    texts = ''.join(f'<pre>{escape(text)}</pre>' for text in (table(plan), '\n'.join(plan.report)))
+    return _page(pages, _legends(colourings) + texts)
+
+
+def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pose) -> str:
+    """
+    Return the page of a goal that was refused: its points, and the place in red.
+
+    :param q: where the arm stands [rad].
+    :raises ImportError: viser is not installed; the text says how to get it.
+    """
+    points = [goal.T_base_frame @ waypoint.pose for waypoint in goal.waypoints]
+    path = np.array([pose.position for pose in (arm.forward(q) @ tcp, *points)])
+    with _scene(()) as server:
+        scene = _Scene(server, arm, tcp)
+        grey: Colours = np.full((len(path) - 1, 3), 150, dtype=np.uint8)
+        scene.add_path(path, grey)
+        scene.add_points(enumerate(path[1:]))
+        place = _place(str(refusal), path)
+        if place is not None:
+            scene.add_ball('refused', place, 0.012, _REFUSED)
+        recorded = scene.record(np.zeros(1), np.array([q]))
+    text = f'<p class="refused">Refused: {escape(str(refusal))}</p>'
+    return _page({'type': recorded}, text)
+
+
+def _period(duration: float) -> float:
+    return max(MIN_PERIOD, duration / MAX_PICTURES)
+
+
+def _place(text: str, path: Floats) -> Floats | None:
+    """Return the place that a refusal names; row 0 of the path is the start."""
+    found = _PLACE.search(text)
+    if found is None:
+        return None
+    point = int(found[1] or found[2])
+    if point + 1 >= len(path):
+        return None
+    fraction = _FRACTION.search(text)
+    part = float(fraction[1]) / 100.0 if fraction else 1.0
+    place: Floats = path[point] + part * (path[point + 1] - path[point])
+    return place
+
+
+# -- colours --------------------------------------------------------------------------------------
+
+
+def _by_type(plan: Plan) -> _Colouring:
+    kinds = dict(
+        zip(plan.rows.waypoints.tolist(), map(_type_name, plan.rows.primitives), strict=True)
+    )
+    reference = plan.reference
+    colours = np.array(
+        [_TYPES[kinds[point]][1] for point in reference.point[1:].tolist()], dtype=np.uint8
+    ).reshape(-1, 3)
+    on_blend = reference.blend_tolerance[1:].any(axis=1)
+    colours[on_blend] = _BLEND
+    legend = [_TYPES[kind] for kind in dict.fromkeys(kinds.values())]
+    return _Colouring('type', colours, [*legend, *([('blend', _BLEND)] if on_blend.any() else [])])
+
+
+def _by_speed(plan: Plan) -> _Colouring:
+    reference = plan.reference
+    distance = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
+    span = np.diff(reference.time)
+    speed = np.where(span > 0.0, distance / np.where(span > 0.0, span, 1.0), 0.0)
+    top = float(speed.max(initial=0.0))
+    legend = [(f'{part * top:.3g} m/s', _shade(part)) for part in (0.0, 0.5, 1.0)]
+    return _Colouring('speed', _shades(speed / (top or 1.0)), legend)
+
+
+def _by_margin(plan: Plan, arm: Arm, preview: Preview) -> _Colouring:
+    """Colour by the smaller of the distances from singularities and joint limits."""
+    known = ~np.isnan(preview.joints).any(axis=1)
+    margins = normalized_margins(arm, preview.joints[known])
+    at = np.interp(plan.reference.time[1:], preview.time[known], margins)
+    legend = [(f'{part * AMPLE_MARGIN:.2g} rad', _shade(part)) for part in (0.0, 0.5)] + [
+        (f'{AMPLE_MARGIN:g} rad and more', _shade(1.0))
+    ]
+    return _Colouring('margin', _shades(at / AMPLE_MARGIN), legend)
+
+
+def _type_name(primitive: object) -> str:
+    return type(primitive).__name__
+
+
+def _shade(part: float) -> Colour:
+    red, green, blue = _shades(np.array([part]))[0].tolist()
+    return red, green, blue
+
+
+def _shades(parts: Floats) -> Colours:
+    """Return colours from red (0) by yellow to green (1)."""
+    u = np.clip(parts, 0.0, 1.0)[:, None]
+    lower, upper = _LOW + 2.0 * u * (_MIDDLE - _LOW), _MIDDLE + (2.0 * u - 1.0) * (_HIGH - _MIDDLE)
+    shades: Colours = np.where(u < 0.5, lower, upper).astype(np.uint8)
+    return shades
+
+
+def _legends(colourings: Iterable[_Colouring]) -> str:
+    links = ' '.join(f'<a href="#{one.name}">by {one.name}</a>' for one in colourings)
+    lines = [
+        f'<p><b>{one.name}</b>'
+        + ''.join(
+            f'<i style="background: rgb{colour}"></i>{escape(text)}' for text, colour in one.legend
+        )
+        + '</p>'
+        for one in colourings
+    ]
+    return f'<nav>{links}</nav>{"".join(lines)}'
+
+
+# -- what the scene shows -------------------------------------------------------------------------
+
+
+def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:
+    """Yield the points with their places."""
+    for point, waypoint in enumerate(plan.goal.waypoints):
+        pose = plan.goal.T_base_frame @ waypoint.pose
+        yield point, np.array(pose.position)
+
+
+def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
+    """Yield the outputs in words, with the places at which they switch."""
+    for waypoint, outputs in (
+        (segment.waypoint, segment.outputs) for segment in plan.segments if segment.outputs
+    ):
+        last = int(np.flatnonzero(plan.reference.point == waypoint)[-1])
+        for output in outputs:
+            at = output.trigger_pose or pose_from_row(plan.reference.poses[last])
+            yield describe_command(output), np.array(at.position)
+
+
+class _Scene:
+    """The arm, its tool and its path on a server that records them."""
+
+    def __init__(self, server: Any, arm: Arm, tcp: Pose) -> None:
+        """Draw the arm with its shapes, each in the frame of its link."""
+        import trimesh
+
+        self._server, self._scene = server, server.scene
+        self._frames = LinkFrames(arm)
+        self._links = [
+            self._scene.add_frame(f'/arm/{link.name.lower()}', show_axes=False)
+            for link in ARM_LINKS
+        ]
+        for k, shape in enumerate(link_shapes(arm, 'collision')):
+            if shape.mesh is not None:
+                mesh = trimesh.load_mesh(shape.mesh)
+            else:
+                mesh = trimesh.creation.cylinder(shape.radius, shape.length, sections=24)
+            self._add_mesh(
+                f'/arm/{ARM_LINKS[shape.link].name.lower()}/{k}', mesh, _ARM, shape.T_link_shape
+            )
+        T_link_tcp = self._frames.flange @ tcp
+        reach = np.array([self._frames.flange.position, T_link_tcp.position])
+        self._scene.add_line_segments(
+            '/arm/wrist_3/tool', reach[None].astype(np.float32), _TOOL, thickness=0.008
+        )
+        self._scene.add_frame(
+            '/arm/wrist_3/tcp',
+            axes_length=0.05,
+            axes_radius=0.0025,
+            position=np.array(T_link_tcp.position),
+            wxyz=_wxyz(T_link_tcp),
+        )
+
+    def _add_mesh(self, name: str, mesh: Any, colour: Colour, pose: Pose) -> None:
+        self._scene.add_mesh_simple(
+            name,
+            np.asarray(mesh.vertices, dtype=np.float32),
+            np.asarray(mesh.faces, dtype=np.uint32),
+            color=colour,
+            flat_shading=True,
+            position=np.array(pose.position),
+            wxyz=_wxyz(pose),
+        )
+
+    def add_path(self, positions: Floats, colours: Colours) -> None:
+        """Draw a path, a colour for each of its edges, and look at it."""
+        edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
+        self._scene.add_line_segments(
+            '/path', edges, np.repeat(colours[:, None], 2, axis=1), thickness=0.007
+        )
+        self._look_at(positions)
+
+    def _look_at(self, positions: Floats) -> None:
+        """Look at path and arm from beside the path, right of the text."""
+        low, high = np.minimum(positions.min(axis=0), 0.0), np.maximum(positions.max(axis=0), 0.4)
+        x, y, _ = positions.mean(axis=0)
+        out = np.array((0.7 * x - 0.7 * y, 0.7 * x + 0.7 * y, 0.5 * np.hypot(x, y)))
+        out = out / np.linalg.norm(out) if np.hypot(x, y) > 0.01 else _ASIDE
+        distance = 0.25 + 0.85 * float(np.linalg.norm(high - low))
+        left = np.array((out[1], -out[0], 0.0))
+        center = 0.5 * (low + high) + 0.2 * distance * left
+        camera = self._server.initial_camera
+        camera.position, camera.look_at = center + distance * out, center
+
+    def add_points(self, points: Iterable[tuple[int, Floats]]) -> None:
+        """Draw numbered points."""
+        for number, place in list(points)[:MAX_NUMBERED_POINTS]:
+            self.add_ball(f'points/{number}', place, 0.006, _POINT)
+            self._scene.add_label(f'/points/{number}/label', str(number), font_screen_scale=0.7)
+
+    def add_outputs(self, outputs: Iterable[tuple[str, Floats]]) -> None:
+        """Draw where outputs switch."""
+        for k, (text, place) in enumerate(outputs):
+            self.add_ball(f'outputs/{k}', place, 0.008, _OUTPUT)
+            self._scene.add_label(f'/outputs/{k}/label', text, font_screen_scale=0.7)
+
+    def add_ball(self, name: str, place: Floats, radius: float, colour: Colour) -> None:
+        """Draw a ball."""
+        self._scene.add_icosphere(f'/{name}', radius, colour, subdivisions=2, position=place)
+
+    def record(self, time: Floats, q: Floats) -> str:
+        """
+        Return viser's page of the scene with the arm in motion.
+
+        Where the joints are not known the arm stays where it was.
+        """
+        known = ~np.isnan(q.sum(axis=1))
+        poses = self._frames.poses(np.where(known[:, None], q, 0.0))
+        self._move(poses[int(np.argmax(known))])
+        recording = self._server.get_scene_serializer()
+        for k in range(len(time)):
+            if known[k]:
+                self._move(poses[k])
+            recording.insert_sleep(float(time[k + 1] - time[k]) if k + 1 < len(time) else 0.0)
+        page: str = recording.as_html()
+        return page
+
+    def _move(self, poses: Floats) -> None:
+        for node, pose in zip(self._links, poses, strict=True):
+            node.position, node.wxyz = pose[:3], pose[[6, 3, 4, 5]]
+
+
+@contextmanager
+def _scene(planes: Sequence[Plane]) -> Iterator[Any]:
+    """Give a server of viser with floor and planes; it is only there to record the scene."""
+    try:
+        import viser
+    except ImportError as error:
+        raise ImportError(
+            'The page of a motion is drawn by viser, which is not installed: install it with '
+            '`pip install ur_cartesian_driver[show]`.',
+            name='viser',
+        ) from error
+    with redirect_stdout(io.StringIO()):  # it greets, whatever it is told
+        server = viser.ViserServer(host='127.0.0.1', port=0, verbose=False)
+    try:
+        server.scene.add_grid('/floor', 3.0, 3.0, cell_size=0.1, section_size=0.5)
+        for plane in planes:
+            _add_plane(server.scene, plane)
+        yield server
+    finally:
+        with redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def _add_plane(scene: Any, plane: Plane) -> None:
+    """Draw a square of a plane around its point."""
+    normal = np.array(plane.normal)
+    across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    across /= np.linalg.norm(across)
+    other = np.cross(normal, across)
+    corners = np.array(plane.point) + 0.8 * np.array(
+        [across + other, other - across, -across - other, across - other]
+    )
+    scene.add_mesh_simple(
+        f'/planes/{plane.name}',
+        corners.astype(np.float32),
+        np.array([(0, 1, 2), (0, 2, 3)], dtype=np.uint32),
+        color=_PLANE,
+        opacity=0.3,
+        side='double',
+    )
+
+
+def _wxyz(pose: Pose) -> Floats:
+    x, y, z, w = pose.quaternion
+    return np.array((w, x, y, z))
+
+
+def _page(pages: dict[str, str], text: str) -> str:
+    """Return viser's page with several scenes to choose from, and a text beside them."""
+    scenes = {name: _DATA.search(page) for name, page in pages.items()}
+    data = {name: found[1] for name, found in scenes.items() if found is not None}
+    page = next(iter(pages.values()))
+    begin, end = page.index('<script>window.__VISER_EMBED_DATA__'), page.index('</head>')
+    config = page[page.index(_CONFIG, begin) : end]
+    head = f'{_CHOICE % json.dumps(data)}<script>{config}{_STYLE}'
+    page = page[:begin] + head + page[end:]
+    end = page.rindex('</body>')
+    return f'{page[:end]}<aside>{text}</aside>{page[end:]}'
