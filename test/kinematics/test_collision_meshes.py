@@ -1,44 +1,44 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The meshes stand on our axes where the robot description has them, inside our cylinders."""
+"""The meshes move with our axes, inside our cylinders, and their distances are distances."""
 
 from math import pi
-import sys
 
 from collision_shapes import capsules, T_base_meshes
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.kinematics import collision_meshes as module
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
-from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, MODELS_WITH_MESHES
-from ur_cartesian_driver.kinematics.robot_models import MODELS
-
-FRAMES = (
-    'base_link',
-    'shoulder_link',
-    'upper_arm_link',
-    'forearm_link',
-    'wrist_1_link',
-    'wrist_2_link',
-    'wrist_3_link',
+from ur_cartesian_driver.kinematics.collision_bodies import (
+    CollisionBodies,
+    Link,
+    segment_distance,
 )
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
+from ur_cartesian_driver.kinematics.link_shapes import (
+    link_meshes,
+    LinkFrames,
+    MODELS_WITH_MESHES,
+)
+from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 
 
 @pytest.fixture(scope='module')
 def pinocchio():
-    found = pytest.importorskip('pinocchio')
-    try:
-        module._find_share()
-    except FileNotFoundError as error:
-        pytest.skip(str(error))
-    return found
+    for name in MODELS_WITH_MESHES:
+        if missing := missing_meshes(name):
+            pytest.skip(missing)
+    return pytest.importorskip('pinocchio')
 
 
 @pytest.fixture(scope='module')
 def all_meshes(pinocchio):
     return {name: CollisionMeshes(Arm(MODELS[name])) for name in MODELS_WITH_MESHES}
+
+
+#: Models whose meshes are no convex hulls.
+EXACT = ('ur3', 'ur5', 'ur10')
 
 
 def random_joints(n, seed=0):
@@ -51,25 +51,16 @@ def vertices(meshes, link):
 
 
 @pytest.mark.parametrize('name', MODELS_WITH_MESHES)
-def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pinocchio):
-    """Pinocchio's model of the URDF, from ``base``, against our axes: all links, and tool0."""
-    urdf = module._find_share() / module._DESCRIPTION / f'{name}_robot.urdf'
-    model = pinocchio.buildModelFromUrdf(str(urdf))
-    data, arm = model.createData(), Arm(MODELS[name])
-    for q in random_joints(10):
-        pinocchio.framesForwardKinematics(model, data, q)
-        T_world = {
-            frame: data.oMf[model.getFrameId(frame)] for frame in ('base', 'tool0', *FRAMES)
-        }
-        T_base_world = T_world['base'].inverse()
-        np.testing.assert_allclose(
-            arm.forward(q).matrix(), (T_base_world * T_world['tool0']).homogeneous, atol=1e-10
-        )
-        # In these descriptions every mesh has the frame of its link.
-        for T, frame in zip(T_base_meshes(all_meshes[name], q), FRAMES, strict=True):
-            np.testing.assert_allclose(
-                T, (T_base_world * T_world[frame]).homogeneous, atol=1e-10, err_msg=frame
-            )
+@pytest.mark.parametrize('is_calibrated', [False, True])
+def test_meshes_are_in_the_frames_of_their_links(name, is_calibrated, calibrated_arm, pinocchio):
+    """Pinocchio moves them by its own kinematics, :class:`LinkFrames` by ours."""
+    arm = calibrated_arm(name) if is_calibrated else Arm(MODELS[name])
+    meshes, q = CollisionMeshes(arm), random_joints(5)
+    for joints, rows in zip(q, LinkFrames(arm).poses(q), strict=True):
+        T_base_mesh = T_base_meshes(meshes, joints)
+        for shape in link_meshes(name, 'collision'):
+            mine, T = pose_from_row(rows[shape.link]) @ shape.T_link_shape, T_base_mesh[shape.link]
+            np.testing.assert_allclose(mine.matrix(), T, atol=1e-9, err_msg=str(shape.link))
 
 
 def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pinocchio):
@@ -126,8 +117,9 @@ def beyond_capsule(points, start, end, radius):
     return np.linalg.norm(points - start - place[:, None] * way, axis=1) - radius
 
 
-@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
+@pytest.mark.parametrize('name', EXACT)
 def test_meshes_are_never_nearer_than_their_capsules(name, all_meshes):
+    """Those that are no convex hulls, which fill what is between housings and tubes."""
     bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(5)
     for pair, least in zip(bodies.pairs, bodies.distances(q).T, strict=True):
         if pair[0] != Link.BASE:  # the plug
@@ -153,7 +145,7 @@ def test_what_is_nearer_than_a_bound_is_what_has_a_smaller_distance(name, all_me
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
+@pytest.mark.parametrize('name', EXACT)
 def test_pairs_that_are_left_out_never_meet_first(name, all_meshes):
     """
     Base and upper arm turn past each other, and so do wrist 1 and wrist 3.
@@ -177,10 +169,144 @@ def test_pairs_that_are_left_out_never_meet_first(name, all_meshes):
     assert (np.abs(q[hits, 4]) < 1.0).all() if name == 'ur5' else not hits.any()
 
 
-def test_other_models_have_no_meshes():
-    assert CollisionMeshes.of(Arm(MODELS['ur5e'])) is None
+# -- against an independent computation -----------------------------------------------------------
+
+H = pi / 2
+UPPER_ARM_WRIST_1 = (Link.UPPER_ARM, Link.WRIST_1)
+#: Configurations of the ur5e, the pair that is nearest in each, and whether it touches.
+KNOWN = {
+    'elbow closed too far': ((0.0, -H, 2.95, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, True),
+    'elbow almost closed': ((0.0, -H, 2.8, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, False),
+    'elbow closed, clear': ((0.0, -H, 2.7, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, False),
+    'flange in the shoulder': (
+        (0.0, -H, 2.9, -1.8, -1.0, 0.0),
+        (Link.SHOULDER, Link.FOREARM),
+        True,
+    ),
+}
 
 
-def test_without_pinocchio_there_are_no_meshes(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'pinocchio', None)
-    assert CollisionMeshes.of(Arm(MODELS['ur5'])) is None
+def triangles(name, link, T):
+    """The corners of the triangles (n, 3, 3) of a link in base [m], from the text of the file."""
+    found = []
+    for shape in link_meshes(name, 'collision'):
+        if shape.link == link:
+            lines = [line.split() for line in shape.mesh.read_text().splitlines()]
+            points = np.array([words[1:4] for words in lines if words[:1] == ['v']], dtype=float)
+            corners = [
+                [int(word.split('/')[0]) - 1 for word in words[1:]]
+                for words in lines
+                if words[:1] == ['f']
+            ]
+            assert {len(face) for face in corners} == {3}
+            found.append((points @ T[:3, :3].T + T[:3, 3])[np.array(corners)])
+    return np.concatenate(found)
+
+
+def brute_force_distance(one, other):
+    """
+    Return the distance of two meshes (n, 3, 3).
+
+    Two triangles are as far apart as a corner from a triangle or an edge from an edge, and 0 where
+    an edge passes through one. Pairs whose spheres are farther apart than any two corners do not
+    count.
+    """
+    centres, radii = zip(*(spheres(mesh) for mesh in (one, other)), strict=True)
+    between = np.linalg.norm(centres[0][:, None] - centres[1], axis=2)
+    corners = (
+        pytest.importorskip('scipy.spatial')
+        .cKDTree(one.reshape(-1, 3))
+        .query(other.reshape(-1, 3))[0]
+        .min()
+    )
+    rows, columns = np.nonzero(between - radii[0][:, None] - radii[1] <= corners)
+    a, b = one[rows], other[columns]
+    best = np.inf
+    for p, q in ((a, b), (b, a)):
+        normal = np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
+        heights = np.einsum('nkc,nc->nk', p - q[:, :1], normal)
+        for k in range(3):
+            above = is_inside(p[:, k] - heights[:, k, None] * normal, q, normal)
+            best = min(best, np.abs(heights[above, k]).min(initial=np.inf))
+            start, end = heights[:, k], heights[:, k - 2]
+            crossing = np.flatnonzero(start * end < 0.0)
+            fraction = (start / np.where(start == end, 1.0, start - end))[crossing, None]
+            point = p[crossing, k] + fraction * (p[crossing, k - 2] - p[crossing, k])
+            if is_inside(point, q[crossing], normal[crossing]).any():
+                return 0.0
+    for i in range(3):
+        for k in range(3):
+            edges = (a[:, i], a[:, i - 2] - a[:, i], b[:, k], b[:, k - 2] - b[:, k])
+            best = min(best, segment_distance(*(edge.T for edge in edges)).min())
+    return best
+
+
+def spheres(mesh):
+    centres = mesh.mean(axis=1)
+    return centres, np.linalg.norm(mesh - centres[:, None], axis=2).max(axis=1)
+
+
+def is_inside(points, corners, normals):
+    """Whether points (n, 3) of the planes of triangles (n, 3, 3) are inside these."""
+    inside = np.ones(len(points), dtype=bool)
+    for k in range(3):
+        edge = corners[:, k - 2] - corners[:, k]
+        inside &= np.einsum('nc,nc->n', np.cross(edge, points - corners[:, k]), normals) >= 0.0
+    return inside
+
+
+@pytest.mark.parametrize('case', KNOWN)
+def test_known_configurations_touch_or_are_clear(case, all_meshes):
+    """All pairs that are near, and at which of them the arm touches first."""
+    joints, nearest, touches = KNOWN[case]
+    meshes, q = all_meshes['ur5e'], np.array([joints])
+    bodies = CollisionBodies(Arm(MODELS['ur5e']))
+    T = [pose_from_row(row) for row in LinkFrames(bodies.arm).poses(q)[0]]
+    shapes = {shape.link: shape for shape in link_meshes('ur5e', 'collision')}
+    found = {}
+    for pair, least in zip(bodies.pairs, bodies.distances(q)[0], strict=True):
+        if least < 0.015 or pair == nearest:
+            one, other = (
+                triangles('ur5e', link, (T[link] @ shapes[link].T_link_shape).matrix())
+                for link in pair
+            )
+            found[pair] = brute_force_distance(one, other)
+            assert meshes.distances(pair, q)[0] == pytest.approx(found[pair], abs=1e-6), pair
+    assert found[nearest] == min(found.values())
+    assert (found[nearest] == 0.0) == touches
+
+
+def test_the_tool_is_a_cylinder_to_the_tcp(pinocchio):
+    """Touching where it reaches into the upper arm, clear where it is shorter."""
+    q = np.array([(0.0, -2.0, 2.2, 0.4, -H, 0.0)])
+    arm, pair = Arm(MODELS['ur5e']), (Link.UPPER_ARM, Link.TOOL)
+    near = [
+        CollisionMeshes(arm, Pose((0.0, 0.0, length)), 0.03).distances(pair, q)[0]
+        for length in (0.05, 0.1, 0.2, 0.6)
+    ]
+    assert near == sorted(near, reverse=True)
+    assert near[0] > 0.03
+    assert near[-1] == 0.0
+
+
+def test_what_is_missing_is_said(monkeypatch):
+    assert missing_meshes('ur10e') == 'there are no meshes of the ur10e'
+    missing_meshes.cache_clear()
+    monkeypatch.setattr('ur_cartesian_driver.kinematics.link_shapes.find_spec', lambda name: None)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '')
+    for name, package in (('ur5', 'example-robot-data'), ('ur7e', 'airo-models')):
+        assert missing_meshes(name) == (
+            f'the package {package} with the meshes of the arm is not installed, the extra '
+            '`collision` brings it'
+        )
+    missing_meshes.cache_clear()
+
+
+def test_pinocchio_may_be_missing(monkeypatch, pinocchio):
+    missing_meshes.cache_clear()
+    monkeypatch.setattr(
+        'ur_cartesian_driver.kinematics.collision_meshes.find_spec', lambda name: None
+    )
+    assert missing_meshes('ur5e') == 'pinocchio is not installed, the extra `collision` brings it'
+    missing_meshes.cache_clear()

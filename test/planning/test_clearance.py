@@ -11,14 +11,18 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
-from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
 from ur_cartesian_driver.motion.errors import CollisionPredicted, ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.planner import plan
-from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.clearance import (
+    Clearance,
+    clearance_remarks,
+    self_collision_remark,
+)
 
 H = pi / 2
 HOME = (0.0, -H, H, -H, -H, 0.0)
@@ -37,47 +41,81 @@ def check(q, start=HOME, model='ur5e', tcp=IDENTITY, **options):
 
 
 def needs_meshes(model='ur5'):
-    if CollisionMeshes.of(Arm(MODELS[model])) is None:
-        pytest.skip('the meshes are not installed')
+    if missing := missing_meshes(model):
+        pytest.skip(missing)
+
+
+@pytest.fixture
+def no_meshes(monkeypatch):
+    """Neither meshes nor pinocchio are installed."""
+    monkeypatch.setattr('ur_cartesian_driver.kinematics.link_shapes.find_spec', lambda name: None)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '')
+    missing_meshes.cache_clear()
+    yield
+    missing_meshes.cache_clear()
 
 
 # -- self-collision -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
-def test_capsules_warn_unless_they_are_told_to_refuse(choice):
-    clear = check(way(HOME, FOLDED), self_collision=choice)
-    assert (clear.warning is not None) == (choice in ('warn', 'auto'))
-    assert (clear.violation is not None) == (choice == 'refuse')
+CHOICES = ('warn', 'auto', 'refuse', 'off')
+
+
+@pytest.mark.parametrize('choice', CHOICES)
+@pytest.mark.parametrize('model', ['ur10e', 'ur5', 'ur5e'])
+@pytest.mark.parametrize('installed', [True, False])
+def test_parameter_and_model_decide_whether_to_refuse(model, choice, installed, request):
+    """Never what is installed, which only decides between which shapes is measured."""
+    if not installed:
+        request.getfixturevalue('no_meshes')
+    elif model != 'ur10e':
+        needs_meshes(model)
+    clear = check(way(HOME, FOLDED), model=model, self_collision=choice)
+    refuses = choice == 'refuse' or (choice == 'auto' and model != 'ur10e')
+    assert (clear.violation is not None) == refuses
+    assert (clear.warning is not None) == (not refuses and choice != 'off')
     if choice == 'off':
         assert (clear.margin, clear.description) == (np.inf, '')
         return
     found = clear.violation or clear.warning
-    assert found.text.startswith('upper arm and wrist 1 come within 0.00')
-    assert 'measured between capsules' in found.text
     assert 'less than min_clearance = 0.0050 m' in found.text
-    assert 'self_collision' in found.remedy
+    if installed and model != 'ur10e':
+        assert found.text.endswith(f'(measured between meshes of the {model})')
+        assert clear.description.endswith(f'(meshes of the {model})')
+    else:
+        assert found.text.endswith('(measured between capsules, which are thicker than the arm)')
+        assert found.remedy.endswith('; self_collision decides whether capsules refuse')
+        assert clear.description.endswith('(capsules)')
 
 
-@pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
-def test_meshes_refuse_unless_they_are_told_to_warn(choice):
-    needs_meshes()
-    clear = check(way(HOME, FOLDED), model='ur5', self_collision=choice)
-    assert (clear.warning is not None) == (choice == 'warn')
-    assert (clear.violation is not None) == (choice in ('auto', 'refuse'))
-    if found := clear.violation or clear.warning:
-        assert 'capsules' not in found.text
+def test_what_is_missing_for_the_verdict_is_said(no_meshes):
+    def remark(model, choice):
+        return self_collision_remark(model, PlanningOptions(self_collision=choice))
+
+    assert remark('ur7e', 'auto') == (
+        'The package airo-models with the meshes of the arm is not installed, the extra '
+        '`collision` brings it: capsules, which are thicker than the arm, refuse self-collisions '
+        '(self_collision is auto).'
+    )
+    assert 'warn of self-collisions (self_collision is warn)' in remark('ur5', 'warn')
+    assert remark('ur10e', 'refuse').startswith('There are no meshes of the ur10e: capsules')
+    assert remark('ur10e', 'auto') == remark('ur10e', 'warn') == remark('ur5', 'off') == ''
+
+
+def test_nothing_is_said_where_nothing_is_missing():
+    needs_meshes('ur5e')
+    assert self_collision_remark('ur5e', PlanningOptions()) == ''
 
 
 def test_the_first_row_too_near_is_named_and_the_smallest_distance():
     q = way(HOME, FOLDED, 5000)  # more than is judged at once
-    clear = check(q)
-    bodies = CollisionBodies(Arm(MODELS['ur5e']))
+    clear = check(q, model='ur10e')
+    bodies = CollisionBodies(Arm(MODELS['ur10e']))
     distances = bodies.distances(q)
     assert clear.warning.row == np.flatnonzero(distances.min(axis=1) < 0.005)[0] > 4096
     assert clear.margin == distances.min()
     a, b = bodies.pairs[distances.min(axis=0).argmin()]
-    assert clear.description == f'{a} and {b}'
+    assert clear.description == f'{a} and {b} (capsules)'
 
 
 def test_meshes_let_pass_what_only_capsules_refuse():
@@ -103,7 +141,9 @@ def test_meshes_let_pass_what_only_capsules_refuse():
 
 def test_min_clearance_is_how_near_it_may_come():
     q = way(HOME, FOLDED)
-    rows = [check(q, min_clearance=bound).warning.row for bound in (0.0, 0.005, 0.03)]
+    rows = [
+        check(q, model='ur10e', min_clearance=bound).warning.row for bound in (0.0, 0.005, 0.03)
+    ]
     assert rows == sorted(rows, reverse=True)
     assert len(set(rows)) == 3
     assert check(way(HOME, HOME), min_clearance=0.0).warning is None
@@ -126,13 +166,12 @@ def test_an_everyday_way_is_clear(model):
 def test_a_tool_is_checked_against_the_arm():
     back = (0.0, -2.2, 2.4, -0.2, -H, 0.0)
     long = Pose((0.0, 0.0, 0.6), (0.0, 0.0, 0.0, 1.0))
-    assert check(way(HOME, back), tcp=long).warning is None
-    warning = check(way(HOME, back), tcp=long, tool_radius=0.03).warning
-    assert warning.text.startswith('upper arm and tool ')
-    needs_meshes()  # which know of no tool, so it does not refuse
-    clear = check(way(HOME, back), model='ur5', tcp=long, tool_radius=0.03)
-    assert clear.warning is not None
-    assert clear.violation is None
+    for model in ('ur5', 'ur10e'):
+        clear = check(way(HOME, back), model=model, tcp=long)
+        assert clear.violation is clear.warning is None
+        clear = check(way(HOME, back), model=model, tcp=long, tool_radius=0.03)
+        found = clear.violation if model == 'ur5' else clear.warning
+        assert found.text.startswith('upper arm and tool ')
 
 
 # -- planes ---------------------------------------------------------------------------------------
@@ -287,12 +326,12 @@ def test_a_refusal_names_segment_and_fraction():
 
 
 def test_a_warning_goes_into_the_report_with_the_smallest_distance():
-    warned = clearance_remarks(check(way(HOME, FOLDED)), SEGMENT, FRACTION)
+    warned = clearance_remarks(check(way(HOME, FOLDED), model='ur10e'), SEGMENT, FRACTION)
     assert warned[0].startswith('point 3: ')
     assert 'upper arm and wrist 1 come within' in warned[0]
-    assert warned[1] == 'clearance: none between upper arm and wrist 1'
+    assert warned[1] == 'clearance: none between upper arm and wrist 1 (capsules)'
     assert clearance_remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
-        'clearance: at least 0.043 m between forearm and wrist 3'
+        'clearance: at least 0.061 m between forearm and wrist 3 (capsules)'
     ]
     assert clearance_remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
 
@@ -323,13 +362,14 @@ def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
     assert refusal.value.code == ErrorCode.COLLISION == -10
     assert re.match(
         r'trajectory\.points\[1\]\.pose, at 9\d\.\d % of its segment: upper arm and '
-        r'wrist 1 come within 0\.00\d\d m of each other, less than min_clearance = 0\.0050 m; ',
+        r'wrist 1 come within 0\.00\d\d m of each other, less than min_clearance = 0\.0050 m '
+        r'\(measured between meshes of the ur5\); ',
         str(refusal.value),
     )
 
 
 def test_where_only_capsules_tell_the_report_warns(make_cell):
-    cell = make_cell(model='ur5e')
+    cell = make_cell(model='ur10e')
     made = plan(folding(cell), cell.state, cell.arm, FREE)
     assert [
         remark
@@ -338,7 +378,7 @@ def test_where_only_capsules_tell_the_report_warns(make_cell):
             r'point 1: at 9\d\.\d % of its segment upper arm and wrist 1 come within', remark
         )
     ]
-    assert 'clearance: none between upper arm and wrist 1' in made.remarks
+    assert 'clearance: none between upper arm and wrist 1 (capsules)' in made.remarks
     refusing = replace(FREE, self_collision='refuse')
     with pytest.raises(CollisionPredicted, match=r'trajectory\.points\[1\]'):
         plan(folding(cell), cell.state, cell.arm, refusing)

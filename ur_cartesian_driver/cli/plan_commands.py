@@ -91,10 +91,13 @@ class GoalPlanning:
 
     def __init__(self, arguments: argparse.Namespace) -> None:
         """Read the parameters and the goal."""
+        from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
 
         self._settings = settings = read_settings(arguments.params_file, arguments.param)
         model = robot_model(arguments.ur_type or settings.driver.ur_type)
+        if remark := self_collision_remark(model.name, settings.planning):
+            print(remark, file=sys.stderr)
         self.arm = Arm(model, calibration(arguments, model))
         T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
         self.state = state_at_rest(

@@ -86,6 +86,7 @@ from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
+from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.preview import ArmPlan
 from ur_cartesian_driver.program.render import has_feature
@@ -182,6 +183,8 @@ class Driver(RobotServices, InteractiveMotions):
 
     def open(self) -> None:
         """Start the robot loop and return; it connects and reconnects by itself."""
+        if remark := self_collision_remark(self.config.ur_type, self.options):
+            LOG.warning('%s', remark)
         self._loop.open()
 
     def close(self) -> None:

@@ -13,14 +13,15 @@ axis of joint 1 by the *shoulder offset* s, the forearm by the *elbow offset* e,
 at d4. All joint housings are cylinders about their own joint's axis, and all tubes run from axis
 to axis. So each end of a body is a point on an axis, and calibrated arms use the same table.
 
-Sources. Radii and lengths of the housings: measured on the collision meshes of UR3, UR5 and UR10
-in the package example-robot-data (:data:`_MEASURED`); a test checks that these cylinders contain
-them, except the cable connector at the base. e-Series arms have the joints of the CB3 arm of
-the same size. The larger ones are a UR10's scaled by the footprints of the data sheets (190 mm;
-UR15 and its relatives 204 mm, UR20 and UR30 245 mm). s and e: the offsets in the configuration
-files of the ROS 2 description package of Universal Robots, but for the UR15 and its relatives, for
-which it has the planes in which the links meet; there s and e are these plus the half widths of
-the housings. The UR10's are the middles of its tubes in the meshes.
+Sources. Radii and lengths of the housings: measured on the meshes of UR3, UR5 and UR10 in the
+package example-robot-data and of UR3e and UR5e in airo-models (:data:`_MEASURED`); a test checks
+that these cylinders contain them, except the cable connector at the base. The larger e-Series
+arms are assumed to have the housings of a UR10. The largest ones are a UR10's scaled by the
+footprints of the data sheets (190 mm; UR15 and its relatives 204 mm, UR20 and UR30 245 mm).
+s and e: the offsets in the configuration files of the ROS 2 description package of Universal
+Robots, but for the UR15 and its relatives, for which it has the planes in which the links meet;
+there s and e are these plus the half widths of the housings. The UR10's are the middles of its
+tubes in the meshes.
 """
 
 from __future__ import annotations
@@ -88,8 +89,10 @@ class HousingSizes:
     fore_tube: float
     fore_wrist_in: float
     fore_wrist_out: float
-    #: Wrists 1 and 2 are alike: one housing about the previous joint, one about the next.
+    #: Wrists 1 and 2 are alike but for a neck: one housing about the previous joint, one about
+    #: the next.
     wrist_radius: float
+    wrist_1_in: float
     wrist_in: float
     wrist_out: float
     wrist_back: float
@@ -101,33 +104,34 @@ class HousingSizes:
         return HousingSizes(**{name: factor * value for name, value in asdict(self).items()})
 
 
-#: The housings of UR3, UR5 and UR10 [m].
-_MEASURED: Mapping[str, tuple[float, float, float]] = {
-    'base_radius': (0.0645, 0.0745, 0.0952),
-    'shoulder_radius': (0.0468, 0.0608, 0.0772),
-    'shoulder_below': (0.0665, 0.0655, 0.0895),
-    'shoulder_above': (0.0575, 0.069, 0.0885),
-    'upper_shoulder_in': (0.066, 0.0655, 0.0904),
-    'upper_shoulder_out': (0.058, 0.069, 0.0879),
-    'upper_elbow_radius': (0.0395, 0.0605, 0.0628),
-    'upper_elbow_in': (0.051, 0.0655, 0.0601),
-    'upper_elbow_out': (0.058, 0.069, 0.0692),
-    'upper_tube': (0.047, 0.059, 0.0763),
-    'elbow_radius': (0.0395, 0.059, 0.0628),
-    'elbow_in': (0.051, 0.055, 0.068),
-    'elbow_out': (0.047, 0.0575, 0.07),
-    'fore_tube': (0.0378, 0.0448, 0.06),
-    'fore_wrist_in': (0.0425, 0.0453, 0.0537),
-    'fore_wrist_out': (0.047, 0.0575, 0.07),
-    'wrist_radius': (0.0343, 0.0397, 0.0474),
-    'wrist_in': (0.047, 0.046, 0.0545),
-    'wrist_out': (0.031, 0.04, 0.0468),
-    'wrist_back': (0.0484, 0.0575, 0.0578),
-    'wrist_front': (0.0425, 0.048, 0.0625),
-    'tool_flange_radius': (0.0385, 0.0444, 0.0475),
+#: The housings of UR3, UR5, UR10, UR3e and UR5e [m].
+_MEASURED: Mapping[str, tuple[float, float, float, float, float]] = {
+    'base_radius': (0.0645, 0.0745, 0.0952, 0.0642, 0.0757),
+    'shoulder_radius': (0.0468, 0.0608, 0.0772, 0.0472, 0.0607),
+    'shoulder_below': (0.0665, 0.0655, 0.0895, 0.0572, 0.064),
+    'shoulder_above': (0.0575, 0.069, 0.0885, 0.0582, 0.0717),
+    'upper_shoulder_in': (0.066, 0.0655, 0.0904, 0.0572, 0.0638),
+    'upper_shoulder_out': (0.058, 0.069, 0.0879, 0.0582, 0.072),
+    'upper_elbow_radius': (0.0395, 0.0605, 0.0628, 0.0396, 0.0609),
+    'upper_elbow_in': (0.051, 0.0655, 0.0601, 0.0542, 0.0779),
+    'upper_elbow_out': (0.058, 0.069, 0.0692, 0.0564, 0.072),
+    'upper_tube': (0.047, 0.059, 0.0763, 0.0454, 0.0586),
+    'elbow_radius': (0.0395, 0.059, 0.0628, 0.0412, 0.0626),
+    'elbow_in': (0.051, 0.055, 0.068, 0.0391, 0.0534),
+    'elbow_out': (0.047, 0.0575, 0.07, 0.0316, 0.0486),
+    'fore_tube': (0.0378, 0.0448, 0.06, 0.0345, 0.0508),
+    'fore_wrist_in': (0.0425, 0.0453, 0.0537, 0.0537, 0.0728),
+    'fore_wrist_out': (0.047, 0.0575, 0.07, 0.0468, 0.0567),
+    'wrist_radius': (0.0343, 0.0397, 0.0474, 0.0325, 0.0401),
+    'wrist_1_in': (0.047, 0.046, 0.0545, 0.0538, 0.0737),
+    'wrist_in': (0.047, 0.046, 0.0545, 0.0355, 0.0462),
+    'wrist_out': (0.031, 0.04, 0.0468, 0.0325, 0.0392),
+    'wrist_back': (0.0484, 0.0575, 0.0578, 0.0471, 0.0569),
+    'wrist_front': (0.0425, 0.048, 0.0625, 0.0505, 0.0537),
+    'tool_flange_radius': (0.0385, 0.0444, 0.0475, 0.0379, 0.0438),
 }
-_UR3, _UR5, _UR10 = (
-    HousingSizes(**{name: sizes[k] for name, sizes in _MEASURED.items()}) for k in range(3)
+_UR3, _UR5, _UR10, _UR3E, _UR5E = (
+    HousingSizes(**{name: sizes[k] for name, sizes in _MEASURED.items()}) for k in range(5)
 )
 _UR15 = _UR10.scaled(204 / 190)
 _UR20 = _UR10.scaled(245 / 190)
@@ -138,9 +142,9 @@ _SIZES: Mapping[str, tuple[HousingSizes, float, float]] = MappingProxyType(
         'ur3': (_UR3, 0.1198, 0.0273),
         'ur5': (_UR5, 0.13585, 0.01615),
         'ur10': (_UR10, 0.1758, 0.0486),
-        'ur3e': (_UR3, 0.12, 0.027),
-        'ur5e': (_UR5, 0.138, 0.007),
-        'ur7e': (_UR5, 0.138, 0.007),
+        'ur3e': (_UR3E, 0.12, 0.027),
+        'ur5e': (_UR5E, 0.138, 0.007),
+        'ur7e': (_UR5E, 0.138, 0.007),
         'ur10e': (_UR10, 0.1762, 0.0393),
         'ur12e': (_UR10, 0.1762, 0.0393),
         'ur16e': (_UR10, 0.176, 0.04),
@@ -389,7 +393,7 @@ def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
         _housing(Link.FOREARM, 2, e - z.elbow_out, e + z.elbow_in, z.elbow_radius),
         _LinkCylinder(Link.FOREARM, (2, e), (3, e), z.fore_tube),
         _housing(Link.FOREARM, 3, e - z.fore_wrist_out, d4 - z.fore_wrist_in, z.wrist_radius),
-        _housing(Link.WRIST_1, 3, d4 - z.wrist_in, d4 + z.wrist_out, z.wrist_radius),
+        _housing(Link.WRIST_1, 3, d4 - z.wrist_1_in, d4 + z.wrist_out, z.wrist_radius),
         _housing(Link.WRIST_1, 4, -z.wrist_back, z.wrist_front, z.wrist_radius),
         _housing(Link.WRIST_2, 4, d5 - z.wrist_in, d5 + z.wrist_out, z.wrist_radius),
         _housing(Link.WRIST_2, 5, -z.wrist_back, z.wrist_front, z.wrist_radius),

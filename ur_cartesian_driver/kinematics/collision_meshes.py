@@ -1,24 +1,19 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Exact distances between the links of a UR3, UR5 or UR10, from the manufacturer's meshes.
+Exact distances between the links of an arm, from the manufacturer's meshes.
 
-The meshes come from the package example-robot-data; pinocchio computes the distances. Both are
-optional; without them the capsules of :mod:`~.collision_bodies` decide. e-Series arms have
-a different shape, so there are no meshes for them.
-
-The meshes follow the axes of our own kinematics, so those of a calibrated arm are where its links
-really are: with all joints at 0 each mesh has its pose from the robot description, and moves with
-its joint from there.
+:mod:`~.link_shapes` knows the models that have meshes and where they are; pinocchio computes the
+distances. Packages and meshes are optional; without them the capsules of
+:mod:`~.collision_bodies` decide.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
+from importlib.util import find_spec
 from itertools import combinations
-import os
-from pathlib import Path
+from math import hypot
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,60 +21,86 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
 from ur_cartesian_driver.kinematics.collision_bodies import Link
+from ur_cartesian_driver.kinematics.link_shapes import (
+    ARM_LINKS,
+    link_meshes,
+    LinkFrames,
+    shortest_turn_of_z,
+)
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 
-#: Models that have meshes.
-MODELS_WITH_MESHES = ('ur3', 'ur5', 'ur10')
 
-_DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
-#: Frame names in the robot description, in the order of the links.
-_LINKS: tuple[Link, ...] = tuple(link for link in Link if link is not Link.TOOL)
-_FRAMES = tuple(f'{link.name.lower()}_link' for link in _LINKS)
+@lru_cache
+def missing_meshes(name: str) -> str:
+    """Return a clause that says why the links of a model cannot be measured; '' if they can."""
+    try:
+        link_meshes(name, 'collision')
+    except (ValueError, FileNotFoundError) as error:
+        return str(error)
+    if find_spec('pinocchio') is None:
+        return 'pinocchio is not installed, the extra `collision` brings it'
+    return ''
 
 
 class CollisionMeshes:
-    """The meshes of one arm, attached to its joints. Not thread-safe."""
+    """
+    The meshes of one arm and the cylinder of its tool, attached to its joints. Not thread-safe.
 
-    def __init__(self, arm: Arm) -> None:
+    :param arm: nominal or calibrated.
+    :param T_flange_tcp: the TCP, where the tool ends.
+    :param tool_radius: radius of a cylinder from the flange to the TCP [m]; 0 = no tool.
+    """
+
+    def __init__(self, arm: Arm, T_flange_tcp: Pose = IDENTITY, tool_radius: float = 0.0) -> None:
         """
         Load the meshes and attach them to the joints.
 
         :raises ValueError: the model has none.
         :raises ImportError: pinocchio is not installed.
-        :raises FileNotFoundError: example-robot-data is not installed.
+        :raises FileNotFoundError: the package with the meshes is not installed.
         """
-        if arm.model.name not in MODELS_WITH_MESHES:
-            raise ValueError(f'There are no meshes of a {arm.model.name}.')
+        shapes = link_meshes(arm.model.name, 'collision')
         self._model = pinocchio_model(arm)
         import pinocchio
 
         self._pinocchio, self._data = pinocchio, self._model.createData()
         self._geometry = pinocchio.GeometryModel()
-        zero = np.zeros(6)
-        pinocchio.forwardKinematics(self._model, self._data, zero)
-        for link, (shape, T_base_link) in enumerate(_load_meshes(arm.model.name)):
-            T_base_joint = self._data.oMi[link]
-            self._geometry.addGeometryObject(
-                pinocchio.GeometryObject(
-                    Link(link).name, link, T_base_joint.inverse() * T_base_link, shape
-                )
+        frames = LinkFrames(arm)
+        pinocchio.forwardKinematics(self._model, self._data, np.zeros(6))
+        for link, T_base_link in zip(ARM_LINKS, frames.at_zero, strict=True):
+            parts = [shape for shape in shapes if shape.link == link]  # all in the same frame
+            mesh = _mesh(*(str(part.mesh) for part in parts))
+            self._attach(link, T_base_link @ parts[0].T_link_shape, mesh)
+        length = hypot(*T_flange_tcp.position)
+        if tool_radius > 0.0 and length > 0.0:
+            # The shape is along z and has its origin in the middle.
+            to_tcp = T_flange_tcp.position
+            T_flange_middle = Pose(
+                (0.5 * to_tcp[0], 0.5 * to_tcp[1], 0.5 * to_tcp[2]),
+                shortest_turn_of_z(*(value / length for value in to_tcp)),
             )
-        self._pairs = {pair: k for k, pair in enumerate(combinations(_LINKS, 2))}
+            self._attach(
+                Link.TOOL,
+                arm.forward((0.0,) * 6) @ T_flange_middle,
+                _coal().Cylinder(tool_radius, length),
+            )
+        links = [link for link in Link if link < self._geometry.ngeoms]
+        self._pairs = {pair: k for k, pair in enumerate(combinations(links, 2))}
         for a, b in self._pairs:
             self._geometry.addCollisionPair(pinocchio.CollisionPair(int(a), int(b)))
         self._placement = pinocchio.GeometryData(self._geometry)
 
-    @classmethod
-    def of(cls, arm: Arm) -> CollisionMeshes | None:
-        """Return the meshes of an arm; None if it has none or a package is missing."""
-        if arm.model.name not in MODELS_WITH_MESHES:
-            return None
-        try:
-            return cls(arm)
-        except (ImportError, FileNotFoundError):
-            return None
+    def _attach(self, link: Link, T_base_shape: Pose, shape: Any) -> None:
+        """Attach a shape to the joint that moves it, given its pose while all joints are at 0."""
+        joint = min(link, Link.WRIST_3)
+        T = self._pinocchio.SE3(T_base_shape.matrix())
+        T_joint_shape = self._data.oMi[joint].inverse() * T
+        self._geometry.addGeometryObject(
+            self._pinocchio.GeometryObject(link.name, int(joint), T_joint_shape, shape)
+        )
 
     def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
         """
@@ -124,52 +145,27 @@ class CollisionMeshes:
 
 
 @lru_cache
-def _load_meshes(name: str) -> list[tuple[Any, Any]]:
-    """Return shape and pose (in base, all joints at 0) of each link's mesh."""
-    import pinocchio
-
-    share = _find_share()
-    urdf = str(share / _DESCRIPTION / f'{name}_robot.urdf')
-    model = pinocchio.buildModelFromUrdf(urdf)
-    geometry = pinocchio.buildGeomFromUrdf(
-        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share)]
-    )
-    data, placement = model.createData(), pinocchio.GeometryData(geometry)
-    pinocchio.updateGeometryPlacements(model, data, geometry, placement, np.zeros(6))
-    pinocchio.updateFramePlacements(model, data)
-    T_world_base = data.oMf[model.getFrameId('base')]
-    found = []
-    for frame in _FRAMES:
-        index = geometry.getGeometryId(f'{frame}_0')
-        found.append(
-            (
-                geometry.geometryObjects[index].geometry,
-                T_world_base.inverse() * placement.oMg[index],
-            )
-        )
-    return found
+def _mesh(*files: str) -> Any:
+    """Return meshes together as the tree of triangles that pinocchio measures with."""
+    coal = _coal()
+    parts = [coal.MeshLoader().load(file, np.ones(3)) for file in files]
+    if len(parts) == 1:
+        return parts[0]
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(sum(part.num_tris for part in parts), sum(part.num_vertices for part in parts))
+    for part in parts:
+        corners = part.vertices()
+        for k in range(part.num_tris):
+            triangle = part.tri_indices(k)
+            mesh.addTriangle(*(corners[triangle[i]] for i in range(3)))
+    mesh.endModel()
+    return mesh
 
 
-def _find_share() -> Path:
-    """
-    Return the directory that holds example-robot-data.
-
-    :raises FileNotFoundError: it is not installed.
-    """
-    for share in _share_candidates():
-        if (share / _DESCRIPTION).is_dir():
-            return share
-    raise FileNotFoundError(
-        'The meshes of the robots are not installed; the extra `collision` brings them.'
-    )
-
-
-def _share_candidates() -> Iterator[Path]:
-    """Return where wheels and ROS installations keep shared files."""
-    import pinocchio
-
-    for parent in Path(pinocchio.__file__).parents:
-        yield parent / 'share'
-    for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
-        if prefix:
-            yield Path(prefix, 'share')
+def _coal() -> Any:
+    """Return the module of the shapes, which has an older name where pinocchio is older."""
+    try:
+        import coal
+    except ImportError:
+        import hppfcl as coal
+    return coal

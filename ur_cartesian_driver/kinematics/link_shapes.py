@@ -41,7 +41,8 @@ from ur_cartesian_driver.motion.pose_rows import compose_rows, multiply_rows
 from ur_cartesian_driver.motion.vectors import Vector3
 
 Floats: TypeAlias = NDArray[np.float64]
-#: `visual` has tens of thousands of triangles a link, `collision` about a thousand.
+#: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
+#: meshes of the e-Series are convex hulls of the links, those of the UR5e's long links in parts.
 Detail: TypeAlias = Literal['visual', 'collision']
 
 #: The links in the order of the joints that move them; the tool is not one of the arm's.
@@ -93,23 +94,26 @@ class _MeshSource:
     #: File name extensions of visual and collision meshes.
     visual: str
     collision: str
+    #: The files of collision meshes that are in parts.
+    parts: Mapping[Link, tuple[str, ...]]
     #: Origins of the meshes of upper arm, forearm, wrists 1 to 3 along z of their frames [m].
     offsets: tuple[float, float, float, float, float]
 
-    def file(self, link: Link, detail: Detail) -> Path:
+    def files(self, link: Link, detail: Detail) -> list[Path]:
         """
-        Return the file with the mesh of a link.
+        Return the files with the mesh of a link.
 
         :raises FileNotFoundError: the package is not installed.
         """
+        names = (_FILES[link],) if detail == 'visual' else self.parts.get(link, (_FILES[link],))
         suffix = self.visual if detail == 'visual' else self.collision
-        inside = Path(self.folder, detail, f'{_FILES[link]}.{suffix}')
         for root in _PACKAGE_ROOTS[self.package]():
-            if (root / inside).is_file():
-                return root / inside
+            found = [Path(root, self.folder, detail, f'{name}.{suffix}') for name in names]
+            if all(file.is_file() for file in found):
+                return found
         raise FileNotFoundError(
-            f'The package {self.package} with the meshes of the arm is not installed; the extra '
-            '`collision` brings it.'
+            f'the package {self.package} with the meshes of the arm is not installed, the extra '
+            '`collision` brings it'
         )
 
     def placement(self, link: Link) -> Pose:
@@ -125,22 +129,37 @@ def _cb3(name: str, *offsets: float) -> _MeshSource:
         folder=f'robots/ur_description/meshes/{name}',
         visual='dae',
         collision='stl',
+        parts={},
         offsets=(a, b, c, d, e),
     )
 
 
-def _e_series(name: str, *offsets: float) -> _MeshSource:
+def _e_series(
+    name: str, *offsets: float, parts: Mapping[Link, tuple[str, ...]] = MappingProxyType({})
+) -> _MeshSource:
     a, b, c, d, e = offsets
     return _MeshSource(
         package='airo-models',
         folder=f'arms/{name}',
         visual='obj',
         collision='obj',
+        parts=parts,
         offsets=(a, b, c, d, e),
     )
 
 
-_UR5E = _e_series('ur5e', 0.138, 0.007, -0.127, -0.0997, -0.0989)
+_UR5E = _e_series(
+    'ur5e',
+    0.138,
+    0.007,
+    -0.127,
+    -0.0997,
+    -0.0989,
+    parts={
+        link: tuple(f'{link.name.lower()}_link_part_{k}' for k in range(3))
+        for link in (Link.UPPER_ARM, Link.FOREARM)
+    },
+)
 #: The meshes of each model that has any. Offsets: the robot descriptions in these packages.
 _SOURCES: Mapping[str, _MeshSource] = MappingProxyType(
     {
@@ -154,6 +173,11 @@ _SOURCES: Mapping[str, _MeshSource] = MappingProxyType(
 )
 #: Models that have meshes.
 MODELS_WITH_MESHES: tuple[str, ...] = tuple(_SOURCES)
+
+
+def mesh_model(name: str) -> str:
+    """Return the model whose meshes a model has."""
+    return Path(_SOURCES[name].folder).name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,17 +207,18 @@ def link_shapes(arm: Arm, detail: Detail = 'visual') -> tuple[LinkShape, ...]:
 
 def link_meshes(name: str, detail: Detail) -> tuple[LinkShape, ...]:
     """
-    Return the meshes of a model, one for each of :data:`ARM_LINKS`.
+    Return the meshes of a model, one or more for each of :data:`ARM_LINKS`, in their order.
 
     :raises ValueError: the model has none.
     :raises FileNotFoundError: their package is not installed.
     """
     if name not in _SOURCES:
-        raise ValueError(f'There are no meshes of a {name}.')
+        raise ValueError(f'there are no meshes of the {name}')
     source = _SOURCES[name]
     return tuple(
-        LinkShape(link=link, T_link_shape=source.placement(link), mesh=source.file(link, detail))
+        LinkShape(link=link, T_link_shape=source.placement(link), mesh=file)
         for link in ARM_LINKS
+        for file in source.files(link, detail)
     )
 
 
@@ -206,7 +231,7 @@ def link_cylinders(arm: Arm) -> tuple[LinkShape, ...]:
         vector = end - start
         length = float(np.linalg.norm(vector))
         x, y, z = (0.5 * (start + end)).tolist()
-        T_base_shape = Pose((x, y, z), _turn_z_to(*(vector / length).tolist()))
+        T_base_shape = Pose((x, y, z), shortest_turn_of_z(*(vector / length).tolist()))
         shapes.append(
             LinkShape(
                 link=link,
@@ -277,11 +302,11 @@ def _on_axis(frame: Pose, origin: Vector3, axis: Vector3) -> Pose:
     """Return the frame moved and turned by the shortest way so that its z lies on an axis."""
     a, p = np.array(axis), np.array(frame.position)
     x, y, z = (np.array(origin) + a * (a @ (p - np.array(origin)))).tolist()
-    turn = _turn_z_to(*rotate(conjugate(frame.quaternion), axis))
+    turn = shortest_turn_of_z(*rotate(conjugate(frame.quaternion), axis))
     return Pose((x, y, z), multiply(frame.quaternion, turn))
 
 
-def _turn_z_to(x: float, y: float, z: float) -> Quaternion:
+def shortest_turn_of_z(x: float, y: float, z: float) -> Quaternion:
     """Return the shortest rotation from z to a unit vector."""
     across = hypot(x, y)
     if across == 0.0:

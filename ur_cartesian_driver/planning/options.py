@@ -66,8 +66,8 @@ class PlanningOptions:
     #: What to do with a line or an arc that cannot arrive in the requested posture, or that the
     #: arm cannot follow although it can reach the end.
     on_posture_change: PostureChoice = 'refuse'
-    #: What to do where the arm comes too close to itself; auto: meshes refuse, capsules, which
-    #: are thicker than the arm, warn.
+    #: What to do where the arm comes too close to itself; auto: refuse for the models that have
+    #: meshes, warn for the others.
     self_collision: CollisionChoice = 'auto'
     #: Minimum distance of the arm to itself [m].
     min_clearance: float = 0.005

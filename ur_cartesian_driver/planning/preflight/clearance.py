@@ -4,16 +4,17 @@
 Check the clearance of the arm from itself and from the workspace planes along its whole path.
 
 Capsules are checked in every row; where they come close, meshes measure exactly, for the models
-that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). An arm that starts too
-close can move away: rows pass as long as a pair that is too close at the start only separates,
-until it is clear; from then on it is treated like all others.
+that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether less than
+`min_clearance` refuses or warns depends on `self_collision` and the model, never on what is
+installed. An arm that starts too close can move away: rows pass as long as a pair that is too
+close at the start only separates, until it is clear; from then on it is treated like all others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import inf
 from typing import TypeAlias
 
@@ -22,7 +23,8 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
-from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
+from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -59,12 +61,12 @@ class ClearanceResult:
 
     #: What refuses the goal ...
     violation: Violation | None
-    #: ... and what only warns, because capsules are thicker than the arm.
+    #: ... and what only warns.
     warning: Violation | None
     #: The smallest distance of all rows [m], negative where capsules overlap or a plane is
     #: crossed, infinite where nothing is checked; between capsules it is a lower bound.
     margin: float
-    #: The pair with that distance.
+    #: The pair with that distance, and the shapes that it was measured between.
     description: str
 
 
@@ -77,11 +79,11 @@ class Clearance:
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
-        """Prepare bodies and planes, and load the meshes if they are needed."""
+        """Prepare bodies and planes."""
         bodies = _bodies(arm, T_flange_tcp, options.tool_radius)
         self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
         if options.self_collision != 'off':
-            self._checkers.append(_SelfCollisionChecker(bodies, options))
+            self._checkers.append(_SelfCollisionChecker(bodies, T_flange_tcp, options))
         if planes := parse_planes(options.workspace_planes):
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
 
@@ -102,16 +104,14 @@ class Clearance:
                 lower, distances = checker.measure(q[begin : begin + _BLOCK], initial.pending)
                 row, column = np.unravel_index(np.argmin(distances), distances.shape)
                 if distances[row, column] < margin:
-                    margin, description = (
-                        float(distances[row, column]),
-                        checker.description[column],
-                    )
+                    margin = float(distances[row, column])
+                    description = checker.description(int(column), float(lower[row, column]))
                 refused = initial.refused(lower, distances)
-                found, remark = (
-                    _first(checker, refused & columns, distances, q[begin:], begin)
-                    for columns in (checker.refuses, ~checker.refuses)
-                )
-                violation, warning = _earlier(violation, found), _earlier(warning, remark)
+                found = _first(checker, refused, distances, q[begin:], begin)
+                if checker.refuses:
+                    violation = _earlier(violation, found)
+                else:
+                    warning = _earlier(warning, found)
             if violation is not None:
                 break
         return ClearanceResult(
@@ -217,21 +217,32 @@ def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
 class _SelfCollisionChecker:
     """The links of the arm, and the tool, against each other."""
 
-    def __init__(self, bodies: CollisionBodies, options: PlanningOptions) -> None:
-        self._bodies = bodies
-        self._meshes = CollisionMeshes.of(bodies.arm)
+    def __init__(
+        self, bodies: CollisionBodies, T_flange_tcp: Pose, options: PlanningOptions
+    ) -> None:
+        self._bodies, self._tcp, self._options = bodies, T_flange_tcp, options
+        self._name = bodies.arm.model.name
         self._bound = options.min_clearance
-        exact = np.array([self._has_mesh(pair) for pair in bodies.pairs], dtype=np.bool_)
-        choice = options.self_collision
-        #: By column: the minimum distance, whether less is refused, and the pair.
+        #: The minimum distance by column, and whether less is refused.
         self.bounds = np.full(len(bodies.pairs), self._bound)
-        self.refuses: Flags = (
-            exact if choice == 'auto' else np.full(len(exact), choice == 'refuse')
-        )
-        self.description = [f'{a} and {b}' for a, b in bodies.pairs]
+        self.refuses = refuses_self_collision(self._name, options)
 
-    def _has_mesh(self, pair: tuple[Link, Link]) -> bool:
-        return self._meshes is not None and Link.TOOL not in pair
+    @cached_property
+    def _meshes(self) -> CollisionMeshes | None:
+        """The meshes, loaded where capsules first come close: most goals need none."""
+        if missing_meshes(self._name):
+            return None
+        return CollisionMeshes(self._bodies.arm, self._tcp, self._options.tool_radius)
+
+    def description(self, column: int, lower: float) -> str:
+        """Return the pair of a column, and the shapes, given the distance of its capsules."""
+        a, b = self._bodies.pairs[column]
+        exact = lower < self._bound and self._meshes is not None
+        return f'{a} and {b} ({self._mesh_name if exact else "capsules"})'
+
+    @property
+    def _mesh_name(self) -> str:
+        return f'meshes of the {mesh_model(self._name)}'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
@@ -241,13 +252,13 @@ class _SelfCollisionChecker:
             below the bound (then they are 0), which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
-        if self._meshes is None:
+        close = np.flatnonzero((lower < self._bound).any(axis=0))
+        if not len(close) or self._meshes is None:
             return lower, lower
         distances = lower.copy()
-        for column, pair in enumerate(self._bodies.pairs):
+        for column in close:
+            pair = self._bodies.pairs[column]
             rows = np.flatnonzero(lower[:, column] < self._bound)
-            if not len(rows) or Link.TOOL in pair:
-                continue
             if pending[column]:
                 distances[rows, column] = self._meshes.distances(pair, q[rows])
             else:
@@ -258,19 +269,39 @@ class _SelfCollisionChecker:
     def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
         """Return the words for a row, whose joints are ``q`` (1, 6)."""
         a, b = self._bodies.pairs[column]
-        between = advice = ''
-        if self._meshes is not None and Link.TOOL not in (a, b):
+        if self._meshes is not None:
             distance = float(self._meshes.distances((a, b), q)[0])
+            shapes, advice = self._mesh_name, ''
         else:
-            between = ' (measured between capsules, which are thicker than the arm)'
+            shapes = 'capsules, which are thicker than the arm'
             advice = '; self_collision decides whether capsules refuse'
         near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
-        near += f', less than min_clearance = {self._bound:.4f} m'
         return Violation(
             row=row,
-            text=f'{a} and {b} {near}{between}',
+            text=f'{a} and {b} {near}, less than min_clearance = {self._bound:.4f} m '
+            f'(measured between {shapes})',
             remedy=f'take another path or posture, or lower min_clearance{advice}',
         )
+
+
+def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
+    """Tell whether a goal is refused where an arm of a model comes too close to itself."""
+    choice = options.self_collision
+    return choice == 'refuse' or (choice == 'auto' and name in MODELS_WITH_MESHES)
+
+
+def self_collision_remark(name: str, options: PlanningOptions) -> str:
+    """Return what the check of a model has to do without, a sentence; '' where nothing counts."""
+    missing, refuses = missing_meshes(name), refuses_self_collision(name, options)
+    if not missing or options.self_collision == 'off':
+        return ''
+    if name not in MODELS_WITH_MESHES and not refuses:
+        return ''  # nobody has them, and nothing is refused
+    verdict = 'refuse' if refuses else 'warn of'
+    return (
+        f'{missing[0].upper()}{missing[1:]}: capsules, which are thicker than the arm, {verdict} '
+        f'self-collisions (self_collision is {options.self_collision}).'
+    )
 
 
 class _PlaneChecker:
@@ -289,11 +320,13 @@ class _PlaneChecker:
         # Bodies of the same link are adjacent.
         self._begins = [i for i, link in enumerate(links) if i == 0 or links[i - 1] != link]
         self._names = [str(links[i]) for i in self._begins] + ['TCP']
-        self.description = [
-            f'{name} and the plane "{plane.name}"' for plane in planes for name in self._names
-        ]
         self.bounds = np.repeat([plane.margin - _ON_PLANE for plane in planes], len(self._names))
-        self.refuses: Flags = np.ones(len(self.description), dtype=np.bool_)
+        self.refuses = True
+
+    def description(self, column: int, lower: float) -> str:
+        """Return the pair of a column."""
+        number, which = divmod(column, len(self._names))
+        return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """Return the heights of all links and the TCP above the planes, (n, columns), twice."""
