@@ -9,6 +9,7 @@ tf_prefixes and, on one address, different ports (0: any free port).
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -83,6 +84,13 @@ ARGUMENTS = [
         default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
         description='YAML file with parameters; the arguments above override it.',
     ),
+    DeclareLaunchArgument(
+        'launch_rviz',
+        default_value='false',
+        choices=['true', 'false'],
+        description='Start RViz with the arm and its plan; the driver then publishes the frames '
+        'of the links, so that no robot_state_publisher is needed.',
+    ),
 ]
 STRINGS = ['ur_type', 'robot_ip', 'reverse_ip', 'tf_prefix']
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
@@ -96,6 +104,9 @@ def generate_launch_description():
         name: ParameterValue(LaunchConfiguration(name), value_type=type_)
         for name, type_ in types.items()
     }
+    parameters['publish_link_frames'] = ParameterValue(
+        LaunchConfiguration('launch_rviz'), value_type=bool
+    )
     driver = Node(
         package=PACKAGE,
         executable='driver',
@@ -104,4 +115,16 @@ def generate_launch_description():
         output='screen',
         emulate_tty=True,
     )
-    return LaunchDescription([*ARGUMENTS, driver])
+    rviz = Node(
+        package='rviz2',
+        executable='rviz2',
+        namespace=LaunchConfiguration('namespace'),
+        arguments=[
+            '--display-config',
+            PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.rviz']),
+            '--fixed-frame',
+            [LaunchConfiguration('tf_prefix'), 'base'],
+        ],
+        condition=IfCondition(LaunchConfiguration('launch_rviz')),
+    )
+    return LaunchDescription([*ARGUMENTS, driver, rviz])

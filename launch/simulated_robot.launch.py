@@ -31,6 +31,12 @@ ARGUMENTS = [
         'tf_prefix', default_value='', description='Prefix of joint and frame names.'
     ),
     DeclareLaunchArgument('namespace', default_value='', description='Namespace of the node.'),
+    DeclareLaunchArgument(
+        'launch_rviz',
+        default_value='false',
+        choices=['true', 'false'],
+        description='Start RViz with the arm and its plan.',
+    ),
 ]
 
 
@@ -57,7 +63,7 @@ def generate_launch_description():
         launch_arguments={
             **{
                 name: LaunchConfiguration(name)
-                for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace')
+                for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace', 'launch_rviz')
             },
             'headless_mode': 'true',
             **dict.fromkeys(ports, '0'),  # any free ports: no client needs to know them

@@ -35,6 +35,7 @@ LAUNCH_ARGUMENTS = {
         'script_command_port',
         'namespace',
         'config_file',
+        'launch_rviz',
     },
     'two_arms.launch.py': {
         'left_robot_ip',
@@ -44,7 +45,14 @@ LAUNCH_ARGUMENTS = {
         'headless_mode',
         'config_file',
     },
-    'simulated_robot.launch.py': {'ur_type', 'robot_ip', 'polyscope', 'tf_prefix', 'namespace'},
+    'simulated_robot.launch.py': {
+        'ur_type',
+        'robot_ip',
+        'polyscope',
+        'tf_prefix',
+        'namespace',
+        'launch_rviz',
+    },
 }
 
 
@@ -143,6 +151,7 @@ def test_files_that_are_not_python_are_installed_with_the_package():
 @pytest.mark.parametrize(
     'path',
     [
+        'config/driver.rviz',
         'config/driver.yaml',
         'launch/driver.launch.py',
         'msg/CartesianTrajectory.msg',
@@ -190,7 +199,7 @@ def test_a_launch_file_starts_an_executable_that_is_installed():
             if keyword.arg == 'executable'
         ]
         assert started, path.name
-        assert {ast.literal_eval(value) for value in started} <= set(EXECUTABLES)
+        assert {ast.literal_eval(value) for value in started} <= {*EXECUTABLES, 'rviz2'}
 
 
 def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():

@@ -13,9 +13,10 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64
+from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 
+from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import (
@@ -40,6 +41,7 @@ TOPICS = {
     'ur_cartesian_driver/wrench': (WrenchStamped, STATE_QOS),
     'ur_cartesian_driver/io_states': (IOStates, LATCHED_QOS),
     'ur_cartesian_driver/tool_data': (ToolData, LATCHED_QOS),
+    'ur_cartesian_driver/robot_description': (String, LATCHED_QOS),
     'diagnostics': (DiagnosticArray, STATE_QOS),
     'ur_cartesian_driver/speed_scaling': (Float64, STATE_QOS),
     'ur_cartesian_driver/robot_mode': (RobotMode, LATCHED_QOS),
@@ -79,6 +81,12 @@ def test_the_state_of_the_robot_is_published(single_cell):
     assert status.robot_model == 'ur5e'
     cell.spin_until(lambda: newest['ur_cartesian_driver/status'].serial_number == '20000000000')
     assert newest['ur_cartesian_driver/wrench'].header.frame_id == 'tool0_controller'
+    cell.spin_until(
+        lambda: (
+            newest['ur_cartesian_driver/robot_description'].data
+            == robot_description(cell.node.driver.arm)
+        )
+    )
 
 
 def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell):

@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
 from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalContext, GoalHandle, GoalRun
+from ur_cartesian_driver.ros.goals.plan_marker_publisher import PlanMarkerPublisher
 from ur_cartesian_driver.ros.messages.action_messages import result_message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.tf.tf_lookup import listen_to_tf
@@ -55,6 +56,7 @@ class CartesianActionServer:
             frames=settings.frames.with_transforms(self._transforms),
             clock=node.get_clock(),
             settings=settings,
+            show=PlanMarkerPublisher(node, settings.frames.base).publish,
         )
         # Guards the runs of the goals that have not ended, and the flag.
         self._lock = threading.Lock()

@@ -58,6 +58,8 @@ class GoalContext:
     frames: Frames
     clock: Clock
     settings: Settings
+    #: Shows a plan; called in the threads of goals.
+    show: Callable[[Plan], None]
 
     def now(self) -> int:
         """Return the time of the node's clock [ns]."""
@@ -168,6 +170,7 @@ class GoalRun:
         )
         if request.validate_only:
             plan = self._plan(goal)
+            context.show(plan)
             return Outcome(
                 code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.', report=plan.report
             )
@@ -266,6 +269,7 @@ class GoalRun:
             self._motion = motion
             abort_requested = self._abort_requested.is_set()
         self._begun.set()
+        self._context.show(plan)  # while it moves: a long plan takes a while
         if abort_requested:
             motion.cancel()
         elif self.arm_request.preempted_by:

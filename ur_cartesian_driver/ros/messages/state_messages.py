@@ -17,8 +17,18 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from ur_cartesian_driver.driver import ConnectionStatus
+from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
+from ur_cartesian_driver.kinematics.robot_description import LINK_NAMES
 from ur_cartesian_driver.motion.io_signals import AnalogChannel, Signals
-from ur_cartesian_driver.motion.pose import conjugate, rotate
+from ur_cartesian_driver.motion.known_frames import (
+    BASE,
+    BASE_LINK,
+    FLANGE,
+    T_BASE_BASE_LINK,
+    T_TOOL0_FLANGE,
+    TOOL0,
+)
+from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
@@ -73,12 +83,33 @@ def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
 
 def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> TransformStamped:
     """Return the measured pose of the active TCP as a transform for tf."""
+    return _transform(state.actual_tcp_pose, base, tcp, stamp)
+
+
+def link_transforms(
+    state: RobotState, frames: LinkFrames, tf_prefix: str, stamp: Time
+) -> list[TransformStamped]:
+    """Return the frames of the robot description as they are now, all of them in ``base``."""
+    rows = frames.poses(np.array([state.actual_q]))[0]
+    T_base_tool0 = pose_from_row(rows[-1]) @ frames.flange
+    found = {
+        BASE_LINK: T_BASE_BASE_LINK,
+        **dict(zip(LINK_NAMES[1:], map(pose_from_row, rows[1:]), strict=True)),
+        TOOL0: T_base_tool0,
+        FLANGE: T_base_tool0 @ T_TOOL0_FLANGE,
+    }
+    return [
+        _transform(pose, tf_prefix + BASE, tf_prefix + name, stamp) for name, pose in found.items()
+    ]
+
+
+def _transform(pose: Pose, parent: str, child: str, stamp: Time) -> TransformStamped:
     return TransformStamped(
-        header=Header(stamp=stamp, frame_id=base),
-        child_frame_id=tcp,
+        header=Header(stamp=stamp, frame_id=parent),
+        child_frame_id=child,
         transform=Transform(
-            translation=vector_message(state.actual_tcp_pose.position),
-            rotation=quaternion_message(state.actual_tcp_pose.quaternion),
+            translation=vector_message(pose.position),
+            rotation=quaternion_message(pose.quaternion),
         ),
     )
 

@@ -43,6 +43,7 @@ class NodeSettings:
     goal_time_tolerance: float = 1.0
     state_publish_rate: float = 50.0
     diagnostics_rate: float = 1.0
+    publish_link_frames: bool = False
     static_frames: tuple[str, ...] = ()
     tf_max_age: float = 1.0
     live_target_enabled: bool = False

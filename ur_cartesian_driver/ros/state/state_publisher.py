@@ -25,15 +25,19 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64
+from std_msgs.msg import Bool, Float64, String
 
 from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
+from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,
     joint_state_message,
+    link_transforms,
     robot_mode_message,
     safety_mode_message,
     status_message,
@@ -78,6 +82,7 @@ class StatePublisher:
         self._period = 1.0 / settings.node.state_publish_rate
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name='state publisher', daemon=True)
+        self._description_topic = _DescriptionTopic(node, settings.planning.tf_prefix)
         self._state_topics = _StateTopics(node, settings)
         self._status_topics = _StatusTopics(node)
         self._io_topics = _IoTopics(node)
@@ -113,10 +118,25 @@ class StatePublisher:
     def _publish(self, now: float) -> None:
         driver, stamp = self._driver, self._clock.now().to_msg()
         state = driver.state
-        self._state_topics.publish(state, stamp)
+        self._description_topic.publish(driver.arm)
+        self._state_topics.publish(state, driver.arm, stamp)
         self._status_topics.publish(driver, state, now, stamp)
         self._io_topics.publish(driver.signals, stamp)
         self._diagnostics_topic.publish(driver, now, stamp)
+
+
+class _DescriptionTopic:
+    """``~/robot_description``: latched, again when the calibration is known."""
+
+    def __init__(self, node: Node, tf_prefix: str) -> None:
+        self._tf_prefix = tf_prefix
+        self._topic = node.create_publisher(String, '~/robot_description', LATCHED_QOS)
+        self._last: Arm | None = None
+
+    def publish(self, arm: Arm) -> None:
+        if arm is not self._last:
+            self._last = arm
+            self._topic.publish(String(data=robot_description(arm, self._tf_prefix)))
 
 
 class _StateTopics:
@@ -133,8 +153,11 @@ class _StateTopics:
         self._tf_message_type: Any = None if tf is None else tf.TFMessage
         self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF_QOS)
         self._last: RobotState | None = None
+        self._publishes_links = settings.node.publish_link_frames
+        self._tf_prefix = settings.planning.tf_prefix
+        self._arm: Arm | None = None
 
-    def publish(self, state: RobotState | None, stamp: Time) -> None:
+    def publish(self, state: RobotState | None, arm: Arm, stamp: Time) -> None:
         last, self._last = self._last, state
         if state is None or (last is not None and state.timestamp == last.timestamp):
             return
@@ -143,11 +166,12 @@ class _StateTopics:
         self._wrench.publish(wrench_message(state, self._tcp, stamp))
         self._speed_scaling.publish(Float64(data=state.effective_speed))
         if self._tf is not None:
-            self._tf.publish(
-                self._tf_message_type(
-                    transforms=[tcp_transform(state, self._base, self._tcp, stamp)]
-                )
-            )
+            transforms = [tcp_transform(state, self._base, self._tcp, stamp)]
+            if self._publishes_links:
+                if arm is not self._arm:
+                    self._arm, self._link_frames = arm, LinkFrames(arm)
+                transforms += link_transforms(state, self._link_frames, self._tf_prefix, stamp)
+            self._tf.publish(self._tf_message_type(transforms=transforms))
 
 
 class _StatusTopics:

@@ -1,0 +1,124 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A plan as markers for RViz."""
+
+from __future__ import annotations
+
+from math import ceil
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Vector3
+import numpy as np
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.ros.message_fields import pose_message
+
+#: How many samples of a path, and how many points are drawn at most.
+MAX_SAMPLES = 5000
+MAX_POINTS = 500
+#: Width of the path and diameter of the points [m].
+PATH_WIDTH, POINT_SIZE = 0.004, 0.01
+#: Length of the axes of the start and the end [m].
+AXIS_LENGTH = 0.05
+
+
+def _colour(red: int, green: int, blue: int) -> ColorRGBA:
+    return ColorRGBA(r=red / 255.0, g=green / 255.0, b=blue / 255.0, a=1.0)
+
+
+#: Colours of the motions, as on the page with the picture of a plan.
+COLOURS = {
+    'MoveL': _colour(30, 110, 220),
+    'MoveP': _colour(20, 150, 90),
+    'MoveC': _colour(230, 130, 20),
+    'MoveJ': _colour(150, 60, 190),
+    'OptimoveL': _colour(0, 160, 190),
+    'OptimoveJ': _colour(200, 60, 140),
+    'Spline': _colour(60, 80, 200),
+}
+BLEND_COLOUR = _colour(240, 200, 60)
+POINT_COLOUR = _colour(50, 60, 70)
+_AXES = (
+    ((1.0, 0.0, 0.0), _colour(220, 50, 50)),
+    ((0.0, 1.0, 0.0), _colour(50, 180, 50)),
+    ((0.0, 0.0, 1.0), _colour(50, 80, 220)),
+)
+
+
+def plan_markers(plan: Plan, base: str, stamp: Time) -> MarkerArray:
+    """
+    Return a plan as markers, which replace those of the plan before.
+
+    Namespace ``path``: the path of the TCP, each piece in the colour of its motion; ``points``:
+    the points of the goal; ``ends``: the axes of the TCP at the start and at the end.
+
+    :param base: the frame of the robot's base.
+    """
+    header = Header(stamp=stamp, frame_id=base)
+    ends = [plan.reference.poses[row] for row in (0, -1)]
+    return MarkerArray(
+        markers=[
+            Marker(header=header, action=Marker.DELETEALL),
+            _path(plan, header),
+            _points(plan, header),
+            *(_axes(row, number, header) for number, row in enumerate(ends)),
+        ]
+    )
+
+
+def _path(plan: Plan, header: Header) -> Marker:
+    reference = plan.reference
+    kinds = dict(
+        zip(
+            plan.rows.waypoints.tolist(),
+            (type(primitive).__name__ for primitive in plan.rows.primitives),
+            strict=True,
+        )
+    )
+    rows = _some(len(reference.poses), MAX_SAMPLES)
+    blended = np.any(reference.blend_tolerance[rows], axis=1).tolist()
+    marker = Marker(header=header, ns='path', type=Marker.LINE_STRIP)
+    marker.scale.x = PATH_WIDTH
+    marker.points = _positions(reference.poses[rows])
+    marker.colors = [
+        BLEND_COLOUR if on_blend else COLOURS[kinds[point]]
+        for point, on_blend in zip(reference.point[rows].tolist(), blended, strict=True)
+    ]
+    return marker
+
+
+def _points(plan: Plan, header: Header) -> Marker:
+    waypoints = plan.goal.waypoints
+    marker = Marker(header=header, ns='points', type=Marker.SPHERE_LIST, color=POINT_COLOUR)
+    marker.scale = Vector3(x=POINT_SIZE, y=POINT_SIZE, z=POINT_SIZE)
+    marker.points = [
+        pose_message(waypoints[k].pose).position for k in _some(len(waypoints), MAX_POINTS)
+    ]
+    return marker
+
+
+def _axes(row: Floats, number: int, header: Header) -> Marker:
+    x, y, z, qx, qy, qz, qw = row.tolist()
+    marker = Marker(header=header, ns='ends', id=number, type=Marker.LINE_LIST)
+    marker.pose.position = Point(x=x, y=y, z=z)
+    for name, value in zip('xyzw', (qx, qy, qz, qw), strict=True):
+        setattr(marker.pose.orientation, name, value)
+    marker.scale.x = PATH_WIDTH
+    for direction, colour in _AXES:
+        x, y, z = (AXIS_LENGTH * part for part in direction)
+        marker.points += [Point(), Point(x=x, y=y, z=z)]
+        marker.colors += [colour, colour]
+    return marker
+
+
+def _some(count: int, most: int) -> list[int]:
+    """Return the indices of rows, evenly spaced if there are too many, and of the last one."""
+    rows = list(range(0, count, max(1, ceil(count / most))))
+    return rows if rows[-1:] == [count - 1] or not count else [*rows, count - 1]
+
+
+def _positions(poses: Floats) -> list[Point]:
+    return [Point(x=x, y=y, z=z) for x, y, z in np.asarray(poses)[:, :3].tolist()]
