@@ -40,6 +40,7 @@ REQUIRES = [
     'ros-jazzy-std-srvs>=5.3,<6',
     'ros-jazzy-unique-identifier-msgs>=2.5,<3',
     'ros-jazzy-visualization-msgs>=5.3,<6',
+    'tqdm>=4.66,<5',
     'urllib3>=2.0,<3',
 ]
 EXTRAS = {

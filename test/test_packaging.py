@@ -229,5 +229,6 @@ def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
         'python3-matplotlib',
         'python3-numpy',
         'python3-yaml',
+        'python3-tqdm',
         'python3-urllib3',
     }

@@ -20,12 +20,15 @@ import signal
 import sys
 from types import FrameType
 
+import numpy as np
+
 from ur_cartesian_driver.cli import (
     check_robot,
     commands,
     import_command,
     plan_commands,
     recording_plot,
+    sweep_command,
 )
 from ur_cartesian_driver.importing.import_options import (
     CodeOutput,
@@ -43,6 +46,8 @@ from ur_cartesian_driver.sim.faults.fault_values import Fault
 
 #: Of options that are times [s].
 MAX_SECONDS = 86400.0
+#: Of offsets of a goal [m], [rad].
+MAX_OFFSET = 50.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
     _add_send(sub)
     _add_validate(sub)
     _add_show(sub)
+    _add_sweep(sub)
     _add_import(sub)
     _add_where(sub)
     _add_check_robot(sub)
@@ -355,6 +361,50 @@ def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
+def _add_sweep(sub: Commands[argparse.ArgumentParser]) -> None:
+    command = _add(
+        sub,
+        'sweep',
+        sweep_command.sweep_goal,
+        'plan a goal at other places, on other robots and calibrations, and print the margins',
+    )
+    _add_planning(command)
+    for name, unit in (('x', 'm'), ('y', 'm'), ('z', 'm'), ('rz', 'rad')):
+        command.add_argument(
+            f'--{name}',
+            type=_offsets,
+            default=(0.0,),
+            metavar='FROM,TO,COUNT',
+            help=f"offsets of the goal's frame [{unit}], like -0.1,0.1,5",
+        )
+    command.add_argument(
+        '--model',
+        action='append',
+        default=[],
+        choices=sorted(MODELS),
+        help='model of the robot, instead of --ur-type; may be given several times',
+    )
+    command.add_argument(
+        '--monte-carlo',
+        type=_count,
+        default=0,
+        metavar='N',
+        help='plan each variant for N arms with random calibrations',
+    )
+    command.add_argument('--seed', type=_count, default=0, help='of the first of these')
+    command.add_argument(
+        '--margin',
+        default='singularity',
+        choices=sorted(sweep_command.MARGINS),
+        help='what the printed map shows',
+    )
+    command.add_argument(
+        '--processes', type=_count, default=0, metavar='N', help='0 = one for each core'
+    )
+    command.add_argument('-o', '--output', metavar='TABLE', help='file of comma-separated values')
+    command.add_argument('--picture', help='heat maps of all margins')
+
+
 def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
     bring = _add(
         sub,
@@ -522,6 +572,26 @@ def _six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
         if not abs(number) <= bound:  # NaN neither
             raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
     return numbers
+
+
+def _offsets(text: str) -> tuple[float, ...]:
+    try:
+        first, last, count = text.split(',')
+        offsets = np.linspace(float(first), float(last), _count(count)).round(9).tolist()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is not FROM,TO,COUNT') from None
+    if not offsets or not all(abs(offset) <= MAX_OFFSET for offset in offsets):  # NaN neither
+        raise argparse.ArgumentTypeError(f'{text!r} is not within {MAX_OFFSET:g}, or has no count')
+    return tuple(offsets)
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if not 0 <= count <= sweep_command.MAX_VARIANTS:
+        raise argparse.ArgumentTypeError(
+            f'{text} is not within 0 and {sweep_command.MAX_VARIANTS}'
+        )
+    return count
 
 
 def _joints(text: str) -> tuple[float, ...]:

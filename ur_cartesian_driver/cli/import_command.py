@@ -9,6 +9,7 @@ from pathlib import Path
 import sys
 
 from ur_cartesian_driver.cli.commands import calibration
+from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.goal_files import fields_of_goal, goal_text
 from ur_cartesian_driver.importing import (
     BrokenFile,
@@ -30,11 +31,12 @@ MANY_POINTS = 200
 def import_goal(arguments: argparse.Namespace) -> int:
     """Write the goal, and say what was left out."""
     try:
-        imported = import_file(arguments.file, options_of(arguments), arguments.format)
+        with timed('importing'):
+            imported = import_file(arguments.file, options_of(arguments), arguments.format)
+            goal = imported.goal
+            text = goal_text(fields_of_goal(goal, packed=len(goal.waypoints) >= MANY_POINTS))
     except (BrokenFile, ImportError) as error:
         raise ValueError(f'{arguments.file}: {error}') from None
-    goal = imported.goal
-    text = goal_text(fields_of_goal(goal, packed=len(goal.waypoints) >= MANY_POINTS))
     if arguments.output:
         Path(arguments.output).write_text(text, encoding='utf-8')
     else:

@@ -19,6 +19,7 @@ from time import time_ns
 import webbrowser
 
 from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
+from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
@@ -135,7 +136,8 @@ class GoalPlanning:
             snapshot=ArmSnapshot.of(self.state),
             time_tolerance=settings.node.goal_time_tolerance,
         )
-        return plan(self.goal, self.state, self.arm, options)
+        with timed('planning'):
+            return plan(self.goal, self.state, self.arm, options)
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -1,0 +1,103 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian sweep``: plan one goal for other places, other robots, other calibrations."""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+import csv
+from dataclasses import replace
+from math import prod
+from multiprocessing import get_context
+from pathlib import Path as FilePath
+import sys
+
+from ur_cartesian_driver.cli.commands import calibration, read_goal
+from ur_cartesian_driver.cli.progress import counted
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.path import Path
+from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sweep import (
+    at_places,
+    calibrated,
+    COLUMNS,
+    csv_rows,
+    draw,
+    heat_map,
+    on_models,
+    summary,
+    sweep,
+    table,
+    Variant,
+)
+
+#: What a map can show.
+MARGINS = tuple(COLUMNS)
+#: A grid of more variants is a mistake.
+MAX_VARIANTS = 100_000
+
+
+def sweep_goal(arguments: argparse.Namespace) -> int:
+    """Print what each variant comes to; the status is 0 if all of them pass."""
+    variants = variants_of(arguments)
+    count = arguments.processes
+    with counted('variants', len(variants)) as one_done:
+        if count:
+            with ProcessPoolExecutor(count, mp_context=get_context('forkserver')) as pool:
+                results = sweep(variants, pool, one_done)
+        else:
+            results = sweep(variants, on_result=one_done)
+    if arguments.output:
+        with open(arguments.output, 'w', encoding='utf-8', newline='') as file:
+            csv.writer(file).writerows(csv_rows(results))
+        print(f'table: {arguments.output}', file=sys.stderr)
+    else:
+        print(table(results))
+    if shown := heat_map(results, arguments.margin):
+        print(shown)
+    if arguments.picture:
+        draw(results, FilePath(arguments.picture))
+        print(f'picture: {arguments.picture}', file=sys.stderr)
+    print(summary(results))
+    return 0 if all(result.passes for result in results) else 1
+
+
+def variants_of(arguments: argparse.Namespace) -> list[Variant]:
+    """
+    Return the variants of a command line.
+
+    :raises ValueError: there are too many.
+    """
+    from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
+
+    settings = read_settings(arguments.params_file, arguments.param)
+    models = arguments.model or [arguments.ur_type or settings.driver.ur_type]
+    offsets = {name: getattr(arguments, name) for name in ('x', 'y', 'z', 'rz')}
+    count = prod(map(len, offsets.values())) * len(models) * max(1, arguments.monte_carlo)
+    if count > MAX_VARIANTS:
+        raise ValueError(f'the sweep has {count} variants; give {MAX_VARIANTS} at most')
+    if len(models) > 1 and (arguments.calibration or arguments.calibration_seed is not None):
+        raise ValueError('a calibration is that of one arm; give one model')
+    model, dialect = robot_model(models[0]), settings.driver.dialect
+    variant = Variant(
+        goal=Path.from_message(read_goal(arguments)),
+        arm=Arm(model, calibration(arguments, model)),
+        start=vector6(arguments.joints or SimulatorConfig().q),
+        T_flange_tcp=Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY,
+        options=replace(
+            settings.planning,
+            dialect=dialect,
+            allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
+        ),
+        frames=settings.frames,
+    )
+    variants = at_places(variant, **offsets)
+    if len(models) > 1:
+        variants = on_models(variants, models)
+    if arguments.monte_carlo:
+        variants = calibrated(variants, arguments.monte_carlo, arguments.seed)
+    return variants

@@ -1,0 +1,473 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Plan one goal in many variants: other places, other robots, arms as exactly built as real ones.
+
+::
+
+    variants = calibrated(at_places(Variant(path), x=(-0.1, 0.0, 0.1), y=(0.0, 0.1)), 20, seed=1)
+    results = sweep(variants)
+    print(table(results))
+    print(heat_map(results))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    as_completed,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+)
+from dataclasses import dataclass, field, replace
+from itertools import product
+from math import inf, isfinite, nan
+import multiprocessing
+import os
+from pathlib import Path as FilePath
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.pose import (
+    IDENTITY,
+    multiply,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.primitive import MoveJ, OptimoveJ
+from ur_cartesian_driver.motion.vectors import add, Vector6
+from ur_cartesian_driver.path import Path
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import Clearance
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    joint_limit_distances,
+    singularity_distance_rows,
+    SINGULARITY_MEASURES,
+)
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.preview import sample
+from ur_cartesian_driver.sim.calibration import random_calibration
+from ur_cartesian_driver.sim.simulator_config import HOME
+
+#: At so many times the margins of a plan are measured, but not closer together than a cycle [s].
+SAMPLES, MIN_PERIOD = 400, 0.008
+
+#: What a variant differs in: numbers [m], [rad], or names.
+Coordinate: TypeAlias = float | str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """A goal, and the arm that it is planned for."""
+
+    #: In a sweep a path is resolved with ``frames``.
+    goal: Goal | Path
+    arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
+    #: Joint positions in which the arm rests at the start [rad], and its active TCP.
+    start: Vector6 = HOME
+    T_flange_tcp: Pose = IDENTITY
+    options: PlanningOptions = field(default_factory=PlanningOptions)
+    frames: Frames = field(default_factory=Frames)
+    #: How far the goal is from where it says: of its frame along the axes of the base [m], and
+    #: about the base's z through the frame's origin [rad].
+    offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    #: By name, in what it differs from the other variants.
+    coordinates: Mapping[str, Coordinate] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Margins:
+    """The smallest distances on a planned motion from what would refuse it; NaN = not known."""
+
+    #: Of any joint from its limits [rad].
+    joint_limit: float = nan
+    #: From a singularity where the tool is led [rad]; 0.3 m of the shoulder count as 1 rad.
+    singularity: float = nan
+    #: Part of the speed of the fastest joint that is left, 0 to 1.
+    speed: float = nan
+    #: Of the arm and its tool from themselves and from planes [m]; infinite = nothing is checked.
+    clearance: float = nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepResult:
+    """What planning a variant came to."""
+
+    variant: Variant
+    #: Empty = the goal passes; else the sentence that refuses it.
+    refusal: str = ''
+    #: None = the refusal is no verdict: planning itself failed.
+    code: ErrorCode | None = ErrorCode.SUCCESSFUL
+    margins: Margins = Margins()
+    #: Expected time of the motion [s].
+    duration: float = nan
+
+    @property
+    def passes(self) -> bool:
+        """Tell whether the arm could carry the goal out."""
+        return not self.refusal
+
+
+def at_places(
+    variants: Variant | Iterable[Variant],
+    x: Sequence[float] = (0.0,),
+    y: Sequence[float] = (0.0,),
+    z: Sequence[float] = (0.0,),
+    rz: Sequence[float] = (0.0,),
+) -> list[Variant]:
+    """
+    Return each variant at all places of a grid.
+
+    :param x: offsets of the goal's frame along the base's x [m]; as ``y`` and ``z``.
+    :param rz: turns about the base's z through the frame's origin [rad].
+    """
+    axes = {'x': x, 'y': y, 'z': z, 'rz': rz}
+    named = [name for name, values in axes.items() if len(values) > 1]
+    return [
+        replace(
+            variant,
+            offset=(place[0], place[1], place[2], place[3]),
+            coordinates={**variant.coordinates}
+            | {name: v for name, v in zip(axes, place, strict=True) if name in named},
+        )
+        for variant in _each(variants)
+        for place in product(*(map(float, values) for values in axes.values()))
+    ]
+
+
+def on_models(variants: Variant | Iterable[Variant], names: Iterable[str]) -> list[Variant]:
+    """Return each variant on arms of other models, as they are designed."""
+    arms = {name: Arm(robot_model(name)) for name in names}
+    return [
+        replace(variant, arm=arm, coordinates={**variant.coordinates, 'model': name})
+        for variant in _each(variants)
+        for name, arm in arms.items()
+    ]
+
+
+def calibrated(variants: Variant | Iterable[Variant], count: int, seed: int = 0) -> list[Variant]:
+    """
+    Return each variant on ``count`` arms whose axes deviate at random, as those of real arms do.
+
+    The flange of such an arm is 1 to 2 mm off; the same seed makes the same arms.
+    """
+    return [
+        replace(
+            variant,
+            arm=Arm(variant.arm.model, random_calibration(variant.arm.model, seed + i)),
+            coordinates={**variant.coordinates, 'calibration': float(seed + i)},
+        )
+        for variant in _each(variants)
+        for i in range(count)
+    ]
+
+
+def _each(variants: Variant | Iterable[Variant]) -> Iterable[Variant]:
+    return (variants,) if isinstance(variants, Variant) else variants
+
+
+def sweep(
+    goals: Iterable[Variant | Goal | Path],
+    executor: Executor | None = None,
+    on_result: Callable[[], object] = lambda: None,
+) -> list[SweepResult]:
+    """
+    Plan goals beside each other, and return what each came to, in their order.
+
+    A goal that is refused, fails, or ends its process loses no other.
+
+    :param goals: variants, or goals and paths for a UR5e in its home position.
+    :param executor: runs them; None = a process for each core. It outlives the call.
+    :param on_result: called as each is done.
+    """
+    variants = [g if isinstance(g, Variant) else Variant(goal=g) for g in goals]
+    if executor is not None:
+        return [
+            _failed(variant, found) if isinstance(found, Exception) else found
+            for variant, found in zip(
+                variants, _gather(executor, variants, on_result), strict=True
+            )
+        ]
+    with _processes(min(len(variants), os.cpu_count() or 1)) as pool:
+        found = _gather(pool, variants, on_result)
+    results = []
+    for variant, result in zip(variants, found, strict=True):
+        if isinstance(result, BrokenExecutor):
+            # A process that dies takes those that wait with it: each gets a process of its own.
+            with _processes(1) as pool:
+                (result,) = _gather(pool, [variant], lambda: None)
+        results.append(_failed(variant, result) if isinstance(result, Exception) else result)
+    return results
+
+
+def _processes(count: int) -> ProcessPoolExecutor:
+    # Not forked from this process, which may have threads.
+    return ProcessPoolExecutor(max(1, count), mp_context=multiprocessing.get_context('forkserver'))
+
+
+def _gather(
+    executor: Executor, variants: Sequence[Variant], on_result: Callable[[], object]
+) -> list[SweepResult | Exception]:
+    """Return the results in the order of the variants, or why there is none."""
+    futures: list[Future[SweepResult] | Exception] = []
+    for variant in variants:
+        try:
+            futures.append(executor.submit(plan_variant, variant))
+        except BrokenExecutor as error:
+            futures.append(error)
+    for _ in as_completed([each for each in futures if isinstance(each, Future)]):
+        on_result()
+    results: list[SweepResult | Exception] = []
+    for future in futures:
+        try:
+            results.append(future.result() if isinstance(future, Future) else future)
+        except Exception as error:
+            results.append(error)
+    return results
+
+
+def _failed(variant: Variant, error: Exception) -> SweepResult:
+    text = ' '.join(str(error).split()) or 'no reason is given'
+    return SweepResult(
+        variant=variant, refusal=f'planning failed: {type(error).__name__}: {text}', code=None
+    )
+
+
+def plan_variant(variant: Variant) -> SweepResult:
+    """Plan one variant; this is what the executor runs."""
+    try:
+        state = state_at_rest(variant.arm, variant.start, variant.T_flange_tcp)
+        goal = variant.goal
+        if isinstance(goal, Path):
+            goal = goal.goal(variant.frames, ArmSnapshot.of(state))
+        *shift, turn = variant.offset
+        T = goal.T_base_frame
+        goal = replace(
+            goal,
+            T_base_frame=Pose(
+                add(T.position, (shift[0], shift[1], shift[2])),
+                multiply(quaternion_from_rotation_vector((0.0, 0.0, turn)), T.quaternion),
+            ),
+        )
+        made = plan(goal, state, variant.arm, variant.options)
+        return SweepResult(
+            variant=variant, margins=margins_of(made, variant), duration=made.duration
+        )
+    except GoalRefused as refusal:
+        return SweepResult(variant=variant, refusal=str(refusal), code=refusal.code)
+    except Exception as error:
+        return _failed(variant, error)
+
+
+def margins_of(made: Plan, variant: Variant) -> Margins:
+    """Return the smallest margins on the whole motion, at SAMPLES times."""
+    arm = variant.arm
+    period = max(MIN_PERIOD, made.duration / SAMPLES)
+    preview = sample(made, arm, variant.T_flange_tcp, period)
+    known = np.isfinite(preview.joints).all(axis=1)
+    q, time = preview.joints[known], preview.time[known]
+    if len(q) < 2:
+        return Margins()
+    scales = np.array([measure.scale for measure in SINGULARITY_MEASURES])
+    singularity = (singularity_distance_rows(arm, q) / scales).min(axis=1)
+    # Joint motions may pass through singularities.
+    led = ~np.isin(_points_at(made, time), _joint_moves(made))
+    rates = np.abs(np.diff(q, axis=0)) / np.diff(time)[:, None]
+    T_flange_tcp = variant.T_flange_tcp if made.T_flange_tcp is None else made.T_flange_tcp
+    clearance = Clearance(arm, T_flange_tcp, variant.options).check(q, made.start)
+    return Margins(
+        joint_limit=float(joint_limit_distances(arm, q).min()),
+        singularity=float(singularity[led].min()) if led.any() else inf,
+        speed=float(1.0 - (rates / np.array(arm.model.max_joint_speed)).max()),
+        clearance=clearance.margin,
+    )
+
+
+def _points_at(made: Plan, time: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+    """Return to which point of the goal the tool is on its way at some times."""
+    row = np.searchsorted(made.reference.time, time, side='left')
+    return made.reference.point[np.minimum(row, len(made.reference.point) - 1)]
+
+
+def _joint_moves(made: Plan) -> list[int]:
+    return [
+        segment.waypoint
+        for segment in made.segments
+        if isinstance(segment.primitive, MoveJ | OptimoveJ)
+    ]
+
+
+# ---- what people look at -----------------------------------------------------------------------
+
+#: What a table has of each variant, with its unit.
+COLUMNS = {
+    'joint_limit': 'joint limit [rad]',
+    'singularity': 'singularity [rad]',
+    'speed': 'speed left [%]',
+    'clearance': 'clearance [m]',
+    'duration': 'duration [s]',
+}
+
+
+def _value(result: SweepResult, column: str) -> float:
+    if column == 'duration':
+        return result.duration
+    value = float(getattr(result.margins, column))
+    return 100.0 * value if column == 'speed' else value
+
+
+def columns(results: Sequence[SweepResult]) -> dict[str, list[Coordinate]]:
+    """Return the table by column: the coordinates, the result, and the margins."""
+    names = list(dict.fromkeys(name for r in results for name in r.variant.coordinates))
+    return (
+        {name: [r.variant.coordinates.get(name, '') for r in results] for name in names}
+        | {'result': [r.refusal or 'passes' for r in results]}
+        | {title: [_value(r, name) for r in results] for name, title in COLUMNS.items()}
+    )
+
+
+def table(results: Sequence[SweepResult]) -> str:
+    """Return a line for each variant, as wide as it has to be, with the refusal at its end."""
+    cells = columns(results)
+    cells['result'] = cells.pop('result')  # last, as it is long
+    texts = [[name, *map(_text, values)] for name, values in cells.items()]
+    widths = [max(map(len, column)) for column in texts]
+    return '\n'.join(
+        '  '.join(
+            text if name == 'result' else text.rjust(width)
+            for name, text, width in zip(cells, row, widths, strict=True)
+        )
+        for row in zip(*texts, strict=True)
+    )
+
+
+def summary(results: Sequence[SweepResult]) -> str:
+    """Return one line: how many pass, and which margins are the smallest of those."""
+    passed = [r for r in results if r.passes]
+    text = f'{len(passed)} of {len(results)} variants pass'
+    if not passed:
+        return f'{text}.'
+    least = (
+        f'{title.split(" [")[0]} {_text(min(_value(r, name) for r in passed))} '
+        f'{title.split("[")[1].rstrip("]")}'
+        for name, title in COLUMNS.items()
+        if name != 'duration'
+    )
+    return f'{text}; smallest margins: {", ".join(least)}.'
+
+
+def _text(value: Coordinate) -> str:
+    if isinstance(value, str):
+        return value
+    return f'{value:.4g}' if isfinite(value) else '-'
+
+
+def _axes(results: Sequence[SweepResult]) -> list[str]:
+    """Return the one or two coordinates that have the most values."""
+    values: dict[str, set[Coordinate]] = {}
+    for result in results:
+        for name, value in result.variant.coordinates.items():
+            values.setdefault(name, set()).add(value)
+    return sorted(values, key=lambda name: -len(values[name]))[:2]
+
+
+def _grid(
+    results: Sequence[SweepResult], column: str
+) -> tuple[list[str], list[list[Coordinate]], np.ndarray[Any, np.dtype[np.float64]]]:
+    """
+    Return the axes of a map, their values, and the worst margin of each cell.
+
+    -inf = a variant of the cell is refused, NaN = there is none.
+    """
+    names = _axes(results)
+    values: list[list[Coordinate]] = [
+        sorted({r.variant.coordinates[name] for r in results}, key=_order) for name in names
+    ]
+    grid = np.full([len(each) for each in values], nan)
+    for result in results:
+        cell = tuple(
+            each.index(result.variant.coordinates[name])
+            for name, each in zip(names, values, strict=True)
+        )
+        grid[cell] = np.fmin(grid[cell], _value(result, column) if result.passes else -inf)
+    # Rounding is no difference.
+    return names, values, np.atleast_2d(np.round(grid.T, 6))
+
+
+def _order(value: Coordinate) -> tuple[int, Coordinate]:
+    return (int(isinstance(value, str)), value)
+
+
+def heat_map(results: Sequence[SweepResult], column: str = 'singularity') -> str:
+    """
+    Return a map in text over the two coordinates with the most values, ``x`` where it is refused.
+
+    :param column: joint_limit, singularity, speed, clearance or duration; each cell shows the
+        least of its variants.
+    """
+    names, values, grid = _grid(results, column)
+    if not names:
+        return ''
+    labels: list[list[Coordinate]] = [*values, ['']]
+    rows = [[_text(value) for value in each] for each in labels[:2]]
+    header = [names[0] + (f' / {names[1]}' if len(names) > 1 else ''), *rows[0]]
+    lines = [header]
+    for label, row in zip(rows[1], grid, strict=True):
+        lines.append([label, *('x' if v == -inf else _text(float(v)) for v in row)])
+    widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+    text = ('  '.join(c.rjust(w) for c, w in zip(line, widths, strict=True)) for line in lines)
+    return '\n'.join((f'{COLUMNS[column]}:', *text))
+
+
+def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
+    """
+    Draw a heat map of each margin; refused cells stay grey.
+
+    :raises OSError: matplotlib is not installed, or the file cannot be written.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    figure, charts = pyplot.subplots(2, 2, figsize=(11.0, 8.0), layout='constrained')
+    for chart, (column, title) in zip(charts.flat, COLUMNS.items(), strict=False):
+        names, values, grid = _grid(results, column)
+        chart.set_title(title)
+        chart.set_facecolor('#9aa5b1')
+        if not names:
+            continue
+        shown = chart.imshow(np.where(np.isfinite(grid), grid, nan), origin='lower', aspect='auto')
+        figure.colorbar(shown, ax=chart)
+        for axis, name, ticks in zip((chart.xaxis, chart.yaxis), names, values, strict=False):
+            axis.set_label_text(name)
+            axis.set_ticks(*_ticks(ticks))
+        if len(names) < 2:
+            chart.set_yticks([])
+    figure.suptitle(summary(results).split(';')[0].rstrip('.'))
+    figure.savefig(picture, dpi=110)
+    pyplot.close(figure)
+
+
+def _ticks(values: Sequence[Coordinate]) -> tuple[list[int], list[str]]:
+    """Return places and labels of at most a dozen ticks."""
+    every = range(0, len(values), -(-len(values) // 12))
+    return list(every), [_text(values[i]) for i in every]
+
+
+def csv_rows(results: Sequence[SweepResult]) -> Iterator[list[Coordinate]]:
+    """Yield the header and the rows of a table for other programs."""
+    cells = columns(results)
+    yield list(cells)
+    yield from map(list, zip(*cells.values(), strict=True))
