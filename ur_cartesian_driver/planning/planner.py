@@ -60,7 +60,7 @@ from ur_cartesian_driver.planning.moves.plan_report import (
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
-from ur_cartesian_driver.planning.moves.segment_timing import schedule, SegmentTimings
+from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
@@ -155,7 +155,9 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         planner.samples.segment,
         planner.samples.fraction,
     )
-    timings = schedule(geometries, options, arm.model, planner.blend_samples, planner.running)
+    timings = SegmentTimings(
+        geometries, options, arm.model, planner.blend_samples, planner.running
+    )
     segments = planner.segments(geometries, timings)
     del planner.samples, planner.blend_samples  # long goals have many, and so has the reference
     reference = reference_path(
@@ -166,7 +168,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     remarks = [
         *ignored_remarks(goal),
-        *(remark for _, remark in sorted(timings.remarks.items())),
+        *(remark for _, remark in sorted(timings.requests.remarks.items())),
         *blend_remarks(goal, geometries, timings),
         *lines,
         *stop_remarks(geometries),

@@ -73,8 +73,8 @@ def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTim
     """Return by how much the end may be off its planned time, if the goal has blends."""
     if not geometries.path.has_blend_after.any() or geometries.is_optimized.any():
         return []
-    planned = timings.durations.sum()
-    off = max(planned - timings.least_times.sum(), timings.greatest_times.sum() - planned)
+    planned, (least, greatest) = timings.durations.sum(), timings.bounds()
+    off = max(planned - least.sum(), greatest.sum() - planned)
     clause = ''
     tolerance = goal.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
     if 0.0 <= tolerance < off and geometries.times[-1] > 0.0:

@@ -10,8 +10,6 @@ derived so that the time is met. How moves and blends follow each other is that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from math import ceil, inf
 
 import numpy as np
@@ -48,26 +46,6 @@ _MAX_ROUNDS = 40
 _EARLY = 0.001
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SegmentTimings:
-    """The speeds of segments over time; columns (n,)."""
-
-    #: What the wire carries; time 0 = speed and acceleration count.
-    velocities: Floats
-    accelerations: Floats
-    wire_times: Floats
-    #: Expected times from point to point [s]; blended points are passed in the middle of the
-    #: blend. Their bounds, whatever the law by which the robot passes its blends.
-    durations: Floats
-    least_times: Floats
-    greatest_times: Floats
-    #: Where speeds and times come from; changes that the limits made, in order of the segments.
-    requests: SpeedRequests
-    remarks: Mapping[int, str]
-    #: How they follow each other.
-    chain: MoveChain
-
-
 def shortest_duration(
     length: Floats, speed: Floats, acceleration: Floats, ramps: Floats | float
 ) -> Floats:
@@ -83,41 +61,34 @@ def shortest_duration(
     return time
 
 
-def schedule(
-    geometries: SegmentGeometries,
-    options: PlanningOptions,
-    model: RobotModel,
-    blend_samples: BlendSamples,
-    running: PlannedSegment | None = None,
-) -> SegmentTimings:
+class SegmentTimings:
     """
-    Return the timings of all segments.
+    The speeds of segments over time, so that times are met within the limits; columns (n,).
 
     :param running: the first segment as it was planned, where it has been sent.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire, a blend too small.
     """
-    requests = SpeedRequests(geometries, options, model, running)
-    timetable = _Timetable(requests, options, model, blend_samples, running)
-    timetable.solve()
-    return timetable.timings()
 
-
-class _Timetable:
-    """Finds the speeds of all segments; columns (n,)."""
+    #: What the wire carries; time 0 = speed and acceleration count.
+    velocities: Floats
+    accelerations: Floats
+    wire_times: Floats
 
     def __init__(
         self,
-        requests: SpeedRequests,
+        geometries: SegmentGeometries,
         options: PlanningOptions,
         model: RobotModel,
         blend_samples: BlendSamples,
-        running: PlannedSegment | None,
+        running: PlannedSegment | None = None,
     ) -> None:
-        """Begin with what is asked for."""
-        self._requests, self._options, self._model = requests, options, model
-        self._geometries, self._samples = requests.geometries, blend_samples
-        n = len(self._geometries)
+        """Begin with what is asked for, and change it until all limits are kept."""
+        self._geometries, self._options, self._model = geometries, options, model
+        self._samples = blend_samples
+        #: Where speeds and times come from, with remarks on what the limits changed.
+        self.requests = requests = SpeedRequests(geometries, options, model, running)
+        n = len(geometries)
         self._time, self._timed, self._rate = requests.time, requests.has_wire_time, requests.rate
         self._speed = requests.speed
         self._least, self._most = requests.acceleration, requests.max_acceleration
@@ -135,11 +106,20 @@ class _Timetable:
         self._rate = np.minimum(self._rate, self._max_rate)
         self._moves = self._at_rate(np.arange(n), self._rate)
         entry = running.blend_entry if running and self._moves.tail[0] > 0.0 else None
+        #: How they follow each other.
         self.chain = MoveChain(self._moves, entry)
         if entry is not None:
             self._wanted[0] = self.chain.times.between[0] + entry.half
+        self._solve()
+        self._set_wire_values()
+        self._remark_changes()
 
-    def solve(self) -> None:
+    @property
+    def durations(self) -> Floats:
+        """Expected times from point to point [s]; blends are passed in their middle at points."""
+        return self.chain.times.durations
+
+    def _solve(self) -> None:
         """Meet the times within the limits; what cannot be met takes longer."""
         for _ in range(_MAX_ROUNDS):
             wanted = self._wanted - self._ahead + np.append(0.0, self._ahead[:-1])
@@ -180,32 +160,16 @@ class _Timetable:
         self._ahead += more
         return bool((more + back).max() > _EARLY * (_NEARLY - 1.0))
 
-    def timings(self) -> SegmentTimings:
-        """
-        Return the timings of the segments.
-
-        :raises GoalRefused: a time is too short, a speed too low, a blend too small.
-        """
-        requests, times, moves = self._requests, self.chain.times, self._moves
+    def _set_wire_values(self) -> None:
+        requests, moves = self.requests, self._moves
         on_wire = moves.time > 0.0
         # A third each of speeding up, cruising and braking.
         time = np.where(on_wire, moves.time, 1.0)
         cruise = requests.length / time / (1.0 - RAMP_SHARE)
-        least, greatest = self._bounds()
         sent = moves.acceleration / requests.acceleration_unit
-        timings = SegmentTimings(
-            velocities=np.where(on_wire, cruise, moves.speed),
-            accelerations=np.where(on_wire, cruise / (RAMP_SHARE * time), sent),
-            wire_times=moves.time,
-            durations=times.durations,
-            least_times=least,
-            greatest_times=greatest,
-            requests=requests,
-            remarks=requests.remarks,
-            chain=self.chain,
-        )
-        self._remark_changes(timings)
-        return timings
+        self.velocities = np.where(on_wire, cruise, moves.speed)
+        self.accelerations = np.where(on_wire, cruise / (RAMP_SHARE * time), sent)
+        self.wire_times = moves.time
 
     def _at_rate(self, rows: Rows, rate: Floats) -> Moves:
         """Return moves at rates; a rate beyond the greatest speed stands for more acceleration."""
@@ -280,7 +244,7 @@ class _Timetable:
         """Return what slows a segment."""
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
-            return self._requests.limits.name(row)
+            return self.requests.limits.name(row)
         if samples.joint_time[sample] < self._tool_times()[sample]:
             return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
         joint = int(samples.joint[sample])
@@ -289,7 +253,7 @@ class _Timetable:
             f'{samples.index[sample]}{self._model.speed_source(joint)})'
         )
 
-    def _bounds(self) -> tuple[Floats, Floats]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """
         Return bounds of the times of segments, whatever the law by which blends are passed [s].
 
@@ -317,23 +281,23 @@ class _Timetable:
 
     # -- remarks and refusals --------------------------------------------------------------------
 
-    def _remark_changes(self, timings: SegmentTimings) -> None:
+    def _remark_changes(self) -> None:
         """
         Remark what is slower than asked for, or early.
 
         :raises GoalRefused: a time is too short, a speed too low, a blend too small.
         """
-        requests, path, timed = self._requests, self._geometries.path, ~np.isnan(self._time)
+        requests, path, timed = self.requests, self._geometries.path, ~np.isnan(self._time)
         is_late = self._wanted > self._time * _NEARLY
-        takes_longer = ~timed & (timings.wire_times > 1.0 / requests.rate * _NEARLY)
-        by_speed = timings.wire_times <= 0.0
+        takes_longer = ~timed & (self.wire_times > 1.0 / requests.rate * _NEARLY)
+        by_speed = self.wire_times <= 0.0
         is_slower = ~timed & by_speed & (self._moves.speed * _NEARLY < requests.speed)
         is_ahead = self._ahead > _EARLY
-        takes_too_long = timings.wire_times > self._options.max_segment_time
-        slowest = np.minimum(timings.velocities, timings.accelerations)
+        takes_too_long = self.wire_times > self._options.max_segment_time
+        slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
         needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
-        travel = timings.velocities * self._model.control_cycle
+        travel = self.velocities * self._model.control_cycle
         too_small = needs_a_cycle & (path.radius < travel)
         refused = takes_too_long | too_slow | too_small
         remarks = requests.remarks
@@ -343,7 +307,7 @@ class _Timetable:
                 remarks[row] = self._too_fast(row)
             elif takes_longer[row]:
                 remarks[row] = (
-                    f'point {point}: takes {timings.wire_times[row]:.3f} s instead of '
+                    f'point {point}: takes {self.wire_times[row]:.3f} s instead of '
                     f'{1.0 / requests.rate[row]:.3f} s, because of {self._limit_name(row)}'
                 )
             elif is_slower[row]:
@@ -360,26 +324,26 @@ class _Timetable:
             if takes_too_long[row]:
                 raise InvalidGoal(
                     point_field(point),
-                    f'would be approached in {timings.wire_times[row]:.4g} s, more than '
+                    f'would be approached in {self.wire_times[row]:.4g} s, more than '
                     f'max_segment_time = {self._options.max_segment_time:.0f} s',
                     'raise velocity or acceleration',
                 )
             if too_slow[row]:
-                raise self._too_slow(row, timings)
+                raise self._too_slow(row)
             if too_small[row]:
                 raise InvalidGoal(  # the robot would stop at the point (C171)
                     segment_field(point, 'blend_radius'),
                     f'is {1e3 * path.radius[row]:g} mm, less than the {1e3 * travel[row]:.3g} mm '
-                    f'that the robot moves in one control cycle at {timings.velocities[row]:.3g} '
+                    f'that the robot moves in one control cycle at {self.velocities[row]:.3g} '
                     f'{requests.limits.unit(row)}: it would stop at the point',
                     'enlarge it, move slower, or set it to 0 to stop there',
                 )
 
-    def _too_slow(self, row: int, timings: SegmentTimings) -> InvalidGoal:
+    def _too_slow(self, row: int) -> InvalidGoal:
         """Return the refusal of a speed too small for the wire."""
-        unit, value = self._requests.limits.unit(row), timings.velocities[row]
+        unit, value = self.requests.limits.unit(row), self.velocities[row]
         if value >= MIN_SPEED:
-            unit, value = f'{unit}^2', timings.accelerations[row]
+            unit, value = f'{unit}^2', self.accelerations[row]
         return InvalidGoal(
             point_field(self._geometries.begin + row),
             f'would be approached with {value:.2g} {unit}, less than the {MIN_SPEED:g} that can '
@@ -395,7 +359,7 @@ class _Timetable:
 
         :raises TooFast: it is refused.
         """
-        requests, limits, options = self._requests, self._requests.limits, self._options
+        requests, limits, options = self.requests, self.requests.limits, self._options
         point, min_time = self._geometries.begin + row, float(self._wanted[row])
         time, length = self._geometries.times[row], requests.length[row]
         unit, name = limits.unit(row), self._limit_name(row)
