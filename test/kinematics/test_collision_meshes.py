@@ -175,9 +175,8 @@ H = pi / 2
 UPPER_ARM_WRIST_1 = (Link.UPPER_ARM, Link.WRIST_1)
 #: Configurations of the ur5e, the pair that is nearest in each, and whether it touches.
 KNOWN = {
-    'elbow closed too far': ((0.0, -H, 2.95, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, True),
+    'elbow closed too far': ((0.0, -H, 2.89, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, True),
     'elbow almost closed': ((0.0, -H, 2.8, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, False),
-    'elbow closed, clear': ((0.0, -H, 2.7, -1.8, -H, 0.0), UPPER_ARM_WRIST_1, False),
     'flange in the shoulder': (
         (0.0, -H, 2.9, -1.8, -1.0, 0.0),
         (Link.SHOULDER, Link.FOREARM),
@@ -207,39 +206,52 @@ def brute_force_distance(one, other):
     """
     Return the distance of two meshes (n, 3, 3).
 
-    Two triangles are as far apart as a corner from a triangle or an edge from an edge, and 0 where
-    an edge passes through one. Pairs whose spheres are farther apart than any two corners do not
-    count.
+    0 where an edge passes through a triangle, else that of a corner from a triangle or of an edge
+    from an edge. Pairs whose spheres are farther apart than the best pair do not count.
     """
     centres, radii = zip(*(spheres(mesh) for mesh in (one, other)), strict=True)
     between = np.linalg.norm(centres[0][:, None] - centres[1], axis=2)
-    corners = (
-        pytest.importorskip('scipy.spatial')
-        .cKDTree(one.reshape(-1, 3))
-        .query(other.reshape(-1, 3))[0]
-        .min()
-    )
-    rows, columns = np.nonzero(between - radii[0][:, None] - radii[1] <= corners)
-    a, b = one[rows], other[columns]
+    between -= radii[0][:, None] + radii[1]
     best = np.inf
-    for p, q in ((a, b), (b, a)):
-        normal = np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
-        heights = np.einsum('nkc,nc->nk', p - q[:, :1], normal)
-        for k in range(3):
-            above = is_inside(p[:, k] - heights[:, k, None] * normal, q, normal)
-            best = min(best, np.abs(heights[above, k]).min(initial=np.inf))
-            start, end = heights[:, k], heights[:, k - 2]
-            crossing = np.flatnonzero(start * end < 0.0)
-            fraction = (start / np.where(start == end, 1.0, start - end))[crossing, None]
-            point = p[crossing, k] + fraction * (p[crossing, k - 2] - p[crossing, k])
-            if is_inside(point, q[crossing], normal[crossing]).any():
-                return 0.0
-    for i in range(3):
-        for k in range(3):
-            edges = (a[:, i], a[:, i - 2] - a[:, i], b[:, k], b[:, k - 2] - b[:, k])
-            best = min(best, segment_distance(*(edge.T for edge in edges)).min())
+    for bound in (np.partition(between.ravel(), 2000)[2000], None):
+        rows, columns = np.nonzero(between <= (best if bound is None else bound))
+        a, b = one[rows], other[columns]
+        if crosses(a, b) or crosses(b, a):
+            return 0.0
+        best = min(best, distance_to_corners(a, b), distance_to_corners(b, a))
+        for i in range(3):
+            for k in range(3):
+                edges = (a[:, i], a[:, i - 2] - a[:, i], b[:, k], b[:, k - 2] - b[:, k])
+                best = min(best, segment_distance(*(edge.T for edge in edges)).min())
     return best
+
+
+def distance_to_corners(p, q):
+    """Return the smallest distance of a corner of a triangle p straight above its triangle q."""
+    normal, best = normals(q), np.inf
+    for k in range(3):
+        height = np.einsum('nc,nc->n', p[:, k] - q[:, 0], normal)
+        best = min(best, np.abs(height[is_inside(p[:, k], q, normal)]).min(initial=np.inf))
+    return best
+
+
+def crosses(p, q):
+    """Whether an edge of a triangle p passes through its triangle q, each (n, 3, 3)."""
+    normal = normals(q)
+    heights = np.einsum('nkc,nc->nk', p - q[:, :1], normal)
+    for k in range(3):
+        crossing = np.flatnonzero(heights[:, k] * heights[:, k - 2] < 0.0)
+        start, end = heights[crossing, k, None], heights[crossing, k - 2, None]
+        edge = p[crossing, k - 2] - p[crossing, k]
+        point = p[crossing, k] + start / (start - end) * edge
+        if is_inside(point, q[crossing], normal[crossing]).any():
+            return True
+    return False
+
+
+def normals(triangles):
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
 
 
 def spheres(mesh):
@@ -248,7 +260,7 @@ def spheres(mesh):
 
 
 def is_inside(points, corners, normals):
-    """Whether points (n, 3) of the planes of triangles (n, 3, 3) are inside these."""
+    """Whether points (n, 3) are straight above or below triangles (n, 3, 3)."""
     inside = np.ones(len(points), dtype=bool)
     for k in range(3):
         edge = corners[:, k - 2] - corners[:, k]

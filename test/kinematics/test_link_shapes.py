@@ -53,7 +53,7 @@ def test_frames_of_a_calibrated_arm_are_near_the_nominal_ones(name, calibrated_a
     assert 1e-5 < distance.max() < 0.015
 
 
-@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
+@pytest.mark.parametrize('name', ['ur3', 'ur5', 'ur10', 'ur3e', 'ur5e'])
 def test_meshes_stand_where_the_robot_descriptions_have_them(name):
     """Pinocchio's model of the package's URDF, from ``base``, against ours: links and meshes."""
     pinocchio = pytest.importorskip('pinocchio')
@@ -98,6 +98,10 @@ def test_cylinders_move_with_their_links(is_calibrated, calibrated_arm):
             np.testing.assert_allclose(T.apply((0.0, 0.0, -half)), start, atol=1e-9)
             np.testing.assert_allclose(T.apply((0.0, 0.0, half)), end, atol=1e-9)
             assert shape.radius == radius
+
+
+def test_a_ur7e_is_a_ur5e():
+    assert link_shapes(Arm(MODELS['ur7e'])) == link_shapes(Arm(MODELS['ur5e']))
 
 
 def test_without_their_package_the_shapes_are_cylinders(monkeypatch):

@@ -102,6 +102,17 @@ def test_what_is_missing_for_the_verdict_is_said(no_meshes):
     assert remark('ur10e', 'auto') == remark('ur10e', 'warn') == remark('ur5', 'off') == ''
 
 
+def test_capsules_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
+    needs_meshes('ur5e')
+
+    def broken(*_):
+        raise ImportError('numpy.core.multiarray failed to import')
+
+    monkeypatch.setattr('ur_cartesian_driver.kinematics.collision_meshes.pinocchio_model', broken)
+    clear = check(way(HOME, FOLDED))
+    assert clear.violation.text.endswith('capsules, which are thicker than the arm)')
+
+
 def test_nothing_is_said_where_nothing_is_missing():
     needs_meshes('ur5e')
     assert self_collision_remark('ur5e', PlanningOptions()) == ''

@@ -232,7 +232,10 @@ class _SelfCollisionChecker:
         """The meshes, loaded where capsules first come close: most goals need none."""
         if missing_meshes(self._name):
             return None
-        return CollisionMeshes(self._bodies.arm, self._tcp, self._options.tool_radius)
+        try:
+            return CollisionMeshes(self._bodies.arm, self._tcp, self._options.tool_radius)
+        except ImportError:  # pinocchio is there and broken: built for another numpy, say
+            return None
 
     def description(self, column: int, lower: float) -> str:
         """Return the pair of a column, and the shapes, given the distance of its capsules."""
