@@ -225,3 +225,22 @@ def test_blends_fit_between_short_lines(tmp_path):
 def test_an_output_that_is_none_is_refused(text):
     with pytest.raises(ValueError, match='not of the form'):
         parse_code_output(text)
+
+
+def test_codes_of_a_line_act_before_its_motion_and_the_end_after_it(tmp_path):
+    # The order of execution of RS274/NGC: spindle, coolant, motion, end.
+    text = 'G21 G90\nG1 X0 Y0 Z0 F600\nG1 X10 M3\nG1 X20 M5\nG1 X30 M30\nG1 X40\n'
+    outputs = dict(map(parse_code_output, ('M3=standard:2:1', 'M5=standard:2:0')))
+    found = imported(tmp_path, text, outputs=outputs)
+    assert 1e3 * positions(found)[:, 0] == pytest.approx([0.0, 10.0, 20.0, 30.0])
+    assert [(c.waypoint, c.value) for c in found.goal.io_commands] == [(0, 1.0), (1, 0.0)]
+    (said,) = [text for text in remarks(found) if text.startswith('line 4: M5')]
+    assert 'before the motion' in said
+
+
+@pytest.mark.parametrize('code', ['G28 Z0', 'G30 Z0', 'G53 G0 Z0'])
+def test_after_a_place_of_the_machine_the_position_is_said_to_be_unknown(tmp_path, code):
+    found = imported(tmp_path, f'G21 G90\nG1 X0 Y0 Z5 F600\n{code}\nG1 X10\n')
+    assert 1e3 * positions(found) == pytest.approx(np.array([[0.0, 0.0, 5.0], [10.0, 0.0, 5.0]]))
+    (said,) = [text for text in remarks(found) if text.startswith('line 3: G')]
+    assert 'is not known, so the path goes on from the point before' in said

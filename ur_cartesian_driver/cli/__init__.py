@@ -29,6 +29,7 @@ from ur_cartesian_driver.cli import (
     plan_commands,
     recording_plot,
     sweep_command,
+    teach_command,
 )
 from ur_cartesian_driver.importing.import_options import (
     CodeOutput,
@@ -101,6 +102,7 @@ def parser() -> argparse.ArgumentParser:
     _add_show(sub)
     _add_sweep(sub)
     _add_import(sub)
+    _add_teach(sub)
     _add_where(sub)
     _add_check_robot(sub)
     _add_plot(sub)
@@ -483,6 +485,29 @@ def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
         help='active TCP in the flange frame, for joint positions [m, rad]',
     )
     _add_calibration(bring)
+
+
+def _add_teach(sub: Commands[argparse.ArgumentParser]) -> None:
+    command = _add(
+        sub,
+        'teach',
+        teach_command.teach_path,
+        'guide the arm by hand, take points with Enter, and write them as a goal to edit',
+    )
+    command.add_argument('-o', '--output', default='path.yaml', help='goal file')
+    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    command.add_argument('--ur-type', default='ur5e', choices=sorted(MODELS), help='its model')
+    for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
+        command.add_argument(f'--{name}-port', type=_port, default=port, help='its port')
+    command.add_argument(
+        '--speed', type=_factor, help="of lines and arcs [m/s]; else the driver's"
+    )
+    command.add_argument(
+        '--blend', type=_length, metavar='LENGTH', help='at inner points, like 1mm'
+    )
+    command.add_argument(
+        '--wait', type=_seconds, default=10.0, help='until the robot must be ready [s]'
+    )
 
 
 def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:

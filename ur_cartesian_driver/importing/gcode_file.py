@@ -34,22 +34,26 @@ _AXES = 'XYZ'
 #: Codes that are done, besides the moves.
 _DONE = {'G17', 'G18', 'G19', 'G20', 'G21', 'G90', 'G91', 'G90.1', 'G91.1', 'G92', 'G94'}
 _MODES_WITHOUT_EFFECT = {'G40', 'G49', 'G69', 'G80'}
+_STAYS = 'where the machine is afterwards is not known, so the path goes on from the point before'
 _LEFT_OUT = {
     'G4': 'the path does not wait',
     'G9': 'the blend says where the tool stops',
     'G10': 'tables of a machine are not used',
     'G11': 'there is no extruder',
-    'G28': 'the home of a machine is not one of the robot',
+    'G28': f'the home of a machine is not one of the robot; {_STAYS}',
     'G29': 'a bed is not measured',
-    'G30': 'the home of a machine is not one of the robot',
+    'G30': f'the home of a machine is not one of the robot; {_STAYS}',
     'G43': 'the length of the tool is in the active TCP',
-    'G53': 'the coordinates of a machine are not those of the robot',
+    'G53': f'the coordinates of a machine are not those of the robot; {_STAYS}',
     'G54': 'the frame of the goal takes its place',
     'G61': 'the blend says where the tool stops',
     'G64': 'the blend says where the tool stops',
     'G98': 'there are no cycles',
     'G99': 'there are no cycles',
 }
+#: Switched before the motion of their line by RS274/NGC (table of the order of execution), as by
+#: LinuxCNC and GRBL; controls whose order is configured may do it afterwards.
+_SWITCHED_OFF = {'M5', 'M9'}
 _REFUSED = {
     **dict.fromkeys(
         ('G41', 'G42', 'G41.1', 'G42.1'), 'cutter compensation; let the CAM compensate'
@@ -142,7 +146,7 @@ class _Program:
         moves = False
         for code in codes:
             if code in ('M2', 'M30'):
-                return False
+                continue
             if code[0] == 'M':
                 self._switch(code, words)
             elif code in ('G0', 'G1', 'G2', 'G3'):
@@ -168,8 +172,14 @@ class _Program:
         if own_words:
             moves = any(name in words for name in 'XYZ' + 'IJKR')
         if moves:
+            for code in _SWITCHED_OFF.intersection(codes, self._options.outputs):
+                self._omit(
+                    f'{code} beside a motion',
+                    'it acts before the motion, as in RS274/NGC; some controls do it afterwards',
+                )
             self._move(words)
-        return True
+        # The end comes after the motion of its line.
+        return not {'M2', 'M30'}.intersection(codes)
 
     def _words(self, line: str) -> tuple[list[str] | None, dict[str, float]]:
         """Return the codes of a line and its other words; no codes = it was left out."""

@@ -176,6 +176,8 @@ class _NameChecker:
 
     def __init__(self, builtins: Mapping[str, Builtin]) -> None:
         self._builtins = builtins
+        #: Of those that are called, by name.
+        self._signatures: dict[str, inspect.Signature | None] = {}
 
     def block(self, scope: Scope, nodes: Iterable[tree.SyntaxNode]) -> None:
         """Check nodes and everything below them."""
@@ -213,7 +215,9 @@ class _NameChecker:
         elif call.function in self._builtins:
             if inspect.isgeneratorfunction(self._builtins[call.function]):
                 scope.suspends = True
-            if signature := _signature(self._builtins[call.function]):
+            if call.function not in self._signatures:
+                self._signatures[call.function] = _signature(self._builtins[call.function])
+            if signature := self._signatures[call.function]:
                 _check_arguments(call, signature)
         else:
             raise name_not_found(call.function, call.line, call.column)

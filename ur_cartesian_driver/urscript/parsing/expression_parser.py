@@ -63,29 +63,34 @@ class ExpressionParser(TokenReader):
     ) -> tree.Expression:
         """Read operand { operator operand }, left-associative."""
         left = operand()
+        if not self._at(*operators):  # mostly
+            return left
         for token in self._operators(*operators):
             left = node(operator=token.text, left=left, right=operand(), **source_position(token))
         return left
 
     def _unary(self) -> tree.Expression:
         """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
+        if not self._at('-', '+', 'run'):
+            return self._postfix()
         if token := self._match('-', '+'):
             with self._nested():
                 operand = self._unary()
             return tree.UnaryExpression(
                 operator=token.text, operand=operand, **source_position(token)
             )
-        if self._match('run'):
-            name = self._expect_kind(TokenKind.NAME)
-            self._expect('(')
-            self._expect(')')
-            return tree.RunExpression(thread=name.text, **source_position(name))
-        return self._postfix()
+        self._expect('run')
+        name = self._expect_kind(TokenKind.NAME)
+        self._expect('(')
+        self._expect(')')
+        return tree.RunExpression(thread=name.text, **source_position(name))
 
     def _postfix(self) -> tree.Expression:
         """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
         value = self._primary()
         for _ in range(MAX_CHAIN):
+            if not self._at('.', '(', '['):
+                return value
             if self._at('.'):
                 value = self._field(value)
             elif self._at('(') and isinstance(value, tree.NameExpression | tree.FieldExpression):

@@ -30,9 +30,13 @@ SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$')
 INT_LIMIT = 2**31
 
 _BLANK = re.compile(r'(?:[ \t\r\f\v\n]|#[^\n]*)+')
-_NUMBER = re.compile(r'(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
 _WORD = re.compile(r'[A-Za-z_][A-Za-z_0-9]*')
-_STRING = re.compile(r'"([^"\n]*)"')
+_TOKEN = re.compile(
+    rf'(?P<word>{_WORD.pattern})'
+    r'|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)'
+    r'|(?P<string>"[^"\n]*")'
+    rf'|(?P<symbol>{"|".join(map(re.escape, SYMBOLS))})'
+)
 
 
 class TokenKind(Enum):
@@ -97,18 +101,18 @@ def _scan(text: str) -> Iterator[Token]:
 
 def _token(text: str, start: int, line: int, column: int) -> tuple[TokenKind, str, int]:
     """Return kind and text of the token at `start`, and where it ends."""
-    if word := _WORD.match(text, start):
-        kind = TokenKind.KEYWORD if word.group() in KEYWORDS else TokenKind.NAME
-        return kind, word.group(), word.end()
-    if number := _NUMBER.match(text, start):
-        if _WORD.match(text, number.end()):
-            raise syntax_error(text, line, column, 'a number ends in letters')
-        return TokenKind.NUMBER, number.group(), number.end()
-    if string := _STRING.match(text, start):
-        return TokenKind.STRING, string.group(1), string.end()
-    for symbol in SYMBOLS:
-        if text.startswith(symbol, start):
-            return TokenKind.SYMBOL, symbol, start + len(symbol)
+    if found := _TOKEN.match(text, start):
+        word, end = found.group(), found.end()
+        match found.lastgroup:
+            case 'word':
+                return TokenKind.KEYWORD if word in KEYWORDS else TokenKind.NAME, word, end
+            case 'number':
+                if _WORD.match(text, end):
+                    raise syntax_error(text, line, column, 'a number ends in letters')
+                return TokenKind.NUMBER, word, end
+            case 'string':
+                return TokenKind.STRING, word[1:-1], end
+        return TokenKind.SYMBOL, word, end
     if text[start] == '"':
         raise syntax_error(text, line, column, 'a string is not closed on its line')
     raise syntax_error(text, line, column, f'{text[start]!r} has no meaning here')

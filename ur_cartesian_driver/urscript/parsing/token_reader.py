@@ -16,6 +16,9 @@ MAX_NESTING = 50
 #: Most operators of one precedence in a row; each makes the tree one node deeper.
 MAX_CHAIN = 100
 
+#: Tokens that only stand for themselves.
+_FIXED = (TokenKind.KEYWORD, TokenKind.SYMBOL)
+
 T = TypeVar('T')
 
 
@@ -56,9 +59,8 @@ class TokenReader:
 
     def _at(self, *texts: str) -> bool:
         """Tell whether the next token is one of these keywords or symbols."""
-        return (
-            self._token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL) and self._token.text in texts
-        )
+        token = self._tokens[self._next]
+        return token.text in texts and token.kind in _FIXED  # a string may have the same text
 
     def _match(self, *texts: str) -> Token | None:
         return self._advance() if self._at(*texts) else None

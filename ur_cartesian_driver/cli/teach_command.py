@@ -1,0 +1,151 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``ur-cartesian teach``: guide the arm by hand, take points, and write them as a path."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator
+import sys
+import threading
+
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.path import Path
+
+HELP = (
+    'Enter takes a point like the one before; l: a line to it, j: a joint motion, p: a line of a '
+    'process, a: here is the middle of an arc, and the next Enter its end; u: undo, q: write, end'
+)
+#: Until the arm can be guided, and until it is held again [s].
+FREEDRIVE_TIME = 10.0
+_KINDS = {'l': 'line', 'j': 'joint', 'p': 'process'}
+
+
+def teach_path(arguments: argparse.Namespace) -> int:
+    """Connect, let a person guide the arm, and write what was taken, also after Ctrl-C."""
+    config = DriverConfig(
+        robot_ip=arguments.robot_ip,
+        ur_type=arguments.ur_type,
+        headless_mode=True,
+        allow_freedrive=True,
+        rtde_port=arguments.rtde_port,
+        primary_port=arguments.primary_port,
+        dashboard_port=arguments.dashboard_port,
+    )
+    lesson = Lesson(Path().at(speed=arguments.speed, blend=arguments.blend))
+    try:
+        with Driver(config) as driver:
+            driver.wait_ready(arguments.wait)
+            guide(driver, lesson, _keys(), _say)
+    finally:
+        if lesson.path.poses:
+            lesson.path.save(arguments.output)
+            _say(f'{_points(len(lesson.path))} in {arguments.output}')
+        else:
+            _say('no point was taken, so nothing is written')
+    return 0
+
+
+def guide(
+    driver: Driver, lesson: Lesson, keys: Iterable[str], say: Callable[[str], object]
+) -> None:
+    """
+    Let the arm be guided while keys come; it is held again at the end, however that comes.
+
+    :raises RobotNotReady: freedrive does not begin, or ends by itself.
+    """
+    active = threading.Event()
+    freedrive = driver.start_freedrive(active.set)
+    freedrive.add_done_callback(lambda _: active.set())
+    try:
+        if not active.wait(FREEDRIVE_TIME):
+            raise RobotNotReady('The robot has not begun freedrive.')
+        say(HELP)
+        for key in keys:
+            if freedrive.done():
+                raise RobotNotReady(f'Freedrive has ended: {freedrive.result().text}')
+            if key == 'q':
+                return
+            state = driver.state
+            try:
+                say('no state of the robot' if state is None else lesson.press(key, state))
+            except InvalidGoal as mistake:
+                say(f'not taken: {mistake}')
+    finally:
+        freedrive.cancel()
+        freedrive.result(FREEDRIVE_TIME)
+
+
+class Lesson:
+    """The points taken so far."""
+
+    def __init__(self, beginning: Path) -> None:
+        """Begin with a path without points, which may have speeds."""
+        self._paths = [beginning]
+        self._kind, self._via = 'l', None  # type: str, Pose | None
+
+    @property
+    def path(self) -> Path:
+        """The path so far."""
+        return self._paths[-1]
+
+    def press(self, key: str, state: RobotState) -> str:
+        """
+        Do what a key says where the robot is, and return what was done.
+
+        :raises InvalidGoal: the point cannot be one of the path.
+        """
+        pose = state.actual_tcp_pose
+        if key == 'u':
+            return self._undo()
+        if key == 'a' and not self.path.poses:
+            return 'an arc needs a point before it; press Enter first'
+        if key == 'a':
+            self._via = pose
+            return f'middle of an arc at {_place(pose)}; Enter takes its end'
+        if key not in ('', *_KINDS):
+            return f'{key!r} means nothing. {HELP}'
+        self._kind = key or self._kind
+        posture = dict(zip(JOINT_NAMES, state.actual_q, strict=True))
+        if not self.path.poses:  # from wherever the arm will stand
+            name, path = 'joint', self.path.joint(pose, posture=posture)
+        elif self._via is not None:
+            name, path = 'arc', self.path.arc(pose, via=self._via.position)
+        else:
+            name = _KINDS[self._kind]
+            named = {'posture': posture} if name == 'joint' else {}
+            path = getattr(self.path, name)(pose, **named)
+        self._paths.append(path)
+        self._via = None
+        return f'point {len(path) - 1}: {name} to {_place(pose)}'
+
+    def _undo(self) -> str:
+        if self._via is not None:
+            self._via = None
+            return 'the middle of the arc is forgotten'
+        if len(self._paths) == 1:
+            return 'there is no point to undo'
+        self._paths.pop()
+        return f'undone; {_points(len(self.path))} left'
+
+
+def _keys() -> Iterator[str]:
+    """Yield what is typed, line by line; the end of the input means q."""
+    for line in sys.stdin:
+        yield line.strip().lower()
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _place(pose: Pose) -> str:
+    return ' '.join(f'{value:.4f}' for value in pose.position) + ' m'
+
+
+def _points(count: int) -> str:
+    return f'{count} point{"s" * (count != 1)}'
