@@ -240,9 +240,10 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_goal(command: argparse.ArgumentParser) -> None:
+def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
     command.add_argument(
         'file',
+        nargs='?' if optional else None,
         help='goal in the YAML of `ros2 action send_goal`, or the name of an example; '
         '- = standard input',
     )
@@ -295,9 +296,9 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_planning(command: argparse.ArgumentParser) -> None:
-    """Add the goal, and what the driver reads from the robot."""
-    _add_goal(command)
+def _add_planning(command: argparse.ArgumentParser, optional: bool = False) -> None:
+    """Add the goal, which may be optional, and what the driver reads from the robot."""
+    _add_goal(command, optional)
     command.add_argument(
         '--ur-type',
         choices=sorted(MODELS),
@@ -357,9 +358,25 @@ def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
         plan_commands.show,
         'plan a goal without a robot, and show the arm on its path in the browser',
     )
-    _add_planning(show)
+    _add_planning(show, optional=True)
     show.add_argument(
         '-o', '--output', metavar='PAGE', help='HTML file to write instead of opening a browser'
+    )
+    show.add_argument(
+        '--live',
+        metavar='ROBOT_IP',
+        help='follow this robot: plan the goal, if one is given, from where the arm stands, and '
+        'serve a page with where it is',
+    )
+    show.add_argument('--rtde-port', type=_port, default=30004, help='RTDE port of that robot')
+    show.add_argument(
+        '--host',
+        default=plan_commands.LOOPBACK,
+        help='address on which the page of --live is served; others than the default let others '
+        'of the network look',
+    )
+    show.add_argument(
+        '--port', type=_port, default=8080, help='port of that page, or the next free one'
     )
 
 

@@ -10,12 +10,14 @@ and TCP. tf2 frames are not available.
 from __future__ import annotations
 
 import argparse
+import asyncio
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 import sys
 from tempfile import NamedTemporaryFile
 from time import time_ns
+from typing import NoReturn, TYPE_CHECKING
 import webbrowser
 
 from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
@@ -26,10 +28,21 @@ from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.motion.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.robot.rtde.probe import read_state
+from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.sim import SimulatorConfig
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.preview.live_page import LivePage
+
+#: Where pages are served unless told otherwise.
+LOOPBACK = '127.0.0.1'
+#: Packets per second, and how long to wait before a lost robot is dialled again [s].
+LIVE_RATE, RECONNECT_PERIOD = 20.0, 1.0
 
 
 def validate(arguments: argparse.Namespace) -> int:
@@ -55,9 +68,13 @@ def validate(arguments: argparse.Namespace) -> int:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Write the page of a goal, or open it in the browser; that of a refused goal, too."""
+    """Write or open the page of a goal, also of a refused one, or follow a robot."""
     from ur_cartesian_driver.preview import motion_page, refusal_page
 
+    if arguments.live:
+        return _show_live(arguments)
+    if not arguments.file:
+        raise ValueError('which goal? Name a file or an example, or follow a robot with --live')
     planning = GoalPlanning(arguments)
     status = 0
     try:
@@ -87,11 +104,62 @@ def show(arguments: argparse.Namespace) -> int:
     return status
 
 
+def _show_live(arguments: argparse.Namespace) -> int:
+    """Serve a page that follows a robot, until a signal comes."""
+    from ur_cartesian_driver.preview import live_page
+
+    state = asyncio.run(read_state(arguments.live, arguments.rtde_port))
+    planning = GoalPlanning(arguments, state)
+    plan = None
+    try:
+        if planning.has_goal:
+            plan = planning.plan()
+    except GoalRefused as refusal:
+        print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
+        return 1
+    try:
+        with live_page(
+            planning.arm,
+            state,
+            plan=plan,
+            planes=planning.planes,
+            host=arguments.host,
+            port=arguments.port,
+        ) as page:
+            print(f'page: {page.url}', flush=True)
+            if arguments.host == LOOPBACK:
+                webbrowser.open(page.url)
+            asyncio.run(_follow(page, arguments.live, arguments.rtde_port))
+    except ImportError as error:
+        print(f'ur-cartesian show: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+async def _follow(page: LivePage, host: str, port: int) -> NoReturn:
+    """Show the states of a robot, and connect again when it is lost."""
+    while True:
+        stream = StateStream(LIVE_RATE, 0.0, page.update)
+        try:
+            await stream.open(host, port)
+            reason = await stream.ended()
+        except OSError as error:
+            reason = str(error)
+        finally:
+            stream.close()
+        page.say_lost(reason)
+        await asyncio.sleep(RECONNECT_PERIOD)
+
+
 class GoalPlanning:
     """The goal of a command line, and the arm that it is planned for."""
 
-    def __init__(self, arguments: argparse.Namespace) -> None:
-        """Read the parameters and the goal."""
+    def __init__(self, arguments: argparse.Namespace, robot: RobotState | None = None) -> None:
+        """
+        Read the parameters and the goal.
+
+        :param robot: where the arm stands; None = as the arguments say.
+        """
         from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
 
@@ -100,13 +168,20 @@ class GoalPlanning:
         if remark := self_collision_remark(model.name, settings.planning):
             print(remark, file=sys.stderr)
         self.arm = Arm(model, calibration(arguments, model))
-        T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
-        self.state = state_at_rest(
-            self.arm, vector6(arguments.joints or SimulatorConfig().q), T_flange_tcp
-        )
-        self._message = read_goal(arguments)
+        if robot is None:
+            q = vector6(arguments.joints or SimulatorConfig().q)
+            tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
+        else:
+            q, tcp = robot.actual_q, robot.T_flange_tcp
+        self.state = state_at_rest(self.arm, q, tcp)
+        self._message = read_goal(arguments) if arguments.file else None
         #: None until its frames are known.
         self.goal: Goal | None = None
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether the command line names a goal."""
+        return self._message is not None
 
     @property
     def planes(self) -> tuple[Plane, ...]:

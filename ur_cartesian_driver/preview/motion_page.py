@@ -35,6 +35,8 @@ from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
 
 Colours = NDArray[np.uint8]
 Colour = tuple[int, int, int]
+#: viser's, which has to be installed only where a page is made.
+Server = Any
 
 #: Time between two pictures of the arm at least, and how many there are at most [s].
 MIN_PERIOD = 0.04
@@ -44,7 +46,7 @@ MAX_NUMBERED_POINTS = 60
 #: A margin of this fraction or more is drawn as ample; see :func:`normalized_margins`.
 AMPLE_MARGIN = 0.5
 
-_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED = (
+_ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED, _TRAIL = (
     (176, 184, 194),
     (90, 100, 110),
     (50, 60, 70),
@@ -52,6 +54,7 @@ _ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED = (
     (200, 120, 0),
     (120, 170, 220),
     (210, 30, 30),
+    (230, 60, 160),
 )
 _TYPES: dict[str, tuple[str, Colour]] = {
     'MoveL': ('line', (30, 110, 220)),
@@ -111,15 +114,23 @@ def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
     preview = sample(plan, arm, plan.T_flange_active, _period(plan.duration))
     colourings = (_by_type(plan), _by_speed(plan), _by_margin(plan, arm, preview))
     pages = {}
-    with _scene(planes) as server:
-        scene = _Scene(server, arm, plan.T_flange_tcp or plan.T_flange_active)
-        scene.add_points(_waypoints(plan))
-        scene.add_outputs(_outputs(plan))
+    with serve(planes) as server:
+        scene = scene_of_plan(server, arm, plan.T_flange_tcp or plan.T_flange_active, plan)
         for colouring in colourings:
             scene.add_path(plan.reference.poses[:, :3], colouring.colours)
             pages[colouring.name] = scene.record(preview.time, preview.joints)
     texts = ''.join(f'<pre>{escape(text)}</pre>' for text in (table(plan), '\n'.join(plan.report)))
     return _page(pages, _legends(colourings) + texts)
+
+
+def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Scene:
+    """Draw the arm and, if there is a plan, its path by type, its points and outputs."""
+    scene = Scene(server, arm, tcp)
+    if plan is not None:
+        scene.add_points(_waypoints(plan))
+        scene.add_outputs(_outputs(plan))
+        scene.add_path(plan.reference.poses[:, :3], _by_type(plan).colours)
+    return scene
 
 
 def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pose) -> str:
@@ -131,8 +142,8 @@ def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pos
     """
     points = [goal.T_base_frame @ waypoint.pose for waypoint in goal.waypoints]
     path = np.array([pose.position for pose in (arm.forward(q) @ tcp, *points)])
-    with _scene(()) as server:
-        scene = _Scene(server, arm, tcp)
+    with serve(()) as server:
+        scene = Scene(server, arm, tcp)
         grey: Colours = np.full((len(path) - 1, 3), 150, dtype=np.uint8)
         scene.add_path(path, grey)
         scene.add_points(enumerate(path[1:]))
@@ -251,10 +262,10 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
             yield describe_command(output), np.array(at.position)
 
 
-class _Scene:
-    """The arm, its tool and its path on a server that records them."""
+class Scene:
+    """The arm, its tool and its path on a server, which shows or records them."""
 
-    def __init__(self, server: Any, arm: Arm, tcp: Pose) -> None:
+    def __init__(self, server: Server, arm: Arm, tcp: Pose) -> None:
         """Draw the arm with its shapes, each in the frame of its link."""
         import trimesh
 
@@ -272,6 +283,10 @@ class _Scene:
             self._add_mesh(
                 f'/arm/{ARM_LINKS[shape.link].name.lower()}/{k}', mesh, _ARM, shape.T_link_shape
             )
+        self.set_tool(tcp)
+
+    def set_tool(self, tcp: Pose) -> None:
+        """Draw the tool from flange to TCP, in the place of the one before."""
         T_link_tcp = self._frames.flange @ tcp
         reach = np.array([self._frames.flange.position, T_link_tcp.position])
         self._scene.add_line_segments(
@@ -302,9 +317,9 @@ class _Scene:
         self._scene.add_line_segments(
             '/path', edges, np.repeat(colours[:, None], 2, axis=1), thickness=0.007
         )
-        self._look_at(positions)
+        self.look_at(positions)
 
-    def _look_at(self, positions: Floats) -> None:
+    def look_at(self, positions: Floats) -> None:
         """Look at path and arm from beside the path, right of the text."""
         low, high = np.minimum(positions.min(axis=0), 0.0), np.maximum(positions.max(axis=0), 0.4)
         x, y, _ = positions.mean(axis=0)
@@ -315,6 +330,15 @@ class _Scene:
         center = 0.5 * (low + high) + 0.2 * distance * left
         camera = self._server.initial_camera
         camera.position, camera.look_at = center + distance * out, center
+
+    def set_trail(self, positions: Floats) -> None:
+        """Draw where the TCP has been, in the place of the trail before."""
+        edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
+        self._scene.add_line_segments('/trail', edges, _TRAIL, thickness=0.004)
+
+    def pose_arm(self, q: Joints) -> None:
+        """Draw the arm with its joints there [rad]."""
+        self._move(self._frames.poses(np.array([q]))[0])
 
     def add_points(self, points: Iterable[tuple[int, Floats]]) -> None:
         """Draw numbered points."""
@@ -355,8 +379,13 @@ class _Scene:
 
 
 @contextmanager
-def _scene(planes: Sequence[Plane]) -> Iterator[Any]:
-    """Give a server of viser with floor and planes; it is only there to record the scene."""
+def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> Iterator[Server]:
+    """
+    Give a server of viser with floor and planes.
+
+    :param port: 0 = any: it is only there to record the scene.
+    :raises ImportError: viser is not installed; the text says how to get it.
+    """
     try:
         import viser
     except ImportError as error:
@@ -366,7 +395,7 @@ def _scene(planes: Sequence[Plane]) -> Iterator[Any]:
             name='viser',
         ) from error
     with redirect_stdout(io.StringIO()):  # it greets, whatever it is told
-        server = viser.ViserServer(host='127.0.0.1', port=0, verbose=False)
+        server = viser.ViserServer(host=host, port=port, verbose=False)
     try:
         server.scene.add_grid('/floor', 3.0, 3.0, cell_size=0.1, section_size=0.5)
         for plane in planes:

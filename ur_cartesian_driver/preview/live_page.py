@@ -1,0 +1,116 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A page that follows a robot: where the arm is, the planned path, its deviation, its state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import hypot
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.preview.motion_page import scene_of_plan, serve, Server
+
+#: The trail of the TCP has an edge for each of these lengths [m], and so many of them at most.
+TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
+
+
+class LivePage:
+    """A page that is served; :func:`live_page` gives one."""
+
+    def __init__(self, server: Server, arm: Arm, state: RobotState, plan: Plan | None) -> None:
+        """Draw the arm where it is, and the plan if there is one."""
+        self._arm, self._plan = arm, plan
+        self._scene = scene_of_plan(server, arm, state.T_flange_tcp, plan)
+        self._tcp = state.T_flange_tcp
+        place = np.array(state.actual_tcp_pose.position)
+        self._trail = np.array([place, place])
+        if plan is None:
+            self._scene.look_at(self._trail)
+        self._text = server.gui.add_markdown('')
+        #: Where the page is.
+        self.url = f'http://{server.get_host()}:{server.get_port()}'
+        self.update(state)
+
+    def update(self, state: RobotState) -> None:
+        """Show a state of the robot."""
+        if state.T_flange_tcp != self._tcp:
+            self._tcp = state.T_flange_tcp
+            self._scene.set_tool(self._tcp)
+        self._scene.pose_arm(state.actual_q)
+        place = np.array(state.actual_tcp_pose.position)
+        if np.linalg.norm(place - self._trail[-1]) >= TRAIL_STEP:
+            self._trail = np.vstack((self._trail[-TRAIL_EDGES:], place))
+            self._scene.set_trail(self._trail)
+        self._text.content = _text(state, self._plan)
+
+    def say_lost(self, reason: str) -> None:
+        """Say that the robot is not heard; the arm stays where it was."""
+        self._text.content = f'**Not connected**: {reason}. The arm is drawn where it last was.'
+
+
+@contextmanager
+def live_page(
+    arm: Arm,
+    state: RobotState,
+    *,
+    plan: Plan | None = None,
+    planes: tuple[Plane, ...] = (),
+    host: str = '127.0.0.1',
+    port: int = 8080,
+) -> Iterator[LivePage]:
+    """
+    Serve a page that follows a robot, until the end of the context.
+
+    :param state: where the robot is now.
+    :param plan: what it is expected to do.
+    :param host: the address that is listened on: everybody who reaches it sees the robot.
+    :param port: the first one that is tried; a free one is found from there on.
+    :raises ImportError: viser is not installed; the text says how to get it.
+    """
+    with serve(planes, host, port) as server:
+        yield LivePage(server, arm, state, plan)
+
+
+def path_deviation(path: Floats, place: Floats) -> float:
+    """
+    Return the distance of a place from a path.
+
+    :param path: (m, 3) its corners [m].
+    """
+    start, vector = path[:-1], np.diff(path, axis=0)
+    square = np.einsum('ni,ni->n', vector, vector)
+    along = np.einsum('ni,ni->n', place - start, vector) / np.where(square > 0.0, square, 1.0)
+    nearest = start + np.clip(along, 0.0, 1.0)[:, None] * vector
+    return float(np.linalg.norm(nearest - place, axis=1).min())
+
+
+def _text(state: RobotState, plan: Plan | None) -> str:
+    x, y, z = (1e3 * value for value in state.actual_tcp_pose.position)
+    lag = state.actual_tcp_pose.distance_to(state.target_tcp_pose)
+    rows = [
+        ('robot', _words(state.robot_mode.name)),
+        ('safety', _words(state.safety_mode.name)),
+        ('program', _words(state.runtime_state.name)),
+        ('TCP', f'{x:.1f} {y:.1f} {z:.1f} mm'),
+        ('speed', f'{1e3 * hypot(*state.actual_tcp_twist[:3]):.1f} mm/s'),
+        ('speed slider', f'{100.0 * state.target_speed_fraction:.0f} %'),
+        ('from its target', f'{1e3 * lag:.2f} mm'),
+    ]
+    if plan is not None:
+        place = np.array(state.actual_tcp_pose.position)
+        deviation = path_deviation(plan.reference.poses[:, :3], place)
+        rows.append(('from the planned path', f'{1e3 * deviation:.2f} mm'))
+    if state.points_begun:
+        rows.append(('points begun', str(state.points_begun)))
+    return '\n'.join(['| | |', '|---|---|', *(f'| {name} | {value} |' for name, value in rows)])
+
+
+def _words(name: str) -> str:
+    return name.lower().replace('_', ' ')
