@@ -41,6 +41,11 @@ def pytest_addoption(parser):
         action='store_true',
         help='leave out the tests that only compute; what waits, for clocks and sockets, runs',
     )
+    parser.addoption(
+        '--browser',
+        metavar='CHROMIUM',
+        help='the browser for the tests of pages, which are left out without it',
+    )
 
 
 def pytest_configure(config):
@@ -49,6 +54,11 @@ def pytest_configure(config):
 
         if is_for_computing(config.workerinput['workerid']):
             os.nice(LOW_PRIORITY)
+
+
+def pytest_ignore_collect(collection_path, config):
+    is_for_browser = collection_path.name == 'browser' and collection_path.is_dir()
+    return True if is_for_browser and not config.getoption('--browser') else None
 
 
 def pytest_collection_modifyitems(config, items):
