@@ -78,7 +78,7 @@ _FRACTION = re.compile(r'at ([\d.]+) % of its segment')
 _STYLE = """
 <style>
 aside { position: fixed; left: 0; top: 0; bottom: 42px; width: 31em; max-width: 45%;
-  box-sizing: border-box; overflow: auto; padding: 1em; background: #ffffffee; z-index: 20;
+  box-sizing: border-box; overflow: auto; padding: 1em; background: #ffffffee; z-index: 1000;
   font: 13px/1.4 system-ui, sans-serif; color: #222; }
 aside pre { font: 10px/1.5 ui-monospace, monospace; overflow-x: auto; }
 aside pre + pre { white-space: pre-wrap; }
@@ -397,6 +397,7 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
     with redirect_stdout(io.StringIO()):  # it greets, whatever it is told
         server = viser.ViserServer(host=host, port=port, verbose=False)
     try:
+        _light(server.scene)
         server.scene.add_grid('/floor', 3.0, 3.0, cell_size=0.1, section_size=0.5)
         for plane in planes:
             _add_plane(server.scene, plane)
@@ -404,6 +405,15 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
+
+
+def _light(scene: Any) -> None:
+    """Light by lamps only: without a graphics card, viser's surroundings take many seconds."""
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(cast_shadow=False)
+    scene.add_light_hemisphere(
+        '/light', sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.5
+    )
 
 
 def _add_plane(scene: Any, plane: Plane) -> None:
