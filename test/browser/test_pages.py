@@ -7,13 +7,18 @@ Only with ``--browser PATH``: the path of Chromium, which playwright drives.
 """
 
 from io import BytesIO
+import os
 from pathlib import Path
+import subprocess
+import sys
 
 from matplotlib.image import imread
 import numpy as np
 import pytest
 
 from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.path import Path as ArmPath
 
 playwright = pytest.importorskip('playwright.sync_api')
 
@@ -49,8 +54,8 @@ class Tab:
         if message.type == 'error':
             self.problems.append(message.text)
 
-    def open(self, file):
-        self.page.goto(file.as_uri())
+    def open(self, url):
+        self.page.goto(url)
         self.page.wait_for_selector('canvas')
         self.page.wait_for_selector('.mantine-Slider-track')
 
@@ -60,8 +65,17 @@ class Tab:
         box = self.page.locator('.mantine-Slider-track').bounding_box()
         x, y = box['x'] + part * box['width'], box['y'] + 0.5 * box['height']
         self.page.mouse.click(x, y)
+        return self.picture()
+
+    def picture(self):
+        """Return the scene when it is drawn: (h, w, 3), 0 to 1."""
         self.page.wait_for_timeout(400)
         return imread(BytesIO(self.page.screenshot(clip=VIEW)), format='png')[:, :, :3]
+
+    def wait_for_text(self, text):
+        self.page.wait_for_function(
+            'text => document.body.innerText.includes(text)', arg=text, timeout=20e3
+        )
 
 
 @pytest.fixture
@@ -76,7 +90,7 @@ def test_the_page_of_an_example_plays_without_a_network(example, tab, tmp_path):
     file = tmp_path / 'page.html'
     assert main(['show', str(example), '-o', str(file)]) == 0
     assert file.stat().st_size < 4e6
-    tab.open(file)
+    tab.open(file.as_uri())
     assert 'tightest margin' in tab.page.locator('aside').inner_text()
     early, late = tab.at(0.1), tab.at(0.6)
     assert early.std() > 0.02
@@ -88,7 +102,7 @@ def test_the_page_of_an_example_plays_without_a_network(example, tab, tmp_path):
 def test_the_links_choose_what_the_colours_say(tab, tmp_path):
     file = tmp_path / 'page.html'
     assert main(['show', 'seam', '-o', str(file)]) == 0
-    tab.open(file)
+    tab.open(file.as_uri())
     by_type = tab.at(0.0)
     with tab.page.expect_navigation(wait_until='load'):
         tab.page.get_by_text('by speed').click()
@@ -102,8 +116,70 @@ def test_a_refused_goal_shows_where(tab, tmp_path):
     assert main(['show', 'square', '--ur-type', 'ur3e', '-o', str(file)]) == 1
     tab.page.goto(file.as_uri())
     tab.page.wait_for_selector('canvas')
-    tab.page.wait_for_timeout(1500)
-    picture = imread(BytesIO(tab.page.screenshot(clip=VIEW)), format='png')
+    tab.page.wait_for_timeout(1000)
+    picture = tab.picture()
     red = picture[:, :, 0] - np.maximum(picture[:, :, 1], picture[:, :, 2]) > 0.35
     assert red.sum() > 4
     assert 'Refused' in tab.page.locator('aside').inner_text()
+
+
+@pytest.fixture
+def driver(ur_sim):
+    config = DriverConfig(
+        robot_ip='127.0.0.1',
+        ur_type=ur_sim.config.model,
+        headless_mode=True,
+        rtde_port=ur_sim.ports.rtde,
+        primary_port=ur_sim.ports.primary,
+        dashboard_port=ur_sim.ports.dashboard,
+        reverse_port=0,
+        script_sender_port=0,
+        trajectory_port=0,
+        script_command_port=0,
+        robot_receive_timeout=1.0,  # the browser takes the processors
+    )
+    with Driver(config) as opened:
+        opened.wait_ready(30.0)
+        yield opened
+
+
+@pytest.fixture
+def path_and_page(driver, ur_sim, tmp_path):
+    """A path that the arm has before it, and the page that follows the arm."""
+    path = ArmPath(driver.state.actual_tcp_pose).at(speed=0.2, acceleration=1.0).by(dy=0.3)
+    file = tmp_path / 'path.yaml'
+    path.save(file)
+    process = subprocess.Popen(
+        [
+            *(sys.executable, '-m', 'ur_cartesian_driver.cli', 'show', str(file)),
+            *('--live', '127.0.0.1', '--rtde-port', str(ur_sim.ports.rtde)),
+        ],
+        env={**os.environ, 'BROWSER': 'true'},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield path, process.stdout.readline().removeprefix('page: ').strip()
+    finally:
+        process.terminate()
+        process.communicate(timeout=30.0)
+
+
+def test_the_live_page_follows_a_goal(path_and_page, driver, tab):
+    path, url = path_and_page
+    tab.page.goto(url)
+    tab.page.wait_for_selector('canvas')
+    tab.wait_for_text('from the planned path')
+    before = tab.picture()
+    driver.execute(path).raise_for_error()
+    y = 1e3 * driver.state.actual_tcp_pose.position[1]
+    tab.wait_for_text(f' {y:.1f} ')
+    after = tab.picture()
+    assert before.std() > 0.02
+    assert np.abs(before - after).mean() > 1e-3
+    rows = dict(
+        row.split('\t') for row in tab.page.inner_text('table').splitlines() if '\t' in row
+    )
+    assert float(rows['from the planned path'].removesuffix(' mm')) < 1.0
+    assert rows['points begun'] == '1'
+    assert tab.problems == []

@@ -39,17 +39,22 @@ def viser_server(monkeypatch):
     """Return what holds the server of the page that is made next."""
     made = []
 
-    class Remembered(viser.ViserServer):
-        def __init__(self, **options):
-            super().__init__(**options)
-            self.texts = []
-            add_markdown = self.gui.add_markdown
-            self.gui.add_markdown = lambda text: (
-                self.texts.append(add_markdown(text)) or (self.texts[-1])
-            )
-            made.append(self)
+    make = viser.ViserServer
 
-    monkeypatch.setattr(viser, 'ViserServer', Remembered)
+    def remember(**options):
+        server = make(**options)
+        server.texts = []
+        add_markdown = server.gui.add_markdown
+
+        def remember_text(text):
+            server.texts.append(add_markdown(text))
+            return server.texts[-1]
+
+        server.gui.add_markdown = remember_text
+        made.append(server)
+        return server
+
+    monkeypatch.setattr(viser, 'ViserServer', remember)
     return made
 
 
