@@ -3,6 +3,7 @@
 """A path says what a goal has, and a mistake is a sentence at the line that makes it."""
 
 from math import nan, pi
+import re
 import subprocess
 import sys
 from typing import Any
@@ -398,3 +399,35 @@ def test_a_path_needs_no_ros():
     )
     ended = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True)
     assert ended.stdout == '[]\n', ended.stderr
+
+
+def test_a_dwell_stops_the_arm_and_delays_what_follows():
+    path = Path(HERE).at(blend=mm(5)).by(dy=0.1, duration=1.0).dwell(0.5).by(dx=0.1, duration=1.0)
+    goal = path.goal()
+    assert [point.time for point in goal.waypoints] == [1.0, 2.5]
+    assert [segment.dwell for segment in goal.segments] == [0.5, 0.0]
+    assert [segment.blend_radius for segment in goal.segments] == [0.0, 0.0]
+    assert Path.from_goal(goal).goal() == goal
+    back = path.then(Path(path.end).by(dz=0.1, duration=1.0)).reversed().goal()
+    assert [
+        (point.time, s.dwell) for point, s in zip(back.waypoints, back.segments, strict=True)
+    ] == [
+        (1.0, 0.0),
+        (2.0, 0.5),
+        (3.5, 0.0),
+    ]
+    spline = Path(HERE).spline((-0.5, 0.0, 0.45), duration=1.0).dwell(0.2)
+    assert spline.goal().waypoints[0].twist == (0.0,) * 6
+
+
+@pytest.mark.parametrize(
+    ('make', 'text'),
+    [
+        (lambda: Path(HERE).dwell(1.0), 'dwell() comes before the first point'),
+        (lambda: Path(HERE).by(dy=0.1, blend=0.01).dwell(1.0), 'the arm does not stop'),
+        (lambda: Path(HERE).by(dy=0.1).dwell(-1.0), 'time -1, outside 0 to 600 s'),
+    ],
+)
+def test_a_dwell_that_cannot_be_is_refused(make, text):
+    with pytest.raises(InvalidGoal, match=re.escape(text)):
+        make()

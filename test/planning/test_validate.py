@@ -400,8 +400,39 @@ REFUSALS = [
     (
         with_point(TIMED, 1, pose=Pose((0.1, 0.0, 0.0))),
         InvalidGoal,
-        'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go, and the '
-        'robot cannot wait there for 1 s',
+        'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go; remove one '
+        'of the two; a dwell of 1 s at points[0] rests there.',
+    ),
+    (
+        with_segment(PLAIN, 1, dwell=601.0),
+        InvalidGoal,
+        'segments[1].dwell is 601 s, more than 600 s; split the goal.',
+    ),
+    (with_segment(PLAIN, 1, dwell=-1.0), InvalidGoal, 'segments[1].dwell is -1; it must not'),
+    (
+        with_segment(PLAIN, 1, dwell=0.5, blend_radius=0.01),
+        InvalidGoal,
+        'segments[1].dwell is 0.5 s, but with a blend of 10 mm the arm does not stop at points[1]',
+    ),
+    (
+        with_segment(TIMED, 1, dwell=1.0),
+        InvalidGoal,
+        'segments[1].dwell is 1 s, but points[2] follows 1 s after trajectory.points[1]; the arm',
+    ),
+    (
+        with_segment(with_point(TIMED, 0, time=0.0), 0, dwell=0.5),
+        InvalidGoal,
+        'segments[0].dwell is 0.5 s, but no motion leads to points[0]: the robot is there at',
+    ),
+    (
+        with_segment(with_point(SPLINE, 1, twist=(0.1, 0, 0, 0, 0, 0)), 1, dwell=0.5),
+        InvalidGoal,
+        'segments[1].dwell is 0.5 s, but the arm passes points[1] with a twist; set its twist',
+    ),
+    (
+        replace(with_segment(PLAIN, 1, dwell=0.5), keep_open=True),
+        NotAvailable,
+        'segments[1].dwell is 0.5 s, but a goal with keep_open does not rest at points; append',
     ),
     (
         with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))),

@@ -58,6 +58,7 @@ def test_there_are_examples():
         'figure_eight',
         'seam_timed',
         'glue',
+        'spots',
     }
 
 

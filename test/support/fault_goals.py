@@ -421,6 +421,42 @@ class OutputGoal(BlendGoal):
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
+#: How long the arm rests in a corner [s].
+REST = 0.8
+
+
+@lru_cache
+def rest_plan(start):
+    """Return the plan of two sides of a square with a rest between them."""
+    state = start.state
+    (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+    goal = Goal(
+        waypoints=(
+            Waypoint(pose=Pose((x, y + SIDE, z), turned)),
+            Waypoint(pose=Pose((x + SIDE, y + SIDE, z), turned)),
+        ),
+        segments=(
+            Segment(velocity=0.25, acceleration=2.0, dwell=REST),
+            Segment(velocity=0.25, acceleration=2.0),
+        ),
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+        safe_outputs=SAFE_OUTPUTS,
+    )
+    return plan(goal, state, ARM, OPTIONS)
+
+
+class RestGoal(BlendGoal):
+    """Two sides of a square, with a rest between them."""
+
+    def plan_from(self, start):
+        return rest_plan(start)
+
+    def is_in(self, phase):
+        return self.points_begun() == 2 and self.cell.at_rest()
+
+
 @lru_cache
 def half_circle_to_append(start):
     """Return the plan of the first three points of a half circle, and the last one to append."""
@@ -504,5 +540,6 @@ GOALS = {
     'SERVO': ServoGoal,
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
+    'At a point': RestGoal,
     'Freedrive': FreedriveGoal,
 }

@@ -336,6 +336,20 @@ OUTPUTS = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+AT_A_POINT = _mode(
+    'At a point',
+    'PRIMITIVES with a `dwell`. Whatever ends the goal ends the rest, and nothing moves then.',
+    {'resting': 'the arm rests at the first point'},
+    2.0,
+    {},
+    faults=tuple(
+        name
+        for name in FAULTS
+        if name not in ("another client's program replaces ours", 'the controller crashes')
+    ),
+    pendant=('protective stop', 'an operator pauses the program'),
+)
+
 APPEND = _mode(
     'Appendable goals',
     'A goal that is appended to while it runs (`keep_open`); the last points are appended '
@@ -388,4 +402,4 @@ FREEDRIVE = replace(
     settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, APPEND, OUTPUTS, FREEDRIVE)
+MODES = (SPLINE, SERVO, APPEND, OUTPUTS, AT_A_POINT, FREEDRIVE)

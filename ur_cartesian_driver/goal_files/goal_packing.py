@@ -45,6 +45,7 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
             'types': array('B', segments.types.astype(np.uint8).tobytes()),
             'arc_modes': array('B', segments.arc_modes.astype(np.uint8).tobytes()),
             'blend_radii': _given(segments.blend_radii),
+            'dwells': _given(segments.dwells),
             'velocities': _given(segments.velocities),
             'segment_accelerations': _given(segments.accelerations),
             'via_postures': _posture_numbers(segments.via_postures, len(segments), names),

@@ -48,6 +48,7 @@ _SEGMENT_FIELDS = (
     'types',
     'arc_modes',
     'blend_radii',
+    'dwells',
     'velocities',
     'segment_accelerations',
     'vias',
@@ -156,6 +157,7 @@ def _segment(segment: Message, field: str) -> Segment:
     return Segment(
         type=type_,
         blend_radius=segment.blend_radius,
+        dwell=segment.dwell,
         velocity=segment.velocity,
         acceleration=segment.acceleration,
         via=via,
@@ -267,6 +269,7 @@ def rows_from_message(packed: Message) -> tuple[WaypointRows, SegmentRows]:
     return points, SegmentRows(
         types=types.astype(np.int64),
         blend_radii=_column(packed, 'blend_radii', n),
+        dwells=_column(packed, 'dwells', n),
         velocities=_column(packed, 'velocities', n),
         accelerations=_column(packed, 'segment_accelerations', n),
         vias=vias if len(packed.vias) else np.broadcast_to(identity, (n, 7)),

@@ -50,6 +50,7 @@ POINT = {
 SEGMENT = {
     'type': UINT8,
     'blend_radius': 0.0,
+    'dwell': 0.0,
     'velocity': 0.0,
     'acceleration': 0.0,
     'via': POSE,
@@ -67,6 +68,7 @@ PACKED = {
     'types': [UINT8],
     'arc_modes': [UINT8],
     'blend_radii': [0.0],
+    'dwells': [0.0],
     'velocities': [0.0],
     'segment_accelerations': [0.0],
     'vias': [0.0],

@@ -88,6 +88,7 @@ def _segments(segments: SegmentRows) -> list[Fields]:
             {
                 'type': int(segment.type),
                 'blend_radius': segment.blend_radius,
+                'dwell': segment.dwell,
                 'velocity': segment.velocity,
                 'acceleration': segment.acceleration,
                 'via': None if segment.via is None else _pose(segment.via.row()),

@@ -90,6 +90,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
     segments = SegmentRows(
         types=path.types,
         blend_radii=_blends(path, options, speeds, remarks),
+        dwells=np.zeros(len(path)),
         velocities=np.zeros(len(path)) if times.any() else speeds,
         accelerations=np.zeros(len(path)) if times.any() else accelerations,
         vias=vias,

@@ -91,6 +91,8 @@ class Segment:
     type: SegmentType = SegmentType.AUTO
     #: Distance from the waypoint at which both segments are left [m].
     blend_radius: float = 0.0
+    #: How long the arm rests at the waypoint [s].
+    dwell: float = 0.0
     #: 0 = from the times, else the default.
     velocity: float = 0.0
     acceleration: float = 0.0

@@ -206,6 +206,7 @@ class SegmentRows(Rows[Segment]):
     types: Integers
     #: (n,) each
     blend_radii: Floats
+    dwells: Floats
     velocities: Floats
     accelerations: Floats
     #: (n, 7) poses on the arcs, and whether there is one (n,)
@@ -232,6 +233,7 @@ class SegmentRows(Rows[Segment]):
         return cls(
             types=np.array([segment.type for segment in plain], dtype=np.int64),
             blend_radii=np.array([segment.blend_radius for segment in plain], dtype=np.float64),
+            dwells=np.array([segment.dwell for segment in plain], dtype=np.float64),
             velocities=np.array([segment.velocity for segment in plain], dtype=np.float64),
             accelerations=np.array([segment.acceleration for segment in plain], dtype=np.float64),
             vias=_pose_array([via or IDENTITY for via in vias])
@@ -250,6 +252,7 @@ class SegmentRows(Rows[Segment]):
         return cls(
             types=number,
             blend_radii=zero,
+            dwells=zero,
             velocities=zero,
             accelerations=zero,
             vias=zeros(n, 7),
@@ -266,10 +269,11 @@ class SegmentRows(Rows[Segment]):
 
     def __iter__(self) -> Iterator[Segment]:
         postures = self.via_postures
-        for i, (kind, radius, velocity, acceleration, via, mode) in enumerate(
+        for i, (kind, radius, dwell, velocity, acceleration, via, mode) in enumerate(
             zip(
                 self.types.tolist(),
                 self.blend_radii.tolist(),
+                self.dwells.tolist(),
                 self.velocities.tolist(),
                 self.accelerations.tolist(),
                 map(self.via, range(len(self))),
@@ -280,6 +284,7 @@ class SegmentRows(Rows[Segment]):
             yield Segment(
                 type=_TYPES.get(kind, kind),
                 blend_radius=radius,
+                dwell=dwell,
                 velocity=velocity,
                 acceleration=acceleration,
                 via=via,
@@ -355,7 +360,7 @@ def _are_plain_points(points: Sequence[Waypoint]) -> bool:
 
 def _are_plain_segments(segments: Sequence[Segment]) -> bool:
     vias = [segment.via for segment in segments if segment.via is not None]
-    numbers = attrgetter('blend_radius', 'velocity', 'acceleration')
+    numbers = attrgetter('blend_radius', 'dwell', 'velocity', 'acceleration')
     return (
         _only({SegmentType}, (segment.type for segment in segments))
         and _only({ArcMode}, (segment.arc_mode for segment in segments))

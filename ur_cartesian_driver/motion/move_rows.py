@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
+    Wait,
 )
 from ur_cartesian_driver.motion.vectors import vector6
 
@@ -146,3 +147,10 @@ def has_optimized(primitives: Sequence[Primitive]) -> bool:
         return any(isinstance(primitive, classes) for primitive in primitives)
     in_rows = np.isin(primitives.kinds, [MOVES.index(move) for move in classes])
     return bool(in_rows.any()) or has_optimized(tuple(primitives.others.values()))
+
+
+def has_waits(primitives: Sequence[Primitive]) -> bool:
+    """Tell whether some primitive lets the arm rest."""
+    if isinstance(primitives, SplineRows | MoveRows):
+        return False
+    return any(isinstance(primitive, Wait) for primitive in primitives)

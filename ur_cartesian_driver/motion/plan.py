@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput
+from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput, Wait
 from ur_cartesian_driver.motion.vectors import vector6
 
 
@@ -178,6 +178,15 @@ class PlannedRows(Rows[PlannedSegment]):
         for row, outputs in self.outputs.items():
             counts[row] += len(outputs)
         return counts
+
+    @property
+    def kinds(self) -> dict[int, str]:
+        """The class of the motion to each point, by the index of the point."""
+        return {
+            waypoint: type(primitive).__name__
+            for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True)
+            if not isinstance(primitive, Wait)
+        }
 
     def __len__(self) -> int:
         return len(self.waypoints)

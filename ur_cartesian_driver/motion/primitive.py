@@ -136,6 +136,17 @@ class SwitchOutput:
     delay: float = 0.0
 
 
-Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wait:
+    """
+    The arm rests where it stands; the robot program counts it as a motion.
+
+    :param duration: from the end of the motion before [s], of real time in which the program runs.
+    """
+
+    duration: float
+
+
+Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Wait
 #: One record of a trajectory on the wire.
 Instruction: TypeAlias = Primitive | SwitchOutput

@@ -38,7 +38,7 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.pose import IDENTITY, multiply, Pose, Quaternion, rotate
-from ur_cartesian_driver.motion.vectors import add, Vector6
+from ur_cartesian_driver.motion.vectors import add, Vector6, ZERO6
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, RestToRest, turned
 from ur_cartesian_driver.path.outputs import Output
 from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal
@@ -65,6 +65,7 @@ from ur_cartesian_driver.path.path_points import (
     seen_from,
 )
 from ur_cartesian_driver.path.weave import strokes, woven
+from ur_cartesian_driver.planning.request.dwells import MAX_DWELL
 
 #: A place: a position x y z [m], or a pose.
 Place: TypeAlias = Sequence[float] | Pose
@@ -452,10 +453,39 @@ class Path:
                     'there from another point',
                     'add a point where the output is to change',
                 )
+            offset += self._points[index].segment.dwell
         command = output.command(value, 0, round(offset * NANOSECONDS) / NANOSECONDS)
         point = self._points[index]
         point = replace(point, outputs=(*point.outputs, command))
         return self._with(_points=(*self._points[:index], point, *self._points[index + 1 :]))
+
+    def dwell(self, time: float) -> Path:
+        """
+        Let the arm rest at the point before for a time; there it has no blend.
+
+        Durations are those of motions: what follows is later by the time [s].
+
+        :raises InvalidGoal: there is no point, or it is passed with a blend or a twist of its own.
+        """
+        if not self._points:
+            raise InvalidGoal('dwell()', 'comes before the first point', 'add a motion first')
+        where, point = f'dwell() at point {len(self) - 1}', self._points[-1]
+        length = to_nanoseconds(where, amount(where, 'time', time, MAX_DWELL, 's')) / NANOSECONDS
+        segment, waypoint = point.segment, point.waypoint
+        own_blend = segment.blend_radius > 0.0 and not point.feed_blend
+        moves = any(abs(rate) > 0.0 for rate in (*waypoint.twist, *waypoint.acceleration))
+        if own_blend or moves:
+            raise InvalidGoal(where, 'is where the arm does not stop', 'leave out blend and twist')
+        if point.in_spline:
+            waypoint = replace(waypoint, twist=ZERO6, acceleration=ZERO6)
+        point = replace(
+            point,
+            waypoint=waypoint,
+            segment=replace(segment, dwell=length, blend_radius=0.0),
+            feed_blend=False,
+            auto_blend=False,
+        )
+        return self._with(_points=(*self._points[:-1], point))
 
     # ---- the path as a whole -------------------------------------------------------------------
 
@@ -592,12 +622,16 @@ class Path:
         if not self._points:
             return self
         places = (self._start, *self._points)
-        # A blend belongs to its point, all else of a segment to the motion.
+        # Blend and dwell belong to their point, all else of a segment to the motion.
         points = [
             replace(
                 motion,
                 waypoint=backwards(place.waypoint),
-                segment=replace(motion.segment, blend_radius=place.segment.blend_radius),
+                segment=replace(
+                    motion.segment,
+                    blend_radius=place.segment.blend_radius,
+                    dwell=place.segment.dwell,
+                ),
                 feed_blend=place.feed_blend,
                 auto_blend=place.auto_blend,
             )
@@ -606,7 +640,7 @@ class Path:
         end = places[-1]
         start = PathPoint(
             waypoint=backwards(end.waypoint),
-            segment=Segment(blend_radius=end.segment.blend_radius),
+            segment=Segment(blend_radius=end.segment.blend_radius, dwell=end.segment.dwell),
             feed_blend=end.feed_blend,
             auto_blend=end.auto_blend,
         )

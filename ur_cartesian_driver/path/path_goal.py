@@ -37,7 +37,11 @@ def goal_of_points(
 
     :param start: where the path begins, if it says so.
     """
-    times = accumulate(point.duration for point in points)
+    rests = [0, *(_nanoseconds(point.segment.dwell) for point in points[:-1])]
+    times = accumulate(
+        point.duration + rest if point.duration else 0
+        for point, rest in zip(points, rests, strict=False)
+    )
     segments = [
         replace(point.segment, blend_radius=_process_blend(points, i, start))
         if point.auto_blend
@@ -81,6 +85,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
             'give none, or one for each point',
         )
     times = [to_nanoseconds(f'points[{i}]', point.time) for i, point in enumerate(points)]
+    rests = [_nanoseconds(segment.dwell) for segment in segments] or [0] * len(points)
     outputs: dict[int, list[IOCommand]] = {}
     for command in goal.io_commands:
         if not 0 <= command.waypoint < len(points):
@@ -96,12 +101,16 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
         PathPoint(
             waypoint=replace(point, time=0.0),
             segment=segments[i] if segments else Segment(),
-            duration=times[i] - (times[i - 1] if i else 0),
+            duration=times[i] - (times[i - 1] + rests[i - 1] if i and times[i] else 0),
             outputs=tuple(outputs.get(i, ())),
             in_spline=in_spline,
         )
         for i, point in enumerate(points)
     )
+
+
+def _nanoseconds(time: float) -> int:
+    return round(time * NANOSECONDS)
 
 
 def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) -> float:

@@ -23,15 +23,15 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
     """
     Return the lines and arcs of a path.
 
-    :raises InvalidGoal: it has corners, other motions, outputs, durations or postures.
+    :raises InvalidGoal: it has corners, other motions, outputs, durations, postures or dwells.
     """
     found: list[Stroke] = []
     before = start
     for i, point in enumerate(points):
         where = f'weave() at point {i}'
-        if point.outputs or point.duration or point.waypoint.posture:
+        if point.outputs or point.duration or point.waypoint.posture or point.segment.dwell:
             raise InvalidGoal(
-                where, 'has outputs, a duration or a posture', 'give them to the result'
+                where, 'has outputs, a duration, a posture or a dwell', 'give them to the result'
             )
         stroke = _stroke(before, point)
         if stroke is None or stroke.length <= SAME_POSITION:

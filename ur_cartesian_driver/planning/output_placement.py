@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.goal import IOCommand
 from ur_cartesian_driver.motion.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput
+from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput, Wait
 from ur_cartesian_driver.motion.vectors import subtract, Vector6
 from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
@@ -66,7 +66,7 @@ def place_outputs(
         key=lambda found: found.time,
     )
     outputs: dict[int, tuple[SwitchOutput, ...]] = {}
-    notes: dict[int, str] = {}
+    notes = dict(segments.notes)
     for found in switches:
         row, line = found.after_index, found.report_index
         outputs[row] = (*outputs.get(row, ()), found.record)
@@ -108,7 +108,19 @@ class _TimedPath:
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self.blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self.returns: Floats = self.ends - self.blend_halves
-        self.index = {waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist())}
+        rests = (segments.lengths == 0.0) & (np.diff(segments.waypoints, prepend=-1) == 0)
+        #: By the row of a motion: until when the arm rests behind it [s].
+        self.rests_until = {
+            k - 1: float(self.ends[k])
+            for k in np.flatnonzero(rests).tolist()
+            if isinstance(segments.primitives[k], Wait)
+        }
+        #: The row whose motion leads to each point.
+        self.index = {
+            waypoint: k
+            for k, waypoint in enumerate(segments.waypoints.tolist())
+            if k - 1 not in self.rests_until
+        }
 
     def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
         """Return when and where a command switches its output."""
@@ -120,16 +132,19 @@ class _TimedPath:
                 'switch the output before the goal',
             )
         time, last = float(self.ends[report_index]) + command.offset, len(self.segments) - 1
-        late = time - float(self.ends[last])
+        late, delay = time - float(self.ends[last]), 0.0
         if command.offset <= _SAME_TIME:
             after_index, trigger_time, where = (
                 report_index,
                 self._at_point(report_index),
                 self._where(report_index),
             )
+        elif time <= self.rests_until.get(report_index, 0.0):
+            after_index, trigger_time, delay = report_index, None, command.offset
+            where = f'{command.offset:.3f} s after stopping there'
         elif late > -_SAME_TIME:
-            after_index, trigger_time = last, None
-            where = f'{max(late, 0.0):.3f} s after the end'
+            after_index, trigger_time, delay = last, None, max(late, 0.0)
+            where = f'{delay:.3f} s after the end'
         else:
             after_index, trigger_time, where = (
                 self._last_returned(time),
@@ -141,7 +156,7 @@ class _TimedPath:
             pin=command.pin,
             value=command.value,
             domain=command.domain,
-            delay=max(late, 0.0) if trigger_time is None and command.offset > _SAME_TIME else 0.0,
+            delay=delay,
         )
         if trigger_time is not None:
             record = self._at(record, trigger_time, float(self.returns[after_index]))

@@ -46,6 +46,7 @@ from ur_cartesian_driver.motion.primitive import (
     Primitive,
     Spline,
     Target,
+    Wait,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
@@ -81,6 +82,7 @@ from ur_cartesian_driver.planning.request.dialect_adaptation import (
     adapt_to_dialect,
     explain_poses_only,
 )
+from ur_cartesian_driver.planning.request.dwells import Dwells
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     point_field,
@@ -163,6 +165,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     reference = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
+    goal, segments, reference = planner.dwells.insert(goal, segments, reference)
     segments = place_outputs(
         segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
     )
@@ -190,10 +193,11 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    segments = place_outputs(found.segments, found.reference, goal.io_commands)
-    return planner.plan(
-        stretch_times(goal, found.stretch), segments, found.reference, found.remarks
+    goal, segments, reference = planner.dwells.insert(
+        stretch_times(goal, found.stretch), found.segments, found.reference
     )
+    segments = place_outputs(segments, reference, goal.io_commands)
+    return planner.plan(goal, segments, reference, found.remarks)
 
 
 class GoalPlanner:
@@ -213,7 +217,8 @@ class GoalPlanner:
         options: PlanningOptions,
         running: PlannedSegment | None = None,
     ) -> None:
-        goal, state = retargeted.goal, retargeted.state
+        self.dwells = Dwells(retargeted.goal)
+        goal, state = self.dwells.moving_goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
         self.running = running
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
@@ -420,7 +425,7 @@ class GoalPlanner:
             primitive = self._arc(geometries, moves, row, joints)
         else:
             move = moves[row]
-            assert not isinstance(move, MoveC | Spline)
+            assert not isinstance(move, MoveC | Spline | Wait)
             primitive = move
             if kind in JOINT_SPACE_TYPES or row in geometries.waypoints.postures:
                 primitive = replace(move, q_near=self._q_near(point, joints))

@@ -177,10 +177,7 @@ def _place(text: str, path: Floats) -> Floats | None:
 
 
 def _by_type(plan: Plan) -> _Colouring:
-    kinds = dict(
-        zip(plan.rows.waypoints.tolist(), map(_type_name, plan.rows.primitives), strict=True)
-    )
-    reference = plan.reference
+    kinds, reference = plan.rows.kinds, plan.reference
     colours = np.array(
         [_TYPES[kinds[point]][1] for point in reference.point[1:].tolist()], dtype=np.uint8
     ).reshape(-1, 3)
@@ -209,10 +206,6 @@ def _by_margin(plan: Plan, arm: Arm, preview: Preview) -> _Colouring:
         (f'{AMPLE_MARGIN:g} rad and more', _shade(1.0))
     ]
     return _Colouring('margin', _shades(at / AMPLE_MARGIN), legend)
-
-
-def _type_name(primitive: object) -> str:
-    return type(primitive).__name__
 
 
 def _shade(part: float) -> Colour:

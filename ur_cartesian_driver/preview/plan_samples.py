@@ -23,8 +23,15 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ, OptimoveL, Spline
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.primitive import (
+    Joints,
+    MoveJ,
+    OptimoveJ,
+    OptimoveL,
+    Spline,
+    Wait,
+)
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +107,8 @@ def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
 
 
 def _line(segments: Sequence[PlannedSegment]) -> str:
-    primitive, pieces = segments[-1].primitive, len(segments)
+    moving = [segment for segment in segments if not isinstance(segment.primitive, Wait)]
+    primitive, pieces = moving[-1].primitive, len(moving)
     name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
     length, angle = (
@@ -120,7 +128,12 @@ def _time(segments: Sequence[PlannedSegment]) -> str:
 
 
 def _spline(plan: Plan) -> JointSpline:
-    pieces = (segment.primitive for segment in plan.segments)
+    pieces = (
+        Spline(target=segment.joints, velocities=ZERO6, duration=segment.duration)
+        if isinstance(segment.primitive, Wait)
+        else segment.primitive
+        for segment in plan.segments
+    )
     return JointSpline.of(plan.start, (piece for piece in pieces if isinstance(piece, Spline)))
 
 

@@ -110,8 +110,14 @@ class GoalMonitor:
         self.held_time = passed * (1.0 - state.target_speed_fraction * playing)
         if not moving:
             return
-        self.scaled_time += passed * state.effective_speed
         self._track(before, state, passed)
+        waits = self._has_begun and self._tracker.waits
+        # The program waits in real time, and reports no scaling while it does not move the arm.
+        held = state.target_speed_fraction <= 0.0 or not playing
+        elapsed = passed * (state.effective_speed or float(waits and not held))
+        self.scaled_time += elapsed
+        if waits:
+            self._tracker.wait(elapsed)
         if _stands_still(before, state):
             self._stalled_time += passed
             # At rest the scaling is 0: only the slider says how fast a wait would pass.

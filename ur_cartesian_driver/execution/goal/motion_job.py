@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import SafeOutput, Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized
+from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, has_waits
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -65,6 +65,8 @@ class MotionJob:
     keep_open: bool = False
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
+    #: Whether the robot program lets the arm rest at points.
+    has_waits: bool = False
     #: What outputs become when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: SERVO: the joints over time.
@@ -88,6 +90,8 @@ class MotionJob:
         """What only our robot program can do of this, as part of a sentence; empty = nothing."""
         if not self.is_motion.all():
             return 'outputs (io_commands)'
+        if self.has_waits:
+            return 'rests at points (dwell)'
         if self.safe_outputs:
             return 'outputs that have to be safe (safe_outputs)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
@@ -147,6 +151,7 @@ def job_from_plan(
         keep_open=goal.keep_open,
         safe_outputs=goal.safe_outputs,
         ending_records=ending_records,
+        has_waits=has_waits(rows.primitives),
         has_speed_profile=not (
             goal.keep_open
             or plan.execution.traits.streams_setpoints

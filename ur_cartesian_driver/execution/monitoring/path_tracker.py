@@ -41,6 +41,9 @@ LAG_TIME = 0.02
 LAG_DISTANCE = 0.0005
 #: Times that differ by less are the same [s]; the wire counts in microseconds.
 SAME_TIME = 5e-7
+#: At a place where the plan waits the target is at most so far beside it [m]: the wire rounds to a
+#: micrometre, and a servo creeps.
+SAME_PLACE = 2e-5
 #: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0
 #: Up to so many edges are searched one by one.
@@ -128,6 +131,9 @@ class PathTracker:
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
         self._arc = _float_array(np.concatenate(([0.0], np.cumsum(steps))))
         self._time, self._points = _float_array(path.time), array('i', path.point.tobytes())
+        waits = (steps == 0.0) & (np.diff(path.time) > SAME_TIME)
+        #: The rows from which on the plan waits, in order.
+        self._waits = array('l', np.flatnonzero(waits).tolist())
         self._has_blend_tolerance = bool(path.blend_tolerance.any())
         self._edges: dict[int, Edge] = {}
         self._end = pose_from_row(path.poses[-1])
@@ -151,12 +157,51 @@ class PathTracker:
         """
         first, end = self._window(max_advance, running)
         self.residual = inf
-        if end > first:
-            lowest = self.path_position.fraction if first == self.path_position.row else 0.0
-            self.path_position, self.residual = self._nearest(
-                self._coordinates(target, first), first, end, lowest
-            )
+        while end > first:
+            # The target does not pass a place where the plan waits before it has been there.
+            wait = self._next_wait(first, end)
+            found = self._nearest_in(target, first, wait)
+            if found is not None and found[1] <= self.residual:
+                self.path_position, self.residual = found
+            if wait >= end or self._arc[wait] - self._arc_length() > SAME_PLACE:
+                break
+            here = self._edge(wait).start
+            distance = here.distance_to(target) + METRES_PER_RADIAN * here.angle_to(target)
+            if distance <= SAME_PLACE:
+                if self.path_position.row < wait:
+                    self.path_position = PathPosition(wait, 0.0)
+                self.residual = distance
+                break
+            first = wait + 1
         return self.path_position
+
+    def _nearest_in(self, target: Pose, first: int, end: int) -> tuple[PathPosition, float] | None:
+        """Return the position on some edges, and its distance; None where there are none."""
+        if end <= first:
+            return None
+        lowest = self.path_position.fraction if first == self.path_position.row else 0.0
+        return self._nearest(self._coordinates(target, first), first, end, lowest)
+
+    def _next_wait(self, first: int, end: int) -> int:
+        """Return the first row from which on the plan waits, or the end of the rows."""
+        if not self._waits:
+            return end
+        k = bisect_left(self._waits, first)
+        return min(self._waits[k], end) if k < len(self._waits) else end
+
+    @property
+    def waits(self) -> bool:
+        """Whether the target is where the plan waits."""
+        row = self.path_position.row
+        return self._next_wait(row, row + 1) == row
+
+    def wait(self, time: float) -> None:
+        """Let a time pass where the plan waits [s]."""
+        row, fraction = self.path_position.row, self.path_position.fraction
+        fraction += time / (self._time[row + 1] - self._time[row])
+        self.path_position = (
+            PathPosition(row, fraction) if fraction < 1.0 else PathPosition(row + 1, 0.0)
+        )
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.dwells import refuse_dwells_of_open_goals
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
 from ur_cartesian_driver.planning.request.validate import check_list_lengths
@@ -111,6 +112,7 @@ def check_appended_points(
         if_empty='give at least one point, or set last',
         if_too_many='append them in several requests',
     )
+    refuse_dwells_of_open_goals(appended.segments, keep_open=True, first=first)
     for i, command in enumerate(appended.io_commands):
         if not first <= command.waypoint < first + count:
             raise InvalidGoal(

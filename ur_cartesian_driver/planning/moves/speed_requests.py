@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.primitive import Spline, Wait
 from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
@@ -170,7 +170,7 @@ class SpeedRequests:
     def _request_again(self, running: PlannedSegment) -> None:
         """Ask for what has been sent already."""
         sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
-        assert not isinstance(sent, Spline)
+        assert not isinstance(sent, Spline | Wait)
         acceleration = sent.acceleration * self.acceleration_unit[0]
         self.speed[0], self.acceleration[0] = sent.velocity, acceleration
         self.max_acceleration[0] = acceleration
@@ -212,11 +212,12 @@ class SpeedRequests:
         """Return the speeds that the goal asks for."""
         options, segments, kinds = self._options, self.geometries.segments, self._kinds
         limits, twists = self.limits, self.geometries.waypoints.twists
-        speeds = np.where(
-            limits.translates,
-            np.linalg.norm(twists[:, :3], axis=1),
-            np.linalg.norm(twists[:, 3:], axis=1),
-        )
+        with np.errstate(over='ignore'):  # any number may come
+            speeds = np.where(
+                limits.translates,
+                np.linalg.norm(twists[:, :3], axis=1),
+                np.linalg.norm(twists[:, 3:], axis=1),
+            )
         # One number for both: the turn may be faster [rad/s], but no faster than the tool [m/s].
         fastest = options.max_tool_speed or options.angular_velocity
         both = max(options.linear_velocity, min(options.angular_velocity, fastest))

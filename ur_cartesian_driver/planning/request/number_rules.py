@@ -69,13 +69,15 @@ def check_point_numbers(goal: GoalTable, options: PlanningOptions) -> None:
 def check_segment_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse segments with negative numbers, or with ones that are not finite."""
     segments = goal.segments
-    numbers = np.stack((segments.blend_radii, segments.velocities, segments.accelerations))
+    numbers = np.stack(
+        (segments.blend_radii, segments.dwells, segments.velocities, segments.accelerations)
+    )
     vias = segments.vias
     fine = (np.isfinite(numbers) & (numbers >= 0.0)).all(axis=0)
     fine &= ~segments.has_via | (np.isfinite(vias).all(axis=1) & _are_units(vias[:, 3:]))
     for i in rows_where(~fine):
         segment = segments[i]
-        for field in ('blend_radius', 'velocity', 'acceleration'):
+        for field in ('blend_radius', 'dwell', 'velocity', 'acceleration'):
             value = getattr(segment, field)
             check_finite(segment_field(i, field), (value,))
             if value < 0.0:

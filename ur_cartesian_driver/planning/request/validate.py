@@ -42,6 +42,7 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
+from ur_cartesian_driver.planning.request.dwells import check_dwells
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_optimized,
     is_spline,
@@ -250,6 +251,7 @@ RULES: tuple[Rule, ...] = (
     _segment_rules,
     _postures,
     check_blends,
+    check_dwells,
     _motions,
 )
 
@@ -336,11 +338,13 @@ def duplicate_point_error(goal: GoalTable, index: int) -> InvalidGoal:
     """Return the refusal of a segment without a motion."""
     times = goal.waypoints.times
     dwell = float(times[index] - times[index - 1])
-    dwell_clause = f', and the robot cannot wait there for {dwell:g} s' if is_timed(goal) else ''
+    remedy = (
+        f'; a dwell of {dwell:g} s at points[{index - 1}] rests there' if is_timed(goal) else ''
+    )
     return InvalidGoal(
         point_field(index),
-        f'duplicates points[{index - 1}]: a UR move needs a distance to go{dwell_clause}',
-        'remove one of the two, or split the goal there',
+        f'duplicates points[{index - 1}]: a UR move needs a distance to go',
+        f'remove one of the two{remedy}',
     )
 
 

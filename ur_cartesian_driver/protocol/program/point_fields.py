@@ -38,6 +38,9 @@ no time:
 18       delay after the end of the last motion [s]                             T
 20       motion type                                                            1
 =======  =====================================================================  =====
+
+WAIT is of our own program, too: a motion that goes nowhere. Its word 18 is the time from the end
+of the motion before until the next one may begin [s], with the factor T; all others are zeros.
 """
 
 from __future__ import annotations
@@ -67,6 +70,7 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
     SwitchOutput,
     Target,
+    Wait,
 )
 from ur_cartesian_driver.motion.rotation_rows import log_rows
 from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
@@ -108,6 +112,8 @@ class MotionType(IntEnum):
     SPLINE = 51
     #: not a motion: switches an output at a trigger pose; our own robot program only
     SWITCH_OUTPUT = 200
+    #: the arm stands for a time; our own robot program only
+    WAIT = 201
 
 
 class SplineKind(IntEnum):
@@ -186,6 +192,8 @@ _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is
 #: The kinds of rows up to this one take a duration.
 _LAST_TIMED = MOVES.index(MoveL)
 _POSE_TYPES = np.array([_TYPES[move][1] for move in MOVES])
+#: Records whose word 18 counts from the end of the motion before.
+_WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, MotionType.WAIT))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
@@ -204,6 +212,8 @@ def motion_type(primitive: Instruction) -> MotionType:
         return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
     if isinstance(primitive, Spline):
         return MotionType.SPLINE
+    if isinstance(primitive, Wait):
+        return MotionType.WAIT
     try:
         return _TYPES[type(primitive)][isinstance(primitive.target, Pose)]
     except KeyError:
@@ -224,6 +234,8 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
         return _output_fields(primitive)
     if isinstance(primitive, Spline):
         return _spline_fields(primitive)
+    if isinstance(primitive, Wait):
+        return (*(0.0,) * 18, primitive.duration, 0, MotionType.WAIT)
     target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
         via, mode, radius = _numbers(primitive.via), primitive.mode, primitive.blend_radius
@@ -333,6 +345,8 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> I
         return _spline(fields)
     if kind is MotionType.SWITCH_OUTPUT:
         return _output(fields)
+    if kind is MotionType.WAIT:
+        return Wait(duration=fields[18])
     return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind, dialect)
 
 
@@ -395,9 +409,9 @@ def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None
     duration, blend, kind = fields[18], fields[19], fields[20]
     if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.min_duration):
         raise _duration_error(duration, dialect)
-    if kind == MotionType.SWITCH_OUTPUT and not 0.0 <= duration <= dialect.max_duration:
+    if kind in _WITH_DELAY and not 0.0 <= duration <= dialect.max_duration:
         raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
-    if kind in (MotionType.SPLINE, MotionType.SWITCH_OUTPUT):
+    if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
     v_at, a_at = NEWEST_DIALECT.speed_words if kind in _ARCS else dialect.speed_words
     velocity, acceleration = fields[v_at], fields[a_at]

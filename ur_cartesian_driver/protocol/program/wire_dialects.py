@@ -8,17 +8,17 @@ nothing on the sockets tells which one that is. So the dialect is a setting. A m
 number of words and the same size in all dialects. Everything that differs is defined here;
 :mod:`trajectory_points` and :mod:`reverse` ask the :class:`Dialect`:
 
-=======  =============  ==========  ================  =====================  =======
-dialect  library        time scale  motion types      words 6 - 17 of moves  streams
-=======  =============  ==========  ================  =====================  =======
-2.0      2.0 - 2.9      1000        0 - 3, 51         v x 6, a x 6           no
-2.10     2.10, 2.11     1,000,000   0 - 5, 51         v x 6, a x 6           no
-2.12     2.12, 2.13     1,000,000   0 - 13, 51        q_near, v, a, flag     no
-2.14     since 2.14     1,000,000   0 - 13, 51, 200   q_near, v, a, flag     yes
-=======  =============  ==========  ================  =====================  =======
+=======  =============  ==========  ===================  =====================  =======
+dialect  library        time scale  motion types         words 6 - 17 of moves  streams
+=======  =============  ==========  ===================  =====================  =======
+2.0      2.0 - 2.9      1000        0 - 3, 51            v x 6, a x 6           no
+2.10     2.10, 2.11     1,000,000   0 - 5, 51            v x 6, a x 6           no
+2.12     2.12, 2.13     1,000,000   0 - 13, 51           q_near, v, a, flag     no
+2.14     since 2.14     1,000,000   0 - 13, 51, 200, 201 q_near, v, a, flag     yes
+=======  =============  ==========  ===================  =====================  =======
 
-Type 200 switches an output. Only our own robot program knows it; the library's programs skip it
-silently.
+Types from 200 on switch an output and let the arm rest. Only our own robot program knows them; the
+library's programs skip them silently.
 
 "Moves" are all types except MOVEC* and SPLINE, whose words never changed. Blend radii have the
 time scale, too. With a scale of 1000, times are whole milliseconds and radii whole millimetres.
@@ -46,6 +46,7 @@ _OPTIMOVES = frozenset((4, 5))
 _OTHER_TARGETS = frozenset(range(6, 14))
 _SPLINE = frozenset((51,))
 _OUTPUTS = frozenset((200,))
+_WAITS = frozenset((201,))
 
 #: Names of words 6 to 17 of a move in errors, with and without q_near.
 _NAMES_WITH_Q_NEAR = (
@@ -101,6 +102,11 @@ class Dialect:
     def supports_outputs(self) -> bool:
         """Whether a trajectory may contain outputs."""
         return self.motion_types >= _OUTPUTS
+
+    @property
+    def supports_waits(self) -> bool:
+        """Whether a trajectory may let the arm rest between two motions."""
+        return self.motion_types >= _WAITS
 
     @property
     def is_coarse(self) -> bool:
@@ -159,7 +165,12 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             Dialect(
                 name='2.14',
                 time_scale=FIXED_POINT,
-                motion_types=_LINES_AND_ARCS | _OPTIMOVES | _OTHER_TARGETS | _SPLINE | _OUTPUTS,
+                motion_types=_LINES_AND_ARCS
+                | _OPTIMOVES
+                | _OTHER_TARGETS
+                | _SPLINE
+                | _OUTPUTS
+                | _WAITS,
                 supports_q_near=True,
                 supports_append=True,
                 supports_tcp_change=True,

@@ -70,14 +70,7 @@ def plan_markers(plan: Plan, base: str, stamp: Time) -> MarkerArray:
 
 
 def _path(plan: Plan, header: Header) -> Marker:
-    reference = plan.reference
-    kinds = dict(
-        zip(
-            plan.rows.waypoints.tolist(),
-            (type(primitive).__name__ for primitive in plan.rows.primitives),
-            strict=True,
-        )
-    )
+    reference, kinds = plan.reference, plan.rows.kinds
     rows = _some(len(reference.poses), MAX_SAMPLES)
     blended = np.any(reference.blend_tolerance[rows], axis=1).tolist()
     marker = Marker(header=header, ns='path', type=Marker.LINE_STRIP)
