@@ -18,6 +18,7 @@ MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',
     'SERVO': 'between points',
+    'Waiting for the arm': 'waiting',
     'Appendable goals': 'moving',
     'Outputs': 'before the trigger pose',
     'Freedrive': 'freedrive',

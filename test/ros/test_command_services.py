@@ -109,6 +109,8 @@ def test_every_service_does_what_it_says(cell):
     assert call('resend_robot_program').success
     assert cell.node.driver.status.state is ConnectionState.READY
     assert call('recover', Recover.Request()).message == 'The robot is ready for goals.'
+    assert call('hand_back_control').success
+    assert call('resend_robot_program').success
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):

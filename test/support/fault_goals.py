@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     Goal,
     IOCommand,
+    OnPathTolerance,
     OutputKind,
     SafeOutput,
     Segment,
@@ -344,6 +345,36 @@ class ServoGoal(SplineGoal):
         assert not self.cell.at_rest()
 
 
+#: How long the arm of a goal that waits for it is held off its path [s].
+PUSHED = 1.0
+
+
+@lru_cache
+def patient_half_circle(start):
+    """Return the plan of a half circle that waits for an arm that is off its path."""
+    goal = replace(
+        half_circle_goal(start.state, ExecutionMode.SERVO),
+        on_path_tolerance=OnPathTolerance.STALL,
+    )
+    return plan(goal, start.state, ARM, OPTIONS)
+
+
+class WaitingGoal(ServoGoal):
+    """The same half circle, which waits for its arm."""
+
+    _is_pushed = False
+
+    def plan_from(self, start):
+        return patient_half_circle(start)
+
+    def is_in(self, phase):
+        assert phase == 'waiting'
+        if not self._is_pushed and self.fraction() > 0.4:
+            self._is_pushed = True
+            self.cell.robot.inject(f'offset pose z {2.0 * PATH_TOLERANCE} for {PUSHED} s')
+        return self._is_pushed and self.cell.at_rest()
+
+
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the
 #: latter [s].
 AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
@@ -538,6 +569,7 @@ class FreedriveGoal(FaultGoal):
 GOALS = {
     'SPLINE': SplineGoal,
     'SERVO': ServoGoal,
+    'Waiting for the arm': WaitingGoal,
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,

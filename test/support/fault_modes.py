@@ -313,6 +313,26 @@ SERVO = _mode(
     },
 )
 
+WAITING = _mode(
+    'Waiting for the arm',
+    'The same set-points with `on_path_tolerance: STALL`; the arm is held off its path.',
+    {'waiting': 'the motion stands on its path, until the arm is back'},
+    2.5,
+    {},
+    faults=(
+        'protective stop',
+        'emergency stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'RTDE is cut',
+        'the reverse socket is half-open',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
@@ -402,4 +422,4 @@ FREEDRIVE = replace(
     settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, APPEND, OUTPUTS, AT_A_POINT, FREEDRIVE)
+MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, FREEDRIVE)

@@ -334,6 +334,7 @@ def run_cell(
     threads: str = os.environ.get('THREADS', ''),
     imperfect: str | None = None,
     robot: dict[str, Any] | None = None,
+    cell: type[RobotCell] = RobotCell,
     **settings: Any,
 ) -> T:
     """
@@ -343,6 +344,7 @@ def run_cell(
     :param imperfect: seed of the imperfections of the arm, empty = it has none; by default that of
         the environment.
     :param robot: fields of the simulator's configuration: model, frequency, geometry, ...
+    :param cell: its class.
     """
     if imperfect is None:
         imperfect = os.environ.get('IMPERFECT', '')
@@ -350,6 +352,7 @@ def run_cell(
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
         return runner.run(
             _run(
+                cell,
                 loop,
                 scenario,
                 headless,
@@ -361,8 +364,8 @@ def run_cell(
         )
 
 
-async def _run(loop, scenario, headless, settings, **simulator):
-    cell = RobotCell(loop, headless=headless, settings=settings, **simulator)
+async def _run(kind, loop, scenario, headless, settings, **simulator):
+    cell = kind(loop, headless=headless, settings=settings, **simulator)
     try:
         await cell.start()
         return await scenario(cell)

@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.vectors import Vector3
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    HandBackCall,
     RecoverCall,
     ServiceAnswer,
     ServiceCall,
@@ -56,6 +57,10 @@ class RobotServices(ABC):
     def zero_ftsensor(self) -> ServiceAnswer:
         """Take the force and torque that are measured now as zero."""
         return self.call(ZeroFtSensorCall()).result()
+
+    def hand_back_control(self) -> ServiceAnswer:
+        """Let the program of the pendant go on behind its External Control node."""
+        return self.call(HandBackCall()).result()
 
     def set_digital_output(self, kind: OutputKind, pin: int, high: bool) -> ServiceAnswer:
         """Set a digital output."""

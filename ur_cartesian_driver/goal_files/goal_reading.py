@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     IOCommand,
+    OnPathTolerance,
     OutputKind,
     Posture,
     SafeOutput,
@@ -79,6 +80,8 @@ def goal_from_fields(message: Message) -> GoalTable:
             _safe_output(output, f'safe_outputs[{i}]')
             for i, output in enumerate(message.safe_outputs)
         ),
+        on_path_tolerance=_member(OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'),
+        stall_timeout=seconds(message.stall_timeout),
     )
 
 

@@ -88,6 +88,8 @@ GOAL: Mapping[str, Any] = {
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,
+    'on_path_tolerance': UINT8,
+    'stall_timeout': TIME,
     'safe_outputs': [{**OUTPUT, 'restore': False}],
     'packed': PACKED,
 }

@@ -47,6 +47,15 @@ class OutputKind(IntEnum):
     STANDARD_ANALOG = 3
 
 
+class OnPathTolerance(IntEnum):
+    """What follows when the arm leaves the path tolerance."""
+
+    ABORT = 0
+    STALL = 1
+
+
+#: How long the motion waits for an arm that is off its path where the goal does not say it [s].
+DEFAULT_STALL_TIMEOUT = 10.0
 #: How much later than planned the end may come where the goal does not say it [s], also how long
 #: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -169,3 +178,6 @@ class Goal:
     io_commands: tuple[IOCommand, ...] = ()
     keep_open: bool = False
     safe_outputs: tuple[SafeOutput, ...] = ()
+    on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
+    #: How long the arm may stay off its path with STALL [s]; 0 = the default.
+    stall_timeout: float = 0.0

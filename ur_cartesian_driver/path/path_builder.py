@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
+    OnPathTolerance,
     Segment,
     SegmentType,
     Tolerance,
@@ -495,13 +496,21 @@ class Path:
         path: Tolerance | None = None,
         goal: Tolerance | None = None,
         time: float | None = None,
+        stall: float | None = None,
     ) -> Path:
         """
         Set the largest deviations on the path and at its end; None = as before.
 
         :param time: how much later than planned the end may come [s], negative = any time.
+        :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
+            0 = such an arm is stopped, and the goal ends.
         """
         settings = self._settings
+        if stall is not None:
+            amount('tolerances()', 'stall', stall, 3600.0, 's')
+            stall = round(stall * NANOSECONDS) / NANOSECONDS
+            choice = OnPathTolerance.STALL if stall else OnPathTolerance.ABORT
+            settings = replace(settings, on_path_tolerance=choice, stall_timeout=stall)
         return self._with(
             _settings=replace(
                 settings,

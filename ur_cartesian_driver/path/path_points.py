@@ -11,6 +11,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     IOCommand,
+    OnPathTolerance,
     SafeOutput,
     Segment,
     Tolerance,
@@ -70,6 +71,8 @@ class PathSettings:
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
     safe_outputs: tuple[SafeOutput, ...] = ()
+    on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
+    stall_timeout: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,12 @@ from math import nan
 
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, Meaning, NO_MEANING
+from ur_cartesian_driver.execution.goal.goal_transitions import (
+    Fault,
+    GoalState,
+    Meaning,
+    NO_MEANING,
+)
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.pose import Pose
@@ -102,6 +107,14 @@ class Feeder(ABC):
             the controller's target may be behind it.
         """
         return (packet.points_begun if self.monitor.job.reports_points_begun else None), 0
+
+    def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
+        """
+        Return the fault that ends the goal, after a look at one that may go away by itself.
+
+        Called with every packet while the robot program runs points.
+        """
+        return fault
 
     def confirms(self, now: float) -> bool:
         """Tell whether the robot program reads what it gets: an arm that stands is not stalled."""

@@ -269,7 +269,7 @@ class GoalMachine:
         """Return what a packet means in the present state, when nothing stops the robot."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(packet, may_stand_still=self.feeder.confirms(now))
-            return fault or self.feeder.supply(self.state)
+            return self.feeder.wait_out(fault, packet) or self.feeder.supply(self.state)
         if self.state is GoalState.ARMING and self._is_armed(packet):
             return GoalSignal.ARMED, ''
         if (

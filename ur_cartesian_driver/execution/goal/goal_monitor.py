@@ -13,7 +13,7 @@ from math import inf
 
 import numpy as np
 
-from ur_cartesian_driver.execution.goal.goal_transitions import GoalSignal
+from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSignal
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
@@ -247,9 +247,7 @@ class GoalMonitor:
             'it moved meanwhile'
         )
 
-    def find_fault(
-        self, state: RobotState, *, may_stand_still: bool = False
-    ) -> tuple[GoalSignal, str] | None:
+    def find_fault(self, state: RobotState, *, may_stand_still: bool = False) -> Fault | None:
         """
         Return the fault of a motion, with a clause for the outcome's text, or None.
 
@@ -287,7 +285,7 @@ class GoalMonitor:
         """Return how far the arm is outside the goal tolerance, as a clause, or None."""
         return self._violation(self._goal_check, self._tracker.pose(), state)
 
-    def _plan_deviation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+    def _plan_deviation(self, state: RobotState) -> Fault | None:
         """Return that the controller's target left the plan, or None."""
         if not self._has_begun or self._tracker.is_within(*self._clearly_allowed):
             return None
@@ -306,7 +304,7 @@ class GoalMonitor:
                 )
         return None
 
-    def _speed_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+    def _speed_violation(self, state: RobotState) -> Fault | None:
         """Return that a program without progress reports is much too fast or slow, or None."""
         if self._speed_check is None or not self._awaits_count:
             return None
@@ -315,7 +313,7 @@ class GoalMonitor:
         )
         return None if clause is None else (GoalSignal.DEVIATION, clause)
 
-    def _stall_fault(self) -> tuple[GoalSignal, str] | None:
+    def _stall_fault(self) -> Fault | None:
         """Return that the arm stands although nothing holds it, or None."""
         if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
             return None
@@ -325,7 +323,7 @@ class GoalMonitor:
             'was ended'
         )
 
-    def _path_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+    def _path_violation(self, state: RobotState) -> Fault | None:
         if not (self._path_check and self._has_begun):
             return None
         clause = self._violation(self._path_check, self._desired(state), state)

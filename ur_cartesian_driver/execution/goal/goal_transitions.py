@@ -110,6 +110,8 @@ class GoalSignal(Enum):
 #: What an event means, with a clause for the outcome's text; None = nothing.
 Meaning: TypeAlias = tuple[GoalSignal | None, str]
 NO_MEANING: Meaning = (None, '')
+#: What is wrong with a motion, with a clause for the outcome's text.
+Fault: TypeAlias = tuple[GoalSignal, str]
 
 #: In which a goal begins; where nothing has to be armed, ARMED follows at once.
 INITIAL_STATE = GoalState.ARMING

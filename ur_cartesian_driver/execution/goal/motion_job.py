@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import SafeOutput, Tolerance
+from ur_cartesian_driver.motion.goal import (
+    DEFAULT_STALL_TIMEOUT,
+    OnPathTolerance,
+    SafeOutput,
+    Tolerance,
+)
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, has_waits
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
@@ -69,6 +74,8 @@ class MotionJob:
     has_waits: bool = False
     #: What outputs become when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
+    #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
+    stall_timeout: float = 0.0
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
@@ -150,6 +157,9 @@ def job_from_plan(
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
         safe_outputs=goal.safe_outputs,
+        stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT)
+        if goal.on_path_tolerance is OnPathTolerance.STALL
+        else 0.0,
         ending_records=ending_records,
         has_waits=has_waits(rows.primitives),
         has_speed_profile=not (

@@ -29,12 +29,14 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     EnterServo,
     GoalCommand,
     LeaveServo,
+    LogWarning,
     OpenServo,
     ReportServo,
     WriteServo,
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, START_ANGLE_TOLERANCE
 from ur_cartesian_driver.execution.goal.goal_transitions import (
+    Fault,
     GoalSignal,
     GoalState,
     Meaning,
@@ -42,6 +44,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 )
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
+from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
 from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
@@ -74,6 +77,8 @@ class ServoFeeder(Feeder):
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
         self._has_filled = self._has_left = False
+        self._wait = WaitForArm(monitor.job.stall_timeout)
+        self._unsaid: list[GoalCommand] = []
 
     # ---- what to send -------------------------------------------------------------------------
 
@@ -144,7 +149,10 @@ class ServoFeeder(Feeder):
 
     def take(self, event: Event, now: float) -> list[GoalCommand]:
         """Answer a packet of the servo's registers with a write."""
-        return self._write(event.feedback, now) if isinstance(event, ServoReceived) else []
+        if not isinstance(event, ServoReceived):
+            return []
+        commands, self._unsaid = self._write(event.feedback, now) + self._unsaid, []
+        return commands
 
     def _write(self, feedback: ServoFeedback, now: float) -> list[GoalCommand]:
         if feedback.last_sequence != self._last_read:
@@ -200,6 +208,21 @@ class ServoFeeder(Feeder):
         """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
         return 0 if self._spline is None or time <= 0.0 else self._spline.piece(time) + 1
 
+    def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
+        """Hold the motion while the arm is off its path, where the goal asks for that."""
+        wait = self._wait
+        if not wait.timeout:
+            return fault
+        self.stream.is_held = wait.update(fault, packet)
+        # The time of the goal stands still meanwhile.
+        self.start_delay += self.stream.held_time - wait.held_time
+        wait.held_time = self.stream.held_time
+        if wait.is_over:
+            return GoalSignal.VIOLATION, f'{wait.clause} for {wait.timeout:g} s'
+        if wait.begins:
+            self._unsaid.append(LogWarning(text=f'the motion waits for the arm: {wait.clause}'))
+        return None if self.stream.is_held else fault
+
     def confirms(self, now: float) -> bool:
         """Tell whether the robot program has lately read a set-point."""
         return now - self._last_answer < ANSWER_TIMEOUT
@@ -227,6 +250,10 @@ class ServoFeeder(Feeder):
         """Return the state of the servo."""
         report = self.stream.report(self._joint_error())
         return [] if report is None else [ReportServo(report=report)]
+
+    def report_lines(self) -> tuple[str, ...]:
+        """Return how often and how long the motion has waited for the arm."""
+        return self._wait.report
 
     def _joint_error(self) -> Vector6:
         packet = self.monitor.latest

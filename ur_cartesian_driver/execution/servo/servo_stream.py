@@ -54,6 +54,8 @@ MIN_WRITE_PERIOD = 0.5
 START_FILL = 0.75
 #: How fast the rate of the motion recovers after the buffer was empty [1/s].
 RESTART_ACCELERATION = 2.0
+#: How fast it falls while the arm is off its path [1/s].
+STALL_DECELERATION = 4.0
 #: After this sequence number they begin at 0 again, long before the register overflows.
 MAX_SEQUENCE = 2**30
 #: Longer or negative steps of the robot's clock count as 0 [s].
@@ -202,6 +204,10 @@ class ServoStream:
         self.motion_time = 0.0
         #: Rate of the motion relative to the set-points, 0 to 1.
         self._motion_rate = 1.0
+        #: Whether the motion is held where it is on its path, and by how much that has delayed it
+        #: [s].
+        self.is_held, self.held_time = False, 0.0
+        self._recovers = False
         self._last_write = -inf
         self._sent = self._underruns = 0
 
@@ -365,8 +371,12 @@ class ServoStream:
         if self.phase in STREAMING:
             speed = feedback.effective_speed if feedback.playing else 0.0
             self._clock.advance(passed, speed, self.in_flight)
-        if self.phase is ServoPhase.SERVOING:
+        if self.phase is ServoPhase.SERVOING and self.is_held:
+            self._recovers = True
+            self._motion_rate = max(0.0, self._motion_rate - STALL_DECELERATION * passed)
+        elif self.phase is ServoPhase.SERVOING:
             self._motion_rate = min(1.0, self._motion_rate + RESTART_ACCELERATION * passed)
+            self._recovers = self._recovers and self._motion_rate < 1.0
 
     def _next_write(self) -> None:
         """Give the next write a number, and a set-point if one is due."""
@@ -385,6 +395,8 @@ class ServoStream:
         self._joints = self._source.next(passed)
         self._source_time += passed
         self._state_time += time
+        if self._recovers:
+            self.held_time += time - passed
         self._unfinished.append((self._state_time, self._source_time))
         if moves and self._source.done:
             self._apply(ServoEvent.AT_END)

@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    DEFAULT_STALL_TIMEOUT,
+    SegmentType,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.pose import Quaternion
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -96,6 +101,13 @@ def check_tolerance_numbers(goal: GoalTable, options: PlanningOptions) -> None:
         for field in ('position', 'orientation', 'twist', 'acceleration'):
             check_finite(f'{name}.{field}_error', getattr(tolerance, field))
     check_finite('goal_time_tolerance', (goal.goal_time_tolerance,))
+    check_finite('stall_timeout', (goal.stall_timeout,))
+    if goal.stall_timeout < 0.0:
+        raise InvalidGoal(
+            'stall_timeout',
+            f'is {goal.stall_timeout:g} s; it must not be negative',
+            f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s',
+        )
 
 
 def _check_enum(field: str, value: int, kind: type[_Enum]) -> None:

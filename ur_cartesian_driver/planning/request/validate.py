@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
+    OnPathTolerance,
     Posture,
     Segment,
     SegmentType,
@@ -149,6 +150,7 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
             f'is set, but a {mode.name} goal needs all its points at the start',
             'set execution to SPLINE or PRIMITIVES',
         )
+    _can_stall(goal, options)
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
@@ -156,6 +158,27 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
             'trajectory.controlled_frame',
             f"is '{goal.controlled_frame}', but T_flange_controlled is not set",
             'set it to the pose of this frame in the flange, or leave controlled_frame empty',
+        )
+
+
+def _can_stall(goal: GoalTable, options: PlanningOptions) -> None:
+    if goal.on_path_tolerance != OnPathTolerance.STALL:
+        return
+    mode = resolve_execution_mode(goal)
+    if not mode.traits.streams_setpoints:
+        raise NotAvailable(
+            'on_path_tolerance',
+            f'is STALL, but the robot runs a {mode.name} goal by itself and does not wait on its '
+            'path',
+            'set execution to SERVO, or on_path_tolerance to ABORT',
+        )
+    tolerance = apply_default_tolerances(goal, options).path_tolerance
+    limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
+    if max((*limits, *tolerance.acceleration)) <= 0.0:
+        raise InvalidGoal(
+            'path_tolerance',
+            'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
+            'set a limit, or on_path_tolerance to ABORT',
         )
 
 

@@ -184,6 +184,11 @@ class SendProgramCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class HandBackCall:
+    """End the robot program, so that the pendant's program goes on behind its node."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverCall:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
 
@@ -228,5 +233,6 @@ ServiceCall: TypeAlias = (
     | SetOutputCall
     | SetSpeedSliderCall
     | SendProgramCall
+    | HandBackCall
     | RecoverCall
 )

@@ -32,6 +32,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
     failed,
+    HandBackCall,
     RecoverCall,
     SendProgramCall,
     ServiceAnswer,
@@ -131,6 +132,8 @@ class ServiceDispatcher:
                 )
             case SendProgramCall():
                 return await self._send_program()
+            case HandBackCall():
+                return await self._hand_back()
             case RecoverCall(unlock_protective_stop=unlock):
                 return await self._recovery.run(
                     may_unlock=unlock or self._settings.unlock_protective_stops
@@ -148,7 +151,7 @@ class ServiceDispatcher:
                 'The TCP of the last goal is being restored; try again when the status is READY.'
             )
         if status.state is ConnectionState.EXECUTING and (
-            isinstance(call, SetTcpCall | SetPayloadCall | SendProgramCall)
+            isinstance(call, SetTcpCall | SetPayloadCall | SendProgramCall | HandBackCall)
             or (isinstance(call, DashboardCall) and call.command in INTERFERING_COMMANDS)
         ):
             return failed(
@@ -161,18 +164,24 @@ class ServiceDispatcher:
 
     def _command(self, command: script_command.AnyScriptCommand) -> ServiceAnswer | None:
         """Send a command to the robot program; return an answer only if it cannot be sent."""
-        robot = self._link.robot
-        if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
-            return failed(
-                f'The robot program is {robot.runtime_state.name} and does not read commands. '
-                f'{self._link.status.message}'.rstrip()
-            )
+        if refusal := self._paused():
+            return refusal
         if not self._link.program.send_command(script_command.encode(command)):
             return failed(
                 'This needs the robot program, which does not run. '
                 f'{self._link.status.message}'.rstrip()
             )
         return None
+
+    def _paused(self) -> ServiceAnswer | None:
+        """Return the answer to a call whose message a paused program would read later."""
+        robot = self._link.robot
+        if robot is None or robot.runtime_state is RuntimeState.PLAYING:
+            return None
+        return failed(
+            f'The robot program is {robot.runtime_state.name} and does not read commands. '
+            f'{self._link.status.message}'.rstrip()
+        )
 
     def _zero_ftsensor(self) -> ServiceAnswer:
         version = self._link.version
@@ -274,6 +283,27 @@ class ServiceDispatcher:
             needed = 'The robot is in local control: switch it to remote control, then try again.'
         return failed(
             f'The robot program did not connect within {EFFECT_TIMEOUT:g} s. {needed}'.rstrip()
+        )
+
+    async def _hand_back(self) -> ServiceAnswer:
+        program = self._link.program
+        if not program.connected:
+            return failed(
+                f'The driver does not control the arm. {self._link.status.message}'.rstrip()
+            )
+        if refusal := self._paused():
+            return refusal
+        program.send_stop()
+        if not await wait_for_state(self._link, lambda _: not program.connected, SETTING_TIMEOUT):
+            return failed(
+                f'The robot program has not ended within {SETTING_TIMEOUT:g} s; stop it on the '
+                'pendant.'
+            )
+        if self._settings.headless_mode:
+            return succeeded('The robot program has ended; resend_robot_program starts it again.')
+        return succeeded(
+            'The program of the pendant goes on behind its External Control node; the arm comes '
+            'back when it reaches that node again.'
         )
 
     # ---- RTDE inputs --------------------------------------------------------------------------

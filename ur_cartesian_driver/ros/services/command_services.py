@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
+    HandBackCall,
     RecoverCall,
     SendProgramCall,
     ServiceAnswer,
@@ -52,6 +53,7 @@ from ur_cartesian_driver.srv import (
 #: Services without a request; the response is success and a sentence, or the value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
+    'hand_back_control': HandBackCall(),
     'zero_ftsensor': ZeroFtSensorCall(),
     **{
         f'dashboard/{name}': DashboardCall(command=command)
