@@ -49,16 +49,16 @@ class LoopingCell(RobotCell):
     """The pendant's program has a node of ours, and goes on behind it with a motion of its own."""
 
     async def load_pendant_program(self):
-        begin, ours, end = (await self.fetch_program()).partition('control_robot()\n# NODE_CONTROL')
-        around = (
-            'while True:\n'
-            'control_robot()\n'
+        begin, _, rest = (await self.fetch_program()).partition('# NODE_CONTROL_LOOP_BEGINS\n')
+        node, _, end = rest.partition('# NODE_CONTROL_LOOP_ENDS\n')
+        loop = (
+            f'while True:\n{node}'
             'set_standard_digital_out(3, True)\n'
             'movej(get_target_joint_positions() + [0.1, 0, 0, 0, 0, 0], a=5, v=2)\n'
-            'end\n# NODE_CONTROL'
+            'end\n'
         )
-        assert ours
-        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, begin + around + end)
+        assert node
+        assert not self.robot.controller.programs.load(PENDANT_PROGRAM, begin + loop + end)
 
 
 def test_the_pendants_program_goes_on_and_brings_the_arm_back():

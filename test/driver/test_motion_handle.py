@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the owner of a motion holds."""
 
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
@@ -43,3 +43,27 @@ def test_who_waits_for_the_outcome_makes_the_report_meanwhile_and_once():
     waiting.join()
     assert outcomes[0].report == ('point 0: LINEAR -> MOVEL', 'late by 1 s')
     assert plan.made == 1
+
+
+def test_the_end_does_not_wait_for_a_report_that_is_being_made():
+    begun, may_end = Event(), Event()
+
+    class SlowReport(PlanWithReport):
+        @property
+        def report(self):
+            begun.set()
+            assert may_end.wait(10.0)
+            return ('point 0: LINEAR -> MOVEL',)
+
+    plan: Any = SlowReport()
+    active = ActiveMotion(7, plan, None, print)
+    outcomes = []
+    waiting = Thread(target=lambda: outcomes.append(active.motion.result()))
+    waiting.start()
+    assert begun.wait(10.0)
+    active.end(Outcome(code=ErrorCode.CANCELLED, text='cancelled'))  # the driver's reader goes on
+    active.end(Outcome(code=ErrorCode.CONNECTION_LOST, text='too late'))
+    assert not active.motion.done()
+    may_end.set()
+    waiting.join()
+    assert (outcomes[0].text, outcomes[0].report) == ('cancelled', ('point 0: LINEAR -> MOVEL',))

@@ -13,12 +13,13 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
+#: An arm that is held off its path is not where the next goal could begin.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
+del KINDS['Waiting for the arm']
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',
     'SERVO': 'between points',
-    'Waiting for the arm': 'waiting',
     'Appendable goals': 'moving',
     'Outputs': 'before the trigger pose',
     'Freedrive': 'freedrive',

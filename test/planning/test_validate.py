@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
     IOCommand,
+    OnPathTolerance,
     OutputKind,
     Posture,
     SafeOutput,
@@ -49,6 +50,12 @@ GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
+PATIENT = replace(
+    TIMED,
+    execution=ExecutionMode.SERVO,
+    path_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
+    on_path_tolerance=OnPathTolerance.STALL,
+)
 
 
 def with_fields(goal, **fields):
@@ -632,3 +639,24 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
 def test_options_out_of_their_range_are_named(field, value):
     with pytest.raises(ValueError, match=field):
         PlanningOptions(**{field: value})
+
+
+def test_a_servo_goal_may_wait_for_its_arm():
+    check(PATIENT, OPTIONS)
+    by_parameter = PlanningOptions(path_tolerance_position=0.001)
+    check(replace(PATIENT, path_tolerance=Tolerance()), by_parameter)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'error', 'text'),
+    [
+        ({'execution': ExecutionMode.SPLINE}, NotAvailable, 'on_path_tolerance is STALL.* SPLINE'),
+        ({'execution': ExecutionMode.PRIMITIVES}, NotAvailable, 'STALL.* PRIMITIVES'),
+        ({'path_tolerance': Tolerance()}, InvalidGoal, 'path_tolerance limits nothing'),
+        ({'stall_timeout': -1.0}, InvalidGoal, 'stall_timeout is -1 s; it must not be negative'),
+        ({'stall_timeout': nan}, InvalidGoal, 'stall_timeout'),
+    ],
+)
+def test_a_wait_that_cannot_be_is_refused(changes, error, text):
+    with pytest.raises(error, match=text):
+        check(replace(PATIENT, **changes), OPTIONS)

@@ -346,7 +346,7 @@ class ServoGoal(SplineGoal):
 
 
 #: How long the arm of a goal that waits for it is held off its path [s].
-PUSHED = 1.0
+PUSHED = 0.85
 
 
 @lru_cache
@@ -362,17 +362,20 @@ def patient_half_circle(start):
 class WaitingGoal(ServoGoal):
     """The same half circle, which waits for its arm."""
 
-    _is_pushed = False
+    _pushed_until = 0.0
 
     def plan_from(self, start):
         return patient_half_circle(start)
 
+    def is_over(self):
+        return self.cell.loop.time() > self._pushed_until  # the next goal begins on its path
+
     def is_in(self, phase):
         assert phase == 'waiting'
-        if not self._is_pushed and self.fraction() > 0.4:
-            self._is_pushed = True
+        if not self._pushed_until and self.fraction() > 0.4:
+            self._pushed_until = self.cell.loop.time() + PUSHED + 0.05  # until it is reported
             self.cell.robot.inject(f'offset pose z {2.0 * PATH_TOLERANCE} for {PUSHED} s')
-        return self._is_pushed and self.cell.at_rest()
+        return self._pushed_until and self.cell.at_rest()
 
 
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the

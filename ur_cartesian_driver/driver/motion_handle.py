@@ -117,12 +117,14 @@ class ActiveMotion:
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress = on_progress
-        #: Guards the plan, which a motion lets go of when its report is made, and the report.
-        self._report_lock = threading.Lock()
+        #: Guards what follows.
+        self._lock = threading.Lock()
+        #: The plan, which a motion lets go of when its report is made; the report; the outcome.
         self._plan: Plan | None = plan
-        self._plan_report: tuple[str, ...] = ()
+        self._plan_report: tuple[str, ...] | None = None
+        self._ended: Outcome | None = None
         #: What the owner holds.
-        self.motion = MotionHandle(number, self._outcome, send, self.plan_report)
+        self.motion = MotionHandle(number, self._outcome, send, self.make_report)
         #: The TCP that the robot has as long as this motion runs.
         self.temporary_tcp = (
             None
@@ -132,12 +134,21 @@ class ActiveMotion:
             )
         )
 
-    def plan_report(self) -> tuple[str, ...]:
-        """Return the report of the plan, made now: that takes longer than to send the plan."""
-        with self._report_lock:
-            if self._plan is not None:
-                self._plan_report, self._plan = self._plan.report, None
-            return self._plan_report
+    def make_report(self) -> None:
+        """
+        Make the report of the plan, unless another thread makes it: longer work than to send it.
+
+        Who makes it gives the outcome of a motion that has ended meanwhile.
+        """
+        with self._lock:
+            plan, self._plan = self._plan, None
+        if plan is None:
+            return
+        report = plan.report
+        with self._lock:
+            self._plan_report, ended = report, self._ended
+        if ended is not None:
+            self._give(ended, report)
 
     def report(self, progress: Progress) -> None:
         """Take a report of the robot loop."""
@@ -149,7 +160,14 @@ class ActiveMotion:
         """Give the outcome; only the first one counts."""
         if self.motion.appender is not None:
             self.motion.appender.end()
-        if not self._outcome.done():
-            self._outcome.set_result(
-                replace(outcome, report=(*self.plan_report(), *outcome.report))
-            )
+        with self._lock:
+            if self._ended is not None:
+                return
+            self._ended, report = outcome, self._plan_report
+        if report is None:
+            self.make_report()
+        else:
+            self._give(outcome, report)
+
+    def _give(self, outcome: Outcome, report: tuple[str, ...]) -> None:
+        self._outcome.set_result(replace(outcome, report=(*report, *outcome.report)))

@@ -74,6 +74,8 @@ class SegmentTimings:
     velocities: Floats
     accelerations: Floats
     wire_times: Floats
+    #: Expected times from point to point [s]; blends are passed in their middle at points.
+    durations: Floats
 
     def __init__(
         self,
@@ -111,13 +113,9 @@ class SegmentTimings:
         if entry is not None:
             self._wanted[0] = self.chain.times.between[0] + entry.half
         self._solve()
+        self.durations = self.chain.times.durations
         self._set_wire_values()
         self._remark_changes()
-
-    @property
-    def durations(self) -> Floats:
-        """Expected times from point to point [s]; blends are passed in their middle at points."""
-        return self.chain.times.durations
 
     def _solve(self) -> None:
         """Meet the times within the limits; what cannot be met takes longer."""
