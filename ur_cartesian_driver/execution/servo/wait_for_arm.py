@@ -29,14 +29,15 @@ class WaitForArm:
 
     def update(self, fault: Fault | None, packet: RobotState) -> bool:
         """Take a packet, and return whether the arm is off its path."""
-        is_off = fault is not None and fault[0] is GoalSignal.VIOLATION
+        clause = fault[1] if fault and fault[0] is GoalSignal.VIOLATION else ''
+        is_off = bool(clause)
         self.begins = is_off and not self.clause
         if self.begins:
             self._count, self._since = self._count + 1, packet.timestamp
         elif packet.runtime_state is not RuntimeState.PLAYING:
             self._since += packet.timestamp - self._timestamp
         self._timestamp = packet.timestamp
-        self.clause = fault[1] if is_off else ''
+        self.clause = clause
         if is_off:
             self._longest = max(self._longest, packet.timestamp - self._since)
         return is_off
