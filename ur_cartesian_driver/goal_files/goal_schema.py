@@ -88,10 +88,10 @@ GOAL: Mapping[str, Any] = {
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,
-    'on_path_tolerance': UINT8,
-    'stall_timeout': TIME,
     'safe_outputs': [{**OUTPUT, 'restore': False}],
     'packed': PACKED,
+    'on_path_tolerance': UINT8,
+    'stall_timeout': TIME,
 }
 
 

@@ -45,6 +45,8 @@ _UNLIMITED = 1e9
 _NOTICEABLY = 1.001
 #: Limits that are lower by less than this factor are the speed asked for.
 _ROUNDED = 1.0 - 1e-9
+#: The least speeds and accelerations that are computed with; 1 / 1e-310 is no number.
+_TINY = 1e-300
 #: Where a speed comes from, for the report.
 _SOURCES = (
     'speed from segments[{}].velocity',
@@ -198,7 +200,7 @@ class SpeedRequests:
                 f'{velocity[row]:.3g} {unit} by {name}'
             )
         own = self.geometries.segments.accelerations
-        acceleration = np.where(own > 0.0, own, self._default_accelerations())
+        acceleration = np.where(own > 0.0, np.maximum(own, _TINY), self._default_accelerations())
         acceleration = np.where(
             limits.is_optimized, acceleration, np.minimum(acceleration, limits.acceleration)
         )
@@ -222,10 +224,10 @@ class SpeedRequests:
         fastest = options.max_tool_speed or options.angular_velocity
         both = max(options.linear_velocity, min(options.angular_velocity, fastest))
         choices = (
-            (segments.velocities > 0.0, segments.velocities),
+            (segments.velocities > 0.0, np.maximum(segments.velocities, _TINY)),
             (limits.is_optimized, options.optimized_velocity),
             (kinds == SegmentType.JOINT, options.joint_velocity),
-            (speeds > 0.0, speeds),
+            (speeds > 0.0, np.maximum(speeds, _TINY)),
             (~limits.translates, options.angular_velocity),
             (limits.is_turn & (kinds != SegmentType.LINEAR), both),
         )
