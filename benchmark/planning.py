@@ -41,6 +41,7 @@ def run(quick: bool) -> Iterator[Figure]:
                 arms[arm],
                 repeat=5 if points <= 10_000 else 1,
             )
+        yield _report_figure(points, arms['nominal'])
         for arm in arms if points <= 10_000 else ():
             goal = _timed(paths.goal(points))
             yield from _figures(f'{points:,} timed points with twists, {arm}', goal, arms[arm])
@@ -65,6 +66,19 @@ def _figures(name: str, goal: Goal, arm: Arm, repeat: int = 5) -> Iterator[Figur
         unit='ms',
         baseline=alone,
         than='without',
+    )
+
+
+def _report_figure(points: int, arm: Arm) -> Figure:
+    """Make the report of a plan, which is made while the arm moves."""
+    made = plan(paths.goal(points, RADIUS), paths.at_home(arm), arm, PlanningOptions())
+    taken = 1e3 * seconds(lambda: made.report, repeat=1)
+    return Figure(
+        benchmark='planning',
+        name=f'report of {points:,} points',
+        value=taken,
+        unit='ms',
+        note=f'{1e3 * taken / points:.0f} us a line, while the arm moves',
     )
 
 

@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.moves.move_chain import MoveTimes
 from ur_cartesian_driver.planning.moves.segment_timing import shortest_duration
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
@@ -49,6 +50,27 @@ def one(cell, options=OPTIONS, segment=None, **point):
     goal = Goal(waypoints=(cell.point(**point),), segments=(segment,) if segment else ())
     made = plan(goal, cell.state, cell.arm, options)
     return made.segments[0], made.remarks
+
+
+def test_the_lines_of_a_report_compute_no_column(cell, monkeypatch):
+    """Else the report of a long path takes the square of its time."""
+    goal = Goal(waypoints=tuple(cell.point(y=0.01 * k) for k in range(1, 9)))
+    made = plan(goal, cell.state, cell.arm, OPTIONS)
+    asked: list[str] = []
+
+    def counted(name):
+        compute = getattr(MoveTimes, name).fget
+
+        def column(times):
+            asked.append(name)
+            return compute(times)
+
+        return property(column)
+
+    for name in ('durations', 'blend_time', 'blend_half'):
+        monkeypatch.setattr(MoveTimes, name, counted(name))
+    assert len(made.report) >= 8
+    assert not asked
 
 
 def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):

@@ -58,6 +58,8 @@ REPAIRS = (
 INTENDED = re.compile(r'slowed from (\S+) to \1 |: the arm stops there, because there is no blend')
 #: Where a margin is equally tight at several places, rounding decides which of them is named.
 PLACE = re.compile(r' at \d+ %')
+#: Between which shapes a clearance was measured was not said before.
+SHAPES = re.compile(r' \((capsules|meshes of the \w+)\)')
 #: By the last name of a field; else 1e-9 (relative to values above 1).
 TOLERANCES = {
     **dict.fromkeys(('durations', 'duration'), 1e-7),
@@ -294,7 +296,7 @@ def compare(old, new):
         a, b = (described(one) if isinstance(one, Exception) else 'planned' for one in (old, new))
         return '' if a == b else f'\n    {a}\n    {b}'
     reports = [
-        [PLACE.sub('', line) for line in one.report if not INTENDED.search(line)]
+        [SHAPES.sub('', PLACE.sub('', line)) for line in one.report if not INTENDED.search(line)]
         for one in (old, new)
     ]
     for a, b in zip(*reports, strict=False):
