@@ -11,7 +11,6 @@ records the joints, and a judge with kinematics and geometry of its own says wha
 and TCP.
 """
 
-import asyncio
 from collections import Counter
 from contextlib import contextmanager
 from dataclasses import replace
@@ -27,7 +26,7 @@ from goal_geometry import Kinematics
 from goal_judge import judge, KNOWN, promise_of, Run
 from mixed_goals import mixed_case, random_robot
 import numpy as np
-from plain_clients import PlainRtde, RtdeBytes
+from plain_clients import PlainRtde, RtdeRecorder
 import pytest
 from random_goals import Case
 from robot_cell import RTDE, run_cell
@@ -64,23 +63,13 @@ FIRST_OF_TCP, MAX_TCP_DURATION = 1000, 2.5
 MAX_GAP = 0.05
 
 
-class Recorder(asyncio.Protocol):
-    """A client of RTDE that knows the published protocol only."""
-
-    def __init__(self):
-        self.codec, self.rows = RtdeBytes(), []
-
-    def data_received(self, data):
-        self.rows += self.codec.feed(data)
-
-
 class Session:
     """One robot, on which goals run from anywhere."""
 
     def __init__(self, cell, robot):
         self.cell, self.robot, self.arm = cell, robot, robot.arm
         self.options = PlanningOptions(**robot.options)
-        self.recorder = Recorder()
+        self.recorder = RtdeRecorder()
         #: How many programs have connected, and how long the last one has moved on paths [s].
         self.programs, self.path_time = 0, 0.0
 

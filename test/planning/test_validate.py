@@ -158,6 +158,14 @@ REFUSALS = [
         'path_tolerance.acceleration_error contains nan',
     ),
     (replace(PLAIN, goal_time_tolerance=nan), InvalidGoal, 'goal_time_tolerance contains nan'),
+    (replace(PLAIN, min_speed_fraction=nan), InvalidGoal, 'min_speed_fraction contains nan'),
+    (replace(PLAIN, min_speed_fraction=1.5), InvalidGoal, 'min_speed_fraction is 1.5, but must'),
+    (replace(PLAIN, min_speed_fraction=-0.1), InvalidGoal, 'min_speed_fraction is -0.1, but must'),
+    (
+        replace(PLAIN, min_speed_fraction=0.9, keep_open=True),
+        InvalidGoal,
+        'the points of a goal with keep_open are not all known',
+    ),
     (replace(PLAIN, age=nan), InvalidGoal, 'trajectory.header.stamp contains nan'),
     # quaternions
     (

@@ -8,6 +8,7 @@ What they see is what any other client of a robot sees.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from dataclasses import dataclass
 import socket
@@ -208,6 +209,17 @@ class RtdeBytes:
             start += size
         del self._received[:start]
         return rows
+
+
+class RtdeRecorder(asyncio.Protocol):
+    """A client of RTDE on an event loop: :attr:`rows` are what has come in."""
+
+    def __init__(self) -> None:
+        self.codec, self.rows = RtdeBytes(), list[RtdeRow]()
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes from the robot."""
+        self.rows += self.codec.feed(data)
 
 
 class PlainRtde:

@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.slow_stretch import speed_advice
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.motion.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
@@ -63,7 +64,7 @@ def validate(arguments: argparse.Namespace) -> int:
     print(table(found))
     if arguments.postures:
         print(postures(found))
-    print(*found.report, sep='\n')
+    print(*found.report, *speed_advice(found.find_slow_stretches()), sep='\n')
     return 0
 
 

@@ -82,6 +82,7 @@ def goal_from_fields(message: Message) -> GoalTable:
         ),
         on_path_tolerance=_member(OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'),
         stall_timeout=seconds(message.stall_timeout),
+        min_speed_fraction=message.min_speed_fraction,
     )
 
 

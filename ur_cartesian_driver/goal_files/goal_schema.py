@@ -90,6 +90,7 @@ GOAL: Mapping[str, Any] = {
     'keep_open': False,
     'safe_outputs': [{**OUTPUT, 'restore': False}],
     'packed': PACKED,
+    'min_speed_fraction': 0.0,
     'on_path_tolerance': UINT8,
     'stall_timeout': TIME,
 }

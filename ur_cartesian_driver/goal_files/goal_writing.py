@@ -53,6 +53,7 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
                 {**_output(output), **_given({'restore': output.restore})}
                 for output in table.safe_outputs
             ],
+            'min_speed_fraction': table.min_speed_fraction,
             'on_path_tolerance': int(table.on_path_tolerance),
             'stall_timeout': _duration(table.stall_timeout),
         }

@@ -181,3 +181,5 @@ class Goal:
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
     #: How long the arm may stay off its path with STALL [s]; 0 = the default.
     stall_timeout: float = 0.0
+    #: The part of the speed asked for below which the goal is refused; 0 = not demanded.
+    min_speed_fraction: float = 0.0

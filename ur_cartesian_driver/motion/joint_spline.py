@@ -63,6 +63,15 @@ class JointSpline:
         )
         return cls(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=coefficients)
 
+    @classmethod
+    def through(cls, times: Floats, rows: MotionRows, *, quintic: bool) -> JointSpline:
+        """Return the curve through rows (n + 1, 6) at times (n + 1,) [s]."""
+        before, after = (
+            MotionRows(*(column[k] for column in rows)) for k in (slice(None, -1), slice(1, None))
+        )
+        polynomials = quintic_rows if quintic else cubic_rows
+        return cls(times=times, coefficients=polynomials(np.diff(times), before, after))
+
     @property
     def duration(self) -> float:
         """The time of its end [s]."""

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput, Wait
+from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import vector6
 
 
@@ -238,6 +239,8 @@ class Plan:
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: What is ignored, slowed or changed, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
+    #: Finds where the tool is slower than asked: long goals have many such stretches.
+    find_slow_stretches: Callable[[], tuple[SlowStretch, ...]] = field(default=tuple)
 
     @property
     def duration(self) -> float:
@@ -251,10 +254,11 @@ class Plan:
 
     @property
     def report(self) -> tuple[str, ...]:
-        """One line for each segment, then the remarks."""
+        """One line for each segment, the remarks, and one line for each slow stretch."""
         rows = self.rows
         lines = (line + rows.notes.get(i, '') for i, line in enumerate(rows.report_lines))
-        return (*filter(None, lines), *self.remarks)
+        slow = (stretch.line for stretch in self.find_slow_stretches())
+        return (*filter(None, lines), *self.remarks, *slow)
 
     @property
     def instructions(self) -> Iterator[Instruction]:

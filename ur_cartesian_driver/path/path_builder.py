@@ -526,6 +526,10 @@ class Path:
         """Choose how the path is executed: a spline by the robot (SPLINE) or streamed (SERVO)."""
         return self._with(_settings=replace(self._settings, execution=mode))
 
+    def steady(self, min_fraction: float = 0.95) -> Path:
+        """Refuse the path where the tool would be slower than this part of its speed (0 to 1)."""
+        return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
+
     def keep_open(self) -> Path:
         """Let points be appended while the arm moves."""
         return self._with(_settings=replace(self._settings, keep_open=True))

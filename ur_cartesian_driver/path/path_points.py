@@ -73,6 +73,7 @@ class PathSettings:
     safe_outputs: tuple[SafeOutput, ...] = ()
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
     stall_timeout: float = 0.0
+    min_speed_fraction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache, partial
 from math import inf, nan
 from pkgutil import resolve_name
 from typing import TypeAlias
@@ -49,8 +50,14 @@ from ur_cartesian_driver.motion.primitive import (
     Wait,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
+from ur_cartesian_driver.planning.min_speed import (
+    check_min_speed,
+    slower_by,
+    unknown_speed_remark,
+)
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.path_margins import BlendSamples, PathSamples
 from ur_cartesian_driver.planning.moves.plan_report import (
@@ -62,6 +69,7 @@ from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, unknown_speeds
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
@@ -162,10 +170,13 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     segments = planner.segments(geometries, timings)
     del planner.samples, planner.blend_samples  # long goals have many, and so has the reference
-    reference = reference_path(
+    motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
-    goal, segments, reference = planner.dwells.insert(goal, segments, reference)
+    find_slow_stretches = cache(
+        partial(slow_move_stretches, geometries, timings, motion, slower_by(goal))
+    )
+    goal, segments, reference = planner.dwells.insert(goal, segments, motion)
     segments = place_outputs(
         segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
     )
@@ -177,7 +188,10 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         *stop_remarks(geometries),
         geometries.tightest_margins.remark,
     ]
-    return planner.plan(goal, segments, reference, remarks)
+    if goal.min_speed_fraction:
+        check_min_speed(goal, find_slow_stretches())
+        remarks += unknown_speed_remark(goal, *unknown_speeds(geometries))
+    return planner.plan(goal, segments, reference, remarks, find_slow_stretches)
 
 
 def plan_spline_goal(planner: GoalPlanner) -> Plan:
@@ -193,11 +207,13 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
+    if goal.min_speed_fraction:
+        check_min_speed(goal, found.find_slow_stretches())
     goal, segments, reference = planner.dwells.insert(
         stretch_times(goal, found.stretch), found.segments, found.reference
     )
     segments = place_outputs(segments, reference, goal.io_commands)
-    return planner.plan(goal, segments, reference, found.remarks)
+    return planner.plan(goal, segments, reference, found.remarks, found.find_slow_stretches)
 
 
 class GoalPlanner:
@@ -296,6 +312,7 @@ class GoalPlanner:
         segments: PlannedRows,
         reference: ReferencePath,
         remarks: Iterable[str],
+        find_slow_stretches: Callable[[], tuple[SlowStretch, ...]],
     ) -> Plan:
         """Return the plan; its remarks follow those collected."""
         return Plan(
@@ -304,6 +321,7 @@ class GoalPlanner:
             reference=reference,
             start=self.state.actual_q,
             remarks=(*self.remarks, *remarks),
+            find_slow_stretches=find_slow_stretches,
             T_flange_active=self.T_flange_active,
             T_flange_tcp=self._retargeted.T_flange_tcp,
             T_tcp_controlled=self._retargeted.T_tcp_controlled,

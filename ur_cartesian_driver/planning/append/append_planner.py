@@ -501,6 +501,7 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             for s in plan.segments[len(left_out) :]
         ),
         reference=_path_from(path, start_time, 0.5 * SAME_TIME),
+        find_slow_stretches=tuple,  # they count from another point
     )
 
 

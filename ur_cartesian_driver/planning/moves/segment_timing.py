@@ -301,6 +301,8 @@ class SegmentTimings:
         remarks = requests.remarks
         for row in rows_where(is_late | takes_longer | is_slower | is_ahead | refused):
             point = self._geometries.begin + row
+            if is_late[row] or takes_longer[row] or is_slower[row]:
+                requests.limited[row] = self._limit_name(row)
             if is_late[row]:
                 remarks[row] = self._too_fast(row)
             elif takes_longer[row]:

@@ -48,13 +48,14 @@ _ROUNDED = 1.0 - 1e-9
 #: The least speeds and accelerations that are computed with; 1 / 1e-310 is no number.
 _TINY = 1e-300
 #: Where a speed comes from, for the report.
+_BOTH = 'speed from linear_velocity and angular_velocity, as the turn leads'
 _SOURCES = (
     'speed from segments[{}].velocity',
     'speed from optimized_velocity',
     'speed from joint_velocity',
     'speed from points[{}].twist',
     'speed from angular_velocity',
-    'speed from linear_velocity and angular_velocity, as the turn leads',
+    _BOTH,
     'speed from linear_velocity',
 )
 
@@ -115,6 +116,9 @@ class SpeedRequests:
         self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & (not options.dialect.is_coarse)
         #: By row, on what the limits change.
         self.remarks: dict[int, str] = {}
+        #: By row, what limits the speed to less than is asked for.
+        self.limited: dict[int, str] = {}
+        self._wanted = np.full(len(geometries), nan)
         self._source = np.zeros(len(geometries), dtype=np.intp)
         self.time, self.min_time = geometries.times.copy(), np.zeros(len(geometries))
         self.is_timed = bool(geometries.times[0] > 0.0)
@@ -136,6 +140,17 @@ class SpeedRequests:
         within = self._turn_leads_line[row] and self.limits.translates[row]
         source = _SOURCES[self._source[row]].format(point)
         return source + (', turn within angular_velocity' if within else '')
+
+    @property
+    def asked(self) -> Floats:
+        """
+        Speeds of the tool (n,) that the goal asks for [m/s], where segments carry it.
+
+        With times the mean that these leave.
+        """
+        if not self.is_timed:
+            return self._wanted
+        return self._curves.length / self.geometries.times
 
     def moves(self) -> Moves:
         """Return the moves, still without speeds and times."""
@@ -191,10 +206,13 @@ class SpeedRequests:
         bound = np.where(at_speed_of_tool, options.max_tool_speed or inf, limits.speed)
         wanted = self._wanted_speeds()
         velocity = np.minimum(wanted, bound)
+        both = self._source == _SOURCES.index(_BOTH)
+        self._wanted = np.where(both, np.minimum(wanted, options.linear_velocity), wanted)
         for row in rows_where(velocity < wanted * _ROUNDED):
             name, unit = limits.name(row), limits.unit(row)
             if at_speed_of_tool[row]:
                 name, unit = 'max_tool_speed', 'm/s'
+            self.limited[row] = name
             self.remarks[row] = (
                 f'point {self.geometries.begin + row}: slowed from {wanted[row]:.3g} to '
                 f'{velocity[row]:.3g} {unit} by {name}'
@@ -275,6 +293,7 @@ class SpeedRequests:
         )
         for k in rows_where(time > wanted * _NOTICEABLY):
             row = int(rows[k])
+            self.limited[row] = self.limits.name(row)
             before = f'{self.remarks[row]}; ' if row in self.remarks else ''
             self.remarks[row] = (
                 f'{before}point {self.geometries.begin + row}: turns in {time[k]:.3f} s instead '

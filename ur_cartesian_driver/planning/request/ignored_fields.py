@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.slow_stretch import name_points
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
 
-#: How many points a remark lists before it counts the rest.
-_MAX_LISTED = 5
 #: Motions whose time is on the wire, without an acceleration.
 _TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
 
@@ -64,9 +63,5 @@ def _take_twist(goal: GoalTable) -> NDArray[np.bool_]:
 
 def add_remark(remarks: list[str], points: Sequence[int], what: str) -> None:
     """Add a remark about points, if there are any."""
-    if not points:
-        return
-    listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
-    more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
-    word = 'point' if len(points) == 1 else 'points'
-    remarks.append(f'{word} {listed}{more}: {what}')
+    if points:
+        remarks.append(f'{name_points(points)}: {what}')

@@ -110,6 +110,22 @@ def check_tolerance_numbers(goal: GoalTable, options: PlanningOptions) -> None:
         )
 
 
+def check_min_speed_fraction(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse a demand on the speed that is no fraction, or that cannot be checked."""
+    field, fraction = 'min_speed_fraction', goal.min_speed_fraction
+    check_finite(field, (fraction,))
+    if not 0.0 <= fraction <= 1.0:
+        raise InvalidGoal(
+            field, f'is {fraction:g}, but must be from 0 (not demanded) to 1', 'give a fraction'
+        )
+    if fraction and goal.keep_open:
+        raise InvalidGoal(
+            field,
+            f'is {fraction:g}, but the points of a goal with keep_open are not all known',
+            'set it to 0, or send the whole path',
+        )
+
+
 def _check_enum(field: str, value: int, kind: type[_Enum]) -> None:
     try:
         kind(value)

@@ -11,8 +11,9 @@ moving one, and :func:`plan_stop` brings such a motion to rest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import degrees
 
 import numpy as np
@@ -35,9 +36,11 @@ from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.motion.primitive import Joints, Spline
+from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -46,6 +49,7 @@ from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
 )
+from ur_cartesian_driver.planning.spline.slow_spline import slow_spline_stretches
 from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
@@ -107,6 +111,7 @@ class SplinePieces:
     #: Row 0 is the start; times are from the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
+    find_slow_stretches: Callable[[], tuple[SlowStretch, ...]]
     #: At the last point.
     end: SplineState
     #: Factor by which all times were stretched.
@@ -145,7 +150,7 @@ def plan_spline(
         first=first,
         rests=not start.is_moving,
     )
-    path, stretch, remarks_made = _fit_to_limits(kinematics, path, start, goal, options)
+    path, stretch, limit = _fit_to_limits(kinematics, path, start, goal, options)
     polynomials = fit_joint_polynomials(
         kinematics, path, start.rows(), points.quintic, options.spline_tolerance
     )
@@ -156,15 +161,32 @@ def plan_spline(
         qd=vector6(polynomials.qd[-1].tolist()),
         qdd=vector6(polynomials.qdd[-1].tolist()) if polynomials.quintic else ZERO6,
     )
-    remarks_made += _clearance_remarks(
-        path, end, arm, tool_tips or (T_flange_tcp,), start, options
+    stretched = (
+        f'all times are stretched by {stretch:.4g}, because of {limit}: '
+        f'{path.spline.times[-1]:.3f} s in total'
     )
     return SplinePieces(
         segments=segments,
         reference=_reference(path),
         end=end,
         stretch=stretch,
-        remarks=(*point_remarks(goal, first), *remarks_made, *_remarks(path, polynomials)),
+        remarks=(
+            *point_remarks(goal, first),
+            *([stretched] if limit else []),
+            *_clearance_remarks(path, end, arm, tool_tips or (T_flange_tcp,), start, options),
+            *_remarks(path, polynomials),
+        ),
+        find_slow_stretches=cache(
+            lambda: slow_spline_stretches(
+                kinematics,
+                path,
+                polynomials,
+                goal.waypoints.twists,
+                stretch,
+                limit,
+                slower_by(goal),
+            )
+        ),
     )
 
 
@@ -222,11 +244,11 @@ def _fit_to_limits(
     start: SplineState,
     goal: GoalTable,
     options: PlanningOptions,
-) -> tuple[SplinePath, float, list[str]]:
-    """Return the path in a time that keeps the limits, the factor, and its remarks."""
+) -> tuple[SplinePath, float, str]:
+    """Return the path in a time that keeps the limits, the factor, and the limit; '' = none."""
     found = worst_excess(kinematics, path, options)
     if found is None:
-        return path, 1.0, []
+        return path, 1.0, ''
     in_parts = start.is_moving or goal.keep_open
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
@@ -240,12 +262,10 @@ def _fit_to_limits(
             f'{options.max_segment_time:.0f} s',
             'move the path away from there',
         )
-    remark = (
-        f'all times are stretched by {found.factor:.4g}, because of {of.name} = '
-        f'{of.limit:.3f} {of.unit} ({of.what}, on the segment to point '
-        f'{found.point}): {path.spline.times[-1]:.3f} s in total'
+    limit = (
+        f'{of.name} = {of.limit:.3f} {of.unit} ({of.what}, on the segment to point {found.point})'
     )
-    return path, found.factor, [remark]
+    return path, found.factor, limit
 
 
 def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:

@@ -1,0 +1,90 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stretches of a plan on which the tool is slower than the goal asks, and what would cure it.
+
+The speed that a goal asks for is that of its points (``velocity``, a twist, or the driver's
+parameter), and with times the mean that they leave: length over time of each segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+#: A tool that is slower by less than this fraction keeps its speed.
+SLOWER_BY = 0.02
+_MAX_LISTED = 5
+
+
+class SlowCause(Enum):
+    """Why the tool is slower than asked; the value is the advice."""
+
+    #: Begin and end of the motion, and of its parts between joint motions.
+    RAMP = 'begin the path before the seam and end it behind, so that the tool has its speed there'
+    STOP = 'let the tool pass: blend_radius (with PROCESS at steady speed), or a SPLINE'
+    REVERSAL = 'turn round beside the seam: leave it and come back, on an arc for example'
+    BLEND = 'enlarge blend_radius, raise the acceleration, or use PROCESS'
+    IN_BLEND = 'enlarge blend_radius, or use a SPLINE, whose speed is known'
+    SHORT = 'raise the acceleration, lengthen the segments, or put a SPLINE through the points'
+    JOINT_LIMIT = 'take another posture, stay away from singularities, or ask for less speed'
+    TOOL_LIMIT = 'raise max_tool_speed, or ask for less speed'
+    TURN = 'turn the tool less, or over more of the path'
+    TIMES = 'space points and times evenly, with twists of .nan (chosen by the driver)'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowStretch:
+    """A stretch of the path on which the tool is slower than asked."""
+
+    #: Where it begins and ends: the index of a point, and the fraction of the segment to it (of
+    #: its length; of a SPLINE of its time).
+    first: int
+    first_fraction: float
+    last: int
+    last_fraction: float
+    #: Speeds of the tool [m/s]: asked for, and planned at the slowest place.
+    asked: float
+    lowest: float
+    cause: SlowCause
+    #: A clause.
+    reason: str
+    #: The point to which the advice belongs.
+    point: int
+    #: Whether ``min_speed_fraction`` counts it: not the ramps, and no blend, whose speed is not
+    #: published.
+    counts: bool = True
+
+    @property
+    def place(self) -> str:
+        """Say where it is."""
+        begin, end = (f'{100.0 * u:.1f} %' for u in (self.first_fraction, self.last_fraction))
+        if self.first == self.last:
+            return f'point {self.first}, {begin} to {end} of its segment'
+        return f'point {self.first} at {begin} to point {self.last} at {end}'
+
+    @property
+    def line(self) -> str:
+        """Its line in the report."""
+        return (
+            f'{self.place}: slower than asked, down to {self.lowest:.3g} of {self.asked:.3g} m/s, '
+            f'because {self.reason}'
+        )
+
+
+def speed_advice(stretches: Sequence[SlowStretch]) -> list[str]:
+    """Return what would cure slow stretches, a line for each cause."""
+    lines = []
+    for cause in SlowCause:
+        points = list(dict.fromkeys(each.point for each in stretches if each.cause is cause))
+        if points:
+            lines.append(f'speed at {name_points(points)}: {cause.value}')
+    return lines
+
+
+def name_points(points: Sequence[int]) -> str:
+    """Return the words for some points, of which the first ones are listed."""
+    more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
+    listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
+    return f'{"point" if len(points) == 1 else "points"} {listed}{more}'

@@ -1,0 +1,333 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where lines, arcs and PROCESS motions are slower than asked, from their times.
+
+Only motions that carry the tool along a path count: not joint moves and OPTIMIZED ones, whose tool
+speed nobody asks for, and no turns on the spot. In a blend the planned path gives the speed, by a
+law that is assumed (:mod:`~.move_chain`).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal_table import rows_where
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
+from ur_cartesian_driver.planning.geometry.blended_path import Flags
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
+
+_IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
+#: Directions with a smaller product reverse.
+_REVERSAL = -0.98
+#: How much of the allowance chords of a blend may use, whose speed is a mean.
+_CHORD_PART = 0.5
+_TINY = 1e-12
+#: Rows of the reference path that are closer have the same time [s].
+_SAME_TIME = 1e-6
+
+
+def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]:
+    """Return the points with blends, and those of motions whose tool speed nobody asks for."""
+    begin, free = geometries.begin, _IS_FREE[geometries.kinds]
+    return (
+        [begin + row for row in rows_where(geometries.path.has_blend_after)],
+        [begin + row for row in rows_where(free)],
+    )
+
+
+def slow_move_stretches(
+    geometries: SegmentGeometries,
+    timings: SegmentTimings,
+    reference: ReferencePath,
+    slower_by: float = SLOWER_BY,
+) -> tuple[SlowStretch, ...]:
+    """
+    Return the slow stretches of a plan of moves, in the order of the path.
+
+    :param reference: without rests.
+    :param slower_by: fraction of the speed that counts as slower.
+    """
+    with np.errstate(over='ignore', invalid='ignore'):  # any speeds may be asked for
+        return _SlowMoves(geometries, timings, reference, slower_by).stretches()
+
+
+class _SlowMoves:
+    """Finds the slow stretches."""
+
+    def __init__(
+        self,
+        geometries: SegmentGeometries,
+        timings: SegmentTimings,
+        reference: ReferencePath,
+        slower_by: float,
+    ) -> None:
+        """Compare the speeds of the profiles with those asked for."""
+        self._geometries, self._timings, self._reference = geometries, timings, reference
+        self._slower_by = slower_by
+        requests, times = timings.requests, timings.chain.times
+        curves = geometries.path.curves
+        self._free: Flags = _IS_FREE[geometries.kinds]
+        #: (n,) whether the tool is carried along a path; asked for [m/s]; NaN elsewhere.
+        self._carries = ~self._free & requests.limits.translates
+        self._asked = np.where(self._carries, requests.asked, np.nan)
+        #: Way of the tool for a unit of the length that the robot counts.
+        self._ratio = curves.length / np.maximum(timings.chain.moves.length, _TINY)
+        self._wanted = (1.0 - slower_by) * self._asked / np.maximum(self._ratio, _TINY)
+        self._too_slow = self._carries & (times.cruise < self._wanted)
+
+    def stretches(self) -> tuple[SlowStretch, ...]:
+        """Return the stretches in the order of the path."""
+        found = [*self._at_points(), *self._cruises(), *self._blends()]
+        return tuple(sorted(found, key=lambda each: (each.first, each.first_fraction)))
+
+    # -- between the blends ----------------------------------------------------------------------
+
+    @cached_property
+    def _is_short(self) -> Flags:
+        """Whether segments end before the tool has its speed, (n,)."""
+        moves = self._timings.chain.moves
+        untimed = (moves.time <= 0.0) & ~self._turns
+        return self._too_slow & untimed & (moves.speed >= self._wanted)
+
+    @cached_property
+    def _turns(self) -> Flags:
+        """Whether the turn of the tool makes segments slow, and no limit, (n,)."""
+        requests = self._timings.requests
+        turns = self._too_slow & requests.limits.is_turn
+        turns[list(requests.limited)] = False
+        return turns
+
+    def _ramps(self) -> tuple[Floats, Floats]:
+        """Return how far each move speeds up below its speed, and from where it brakes (n,)."""
+        times = self._timings.chain.times
+        full = times.length - times.tail
+        slow = (1.0 - self._slower_by) * times.cruise
+        wanted = np.where(self._too_slow, slow, self._wanted)
+        squared = wanted**2
+        speeds_up = np.clip(
+            (squared - times.enter**2) / (2.0 * np.maximum(times.acceleration, _TINY)), 0.0, full
+        )
+        brakes = np.clip(times.length - squared / (2.0 * times.braking), 0.0, full)
+        nothing = ~self._carries
+        speeds_up[nothing | (times.enter >= wanted)] = 0.0
+        brakes = np.where(nothing | (times.leave >= wanted), full, brakes)
+        whole = self._is_short | self._turns
+        speeds_up[whole], brakes[whole] = 0.0, full[whole]
+        return speeds_up, brakes
+
+    def _fractions(self, distances: Floats) -> Floats:
+        """Return the fractions of segments at distances on their profiles (n,)."""
+        path, times = self._geometries.path, self._timings.chain.times
+        full = np.maximum(times.length - times.tail, _TINY)
+        fractions: Floats = path.u_join + (path.u_leave - path.u_join) * distances / full
+        return fractions
+
+    def _at_points(self) -> list[SlowStretch]:
+        """Return the stretches around points at which the tool brakes or speeds up."""
+        geometries, path, times = (
+            self._geometries,
+            self._geometries.path,
+            self._timings.chain.times,
+        )
+        speeds_up, brakes = self._ramps()
+        full = times.length - times.tail
+        begins, ends = self._fractions(brakes), self._fractions(speeds_up)
+        blended, ratio = path.has_blend_after, self._ratio
+        # The segments that begin and end what lies between joint moves.
+        opens, closes = self._runs()
+        heads, tails = speeds_up > 0.0, brakes < full
+        found, n = [], len(heads)
+        for row in rows_where(tails | np.append(heads[1:], False)):
+            point = geometries.begin + row
+            tail, head = bool(tails[row]), row + 1 < n and bool(heads[row + 1])
+            if blended[row]:
+                reason = f'of the blend at point {point}'
+                if tail:
+                    found.append(
+                        self._stretch(
+                            (row, begins[row], row, path.u_leave[row]),
+                            times.leave[row] * ratio[row],
+                            SlowCause.RAMP if closes[row] else SlowCause.BLEND,
+                            f'it brakes because {reason}',
+                            point,
+                            counts=not closes[row],
+                        )
+                    )
+                if head:
+                    found.append(
+                        self._stretch(
+                            (row + 1, path.u_join[row + 1], row + 1, ends[row + 1]),
+                            times.enter[row + 1] * ratio[row + 1],
+                            SlowCause.RAMP if opens[row + 1] else SlowCause.BLEND,
+                            f'it is still slow because {reason}',
+                            point,
+                            counts=not opens[row + 1],
+                        )
+                    )
+                continue
+            is_ramp = bool((not tail or closes[row]) and (not head or opens[row + 1]))
+            reverses = tail and head and self._reverses(row)
+            cause = SlowCause.REVERSAL if reverses else SlowCause.STOP
+            end = (row + 1, ends[row + 1]) if head else (row, 1.0)
+            found.append(
+                self._stretch(
+                    (row, begins[row], *end) if tail else (row + 1, 0.0, *end),
+                    0.0,
+                    SlowCause.RAMP if is_ramp else cause,
+                    f'the path reverses at point {point}'
+                    if reverses
+                    else f'the arm comes to rest at point {point}',
+                    point,
+                    counts=not is_ramp,
+                )
+            )
+        if heads[0]:
+            found.append(
+                self._stretch(
+                    (0, path.u_join[0], 0, ends[0]),
+                    times.enter[0] * ratio[0],
+                    SlowCause.RAMP,
+                    'the arm starts from rest',
+                    geometries.begin,
+                    counts=False,
+                )
+            )
+        return found
+
+    def _runs(self) -> tuple[Flags, Flags]:
+        """Return which segments (n,) are first and last between joint moves."""
+        run, carries = np.cumsum(self._free), self._carries
+        opens, closes = np.zeros((2, len(run)), dtype=np.bool_)
+        rows = np.flatnonzero(carries)
+        opens[rows[np.diff(run[rows], prepend=-1) > 0]] = True
+        closes[rows[np.diff(run[rows], append=len(run) + 1) > 0]] = True
+        return opens, closes
+
+    def _reverses(self, row: int) -> bool:
+        """Tell whether the path goes back where a segment ends."""
+        curves = self._geometries.path.curves
+        at = np.array([row, row, row + 1, row + 1]), np.array([0.999, 1.0, 0.0, 0.001])
+        before, here, _, after = curves.rows(*at)[:, :3]
+        a, b = here - before, after - here
+        return bool(a @ b <= _REVERSAL * np.linalg.norm(a) * np.linalg.norm(b))
+
+    # -- whole segments --------------------------------------------------------------------------
+
+    def _cruises(self) -> list[SlowStretch]:
+        """Return the stretches whose greatest speed is too low."""
+        geometries, timings, times = self._geometries, self._timings, self._timings.chain.times
+        speeds_up, brakes = self._ramps()
+        begins, ends = self._fractions(speeds_up), self._fractions(brakes)
+        found = []
+        for row in rows_where(self._too_slow & (ends > begins)):
+            point = geometries.begin + row
+            lowest, limit = times.cruise[row], timings.requests.limited.get(row)
+            if self._is_short[row] or self._turns[row]:
+                lowest = min(times.enter[row], times.leave[row], lowest)
+            if self._is_short[row]:
+                cause = SlowCause.SHORT
+                reason = f'the segment is too short for more than {self._speed(row):.3g} m/s'
+            elif limit is not None:
+                cause = (
+                    SlowCause.TOOL_LIMIT if 'max_tool_speed' in limit else SlowCause.JOINT_LIMIT
+                )
+                reason = f'of {limit}'
+            elif self._turns[row]:
+                cause, reason = SlowCause.TURN, 'the tool turns that far on the segment'
+            else:
+                cause, reason = SlowCause.TIMES, 'the times of its neighbours leave it more time'
+            found.append(
+                self._stretch(
+                    (row, begins[row], row, ends[row]),
+                    lowest * self._ratio[row],
+                    cause,
+                    reason,
+                    point,
+                )
+            )
+        return found
+
+    def _speed(self, row: int) -> float:
+        """Return the greatest speed of the tool on a segment [m/s]."""
+        return float(self._timings.chain.times.cruise[row] * self._ratio[row])
+
+    # -- in blends -------------------------------------------------------------------------------
+
+    def _blends(self) -> list[SlowStretch]:
+        """Return the blends in which the planned path is slower than asked."""
+        path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
+        ratio = self._ratio
+        rows = np.flatnonzero(path.has_blend_after)
+        carries = np.append(self._carries, False)
+        rows = rows[carries[rows] | carries[rows + 1]]
+        if not len(rows):
+            return []
+        end = times.begins[rows + 1]
+        begin = end - times.blend_time[rows + 1]
+        steps = np.linalg.norm(np.diff(reference.poses[:, :3], axis=0), axis=1)
+        passing = np.diff(reference.time)
+        speeds = np.where(passing > _SAME_TIME, steps / np.maximum(passing, _SAME_TIME), np.inf)
+        middle = 0.5 * (reference.time[1:] + reference.time[:-1])
+        first, last = np.searchsorted(middle, begin), np.searchsorted(middle, end)
+        asked = np.fmin(self._asked[rows], self._asked[rows + 1])
+        # The end of the last blend may be the end of all speeds.
+        lowest = np.minimum.reduceat(
+            np.append(speeds, np.inf), np.stack((first, last), axis=1).ravel()
+        )[::2]
+        # The rate of a fillet changes evenly, and so does its speed.
+        ends = np.fmin(times.leave[rows] * ratio[rows], times.enter[rows + 1] * ratio[rows + 1])
+        lowest = np.where(path.fillet[rows], ends, lowest)
+        part = np.where(path.fillet[rows], 1.0, _CHORD_PART)
+        slow = lowest < (1.0 - part * self._slower_by) * asked
+        return [
+            self._stretch(
+                (row, path.u_leave[row], row + 1, path.u_join[row + 1]),
+                low,
+                SlowCause.IN_BLEND,
+                f'of the blend at point {self._geometries.begin + row} (as assumed: how fast the '
+                'robot passes blends is not published)',
+                self._geometries.begin + row,
+                counts=False,
+                asked=wish,
+            )
+            for row, low, wish in zip(
+                rows[slow].tolist(), lowest[slow].tolist(), asked[slow].tolist(), strict=True
+            )
+        ]
+
+    def _stretch(
+        self,
+        place: tuple[int, float, int, float],
+        lowest: float,
+        cause: SlowCause,
+        reason: str,
+        point: int,
+        *,
+        counts: bool = True,
+        asked: float | None = None,
+    ) -> SlowStretch:
+        """Return a stretch from the fraction of one row to that of another one."""
+        first, begin, last, end = place
+        base = self._geometries.begin
+        return SlowStretch(
+            first=base + first,
+            first_fraction=float(begin),
+            last=base + last,
+            last_fraction=float(end),
+            asked=float(np.fmax(self._asked[first], self._asked[last]))
+            if asked is None
+            else asked,
+            lowest=float(lowest),
+            cause=cause,
+            reason=reason,
+            point=point,
+            counts=counts,
+        )

@@ -1,0 +1,120 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a spline is slower than asked: than the mean speed that its times leave on each segment.
+
+Where the twists of its points are lower, they count. Speeds are those of the joint polynomials.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.motion.goal_table import Integers
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.polynomials import MotionRows
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.spline.joint_polynomials import JointPolynomials
+from ur_cartesian_driver.planning.spline.spline_path import SplinePath
+
+#: A shorter segment carries the tool nowhere [m]; a slower tool rests [m/s].
+_MIN_LENGTH = 1e-6
+_REST = 1e-9
+#: Directions with a smaller product reverse.
+_REVERSAL = -0.5
+#: How many places are compared for each sample of the path.
+_PER_SAMPLE = 4
+
+
+def slow_spline_stretches(
+    kinematics: TcpKinematics,
+    path: SplinePath,
+    polynomials: JointPolynomials,
+    twists: Floats,
+    stretch: float,
+    limit: str,
+    slower_by: float = SLOWER_BY,
+) -> tuple[SlowStretch, ...]:
+    """
+    Return the slow stretches of a spline from rest to rest.
+
+    :param twists: (n, 6) those that the goal gives its points; NaN and 0 = none.
+    :param stretch: the factor by which the times of the goal were stretched because of a limit.
+    :param slower_by: fraction of the speed that counts as slower.
+    """
+    piece, u, times = _places(path)
+    joints = JointSpline.through(
+        polynomials.times,
+        MotionRows(polynomials.q, polynomials.qd, polynomials.qdd),
+        quintic=polynomials.quintic,
+    )
+    tool, _ = tool_rates(kinematics.arm, kinematics.T_flange_tcp, *joints.rows(times))
+    velocities = tool[:, :3]
+    speeds = np.linalg.norm(velocities, axis=1)
+    asked = _asked_speeds(path, piece, u, twists, stretch)
+    wanted = (1.0 - slower_by) * asked
+    edges = np.flatnonzero(np.diff(speeds < wanted, prepend=False, append=False))
+    found = []
+    for first, stop in edges.reshape(-1, 2).tolist():
+        # Slower from a sample on: it may be since the sample before it.
+        begin, end = max(first - 1, 0), min(stop, len(speeds) - 1)
+        slowest = first + int(np.argmin(speeds[first:stop] / asked[first:stop]))
+        is_ramp = (first == 0 or stop == len(speeds)) and piece[first] == piece[stop - 1]
+        point, rests = path.first + int(piece[slowest]), bool(speeds[slowest] < _REST)
+        reason = f'times and twists at both ends of the segment to point {point} leave it so'
+        cause, counts = SlowCause.TIMES, True
+        if stretch * speeds[slowest] >= wanted[slowest]:
+            cause = SlowCause.TOOL_LIMIT if 'tool' in limit else SlowCause.JOINT_LIMIT
+            reason = f'of {limit}'
+        elif is_ramp:
+            cause, counts = SlowCause.RAMP, False
+            reason = 'the arm starts from rest' if first == 0 else 'the arm comes to rest'
+        elif velocities[begin] @ velocities[end] < _REVERSAL * speeds[begin] * speeds[end]:
+            cause, reason = SlowCause.REVERSAL, f'the path reverses near point {point}'
+        elif rests:
+            cause, reason = SlowCause.STOP, f'the twist of point {point} is 0'
+        at_end = bool(u[begin] == 1.0 and begin < end)
+        found.append(
+            SlowStretch(
+                first=path.first + int(piece[begin]) + at_end,
+                first_fraction=0.0 if at_end else float(u[begin]),
+                last=path.first + int(piece[end]),
+                last_fraction=float(u[end]),
+                asked=float(asked[slowest]),
+                lowest=0.0 if rests else float(speeds[slowest]),
+                cause=cause,
+                reason=reason,
+                point=point,
+                counts=counts,
+            )
+        )
+    return tuple(found)
+
+
+def _places(path: SplinePath) -> tuple[Integers, Floats, Floats]:
+    """Return pieces, fractions of their times and times (n,) [s], denser than the samples."""
+    rows = np.arange(_PER_SAMPLE * (len(path.u) - 1) + 1) / _PER_SAMPLE
+    times = np.interp(rows, np.arange(len(path.u)), path.times)
+    piece = path.piece[np.ceil(rows).astype(np.intp)]
+    begin, end = path.spline.times[piece], path.spline.times[piece + 1]
+    return piece, np.clip((times - begin) / (end - begin), 0.0, 1.0), times
+
+
+def _asked_speeds(
+    path: SplinePath, piece: Integers, u: Floats, twists: Floats, stretch: float
+) -> Floats:
+    """Return the speeds asked for at places [m/s]; 0 where the tool is carried nowhere."""
+    n = len(twists)
+    ends = np.searchsorted(path.piece, np.arange(n), side='right') - 1
+    lengths = np.diff(path.length[ends], prepend=0.0)
+    mean = np.where(lengths > _MIN_LENGTH, stretch * lengths / np.diff(path.spline.times), 0.0)
+    with np.errstate(over='ignore'):  # any twist may be asked for
+        given = np.linalg.norm(twists[:, :3], axis=1)
+    given = np.where(np.isfinite(given) & (given > 0.0), given, np.inf)
+    before, after = np.append(np.inf, given[:-1]), given
+    at_begin, at_end = np.minimum(mean, before)[piece], np.minimum(mean, after)[piece]
+    asked: Floats = at_begin + u * (at_end - at_begin)
+    return asked
