@@ -329,7 +329,7 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (lambda: Path().joint(HERE).reversed(), 'reversed() has no start to go back to'),
         (
             lambda: START.by(dx=0.1).set(TORCH, True).reversed(),
-            'reversed() has outputs, which have no reverse',
+            'reversed() has outputs, inputs or payloads, which have no reverse',
         ),
         (lambda: START.repeated(0), 'repeated() is asked for 0 times'),
         (lambda: START.by(dx=0.1).weave(0.01, 0.1), 'weave() needs a speed and a wavelength'),

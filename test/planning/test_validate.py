@@ -21,9 +21,12 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
+    InputKind,
+    InputWait,
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    PayloadChange,
     Posture,
     SafeOutput,
     Segment,
@@ -47,6 +50,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
 
 
 GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
+BURNING = InputWait(waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=2.0)
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
@@ -427,7 +431,7 @@ REFUSALS = [
     (
         with_segment(PLAIN, 1, dwell=0.5, blend_radius=0.01),
         InvalidGoal,
-        'segments[1].dwell is 0.5 s, but with a blend of 10 mm the arm does not stop at points[1]',
+        'segments[1].dwell needs a stop at points[1], but with a blend of 10 mm the arm passes it',
     ),
     (
         with_segment(TIMED, 1, dwell=1.0),
@@ -437,12 +441,79 @@ REFUSALS = [
     (
         with_segment(with_point(TIMED, 0, time=0.0), 0, dwell=0.5),
         InvalidGoal,
-        'segments[0].dwell is 0.5 s, but no motion leads to points[0]: the robot is there at',
+        'segments[0].dwell needs a motion to points[0], but the robot is there at time 0; give',
     ),
     (
         with_segment(with_point(SPLINE, 1, twist=(0.1, 0, 0, 0, 0, 0)), 1, dwell=0.5),
         InvalidGoal,
-        'segments[1].dwell is 0.5 s, but the arm passes points[1] with a twist; set its twist',
+        'segments[1].dwell needs a stop at points[1], which the arm passes with a twist',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(replace(BURNING, waypoint=3),)),
+        InvalidGoal,
+        'input_waits[0].point_index is 3, but the points are 0 to 2; name one of these.',
+    ),
+    (
+        with_segment(with_fields(PLAIN, input_waits=(BURNING,)), 1, blend_radius=0.01),
+        InvalidGoal,
+        'input_waits[0].point_index needs a stop at points[1], but with a blend of 10 mm',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(BURNING, BURNING)),
+        InvalidGoal,
+        'input_waits[1].point_index is 1, where the goal waits for another input already; add',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(replace(BURNING, pin=8),)),
+        InvalidGoal,
+        'input_waits[0].pin is 8, but there are standard digital inputs 0 to 7; name one of',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(replace(BURNING, value=0.5),)),
+        InvalidGoal,
+        'input_waits[0].value is 0.5; a standard digital input takes 0 or 1',
+    ),
+    (
+        with_fields(
+            PLAIN, input_waits=(replace(BURNING, input=InputKind.TOOL_ANALOG, pin=1, value=nan),)
+        ),
+        InvalidGoal,
+        'input_waits[0].value is nan; a tool analog input takes a level of 0 to 10 A or V',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(replace(BURNING, below=True),)),
+        InvalidGoal,
+        'input_waits[0].below is set, but a standard digital input has no level; set value',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(replace(BURNING, timeout=0.0),)),
+        InvalidGoal,
+        'input_waits[0].timeout is 0 s; it must be more than 0, and at most 600 s',
+    ),
+    (
+        with_fields(SPLINE, input_waits=(BURNING,), execution=ExecutionMode.SERVO),
+        NotAvailable,
+        'input_waits is not empty, but SERVO does nothing at points but rest; set execution to',
+    ),
+    (
+        with_fields(PLAIN, input_waits=(BURNING,), keep_open=True),
+        NotAvailable,
+        'input_waits[0].point_index is set, but a goal with keep_open does nothing at points but',
+    ),
+    (
+        with_fields(PLAIN, payload_changes=(PayloadChange(waypoint=1, mass=101.0),)),
+        InvalidGoal,
+        'payload_changes[0].mass is 101 kg, outside 0 to 100 kg',
+    ),
+    (
+        with_fields(
+            PLAIN,
+            payload_changes=(
+                PayloadChange(waypoint=1, mass=1.0, center_of_gravity=(0.0, 0.0, 50.0)),
+            ),
+        ),
+        InvalidGoal,
+        'payload_changes[0].center_of_gravity contains a number beyond 5 m; give it in metres',
     ),
     (
         replace(with_segment(PLAIN, 1, dwell=0.5), keep_open=True),

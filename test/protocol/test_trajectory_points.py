@@ -14,10 +14,12 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
+    AwaitInput,
+    ChangePayload,
     MoveC,
     MoveJ,
     MoveL,
@@ -26,6 +28,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
     SwitchOutput,
+    Wait,
 )
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import encode_result
@@ -402,6 +405,19 @@ PRIMITIVES = st.one_of(
         starts_beyond=st.booleans(),
         delay=DURATION,
     ),
+    st.builds(Wait, duration=DURATION),
+    st.builds(
+        AwaitInput,
+        input=st.sampled_from(InputKind),
+        pin=st.integers(0, 7),
+        threshold=FRACTION,
+        below=st.booleans(),
+        timeout=DURATION,
+        go_on=st.booleans(),
+    ),
+    st.builds(
+        ChangePayload, mass=POSITIVE, center_of_gravity=st.tuples(FRACTION, FRACTION, FRACTION)
+    ),
 )
 
 
@@ -430,6 +446,7 @@ RESULTS = [
     (TrajectoryResult.SUCCESS, '00000000'),
     (TrajectoryResult.CANCELED, '00000001'),
     (TrajectoryResult.FAILURE, '00000002'),
+    (TrajectoryResult.INPUT_MISSING, '00000003'),
 ]
 
 
@@ -450,7 +467,7 @@ def test_results_are_read_when_joined_or_in_pieces():
     assert decoder.feed(b'') == []
 
 
-@pytest.mark.parametrize('text', ['00000003', 'ffffffff', '7fffffff'])
+@pytest.mark.parametrize('text', ['00000004', 'ffffffff', '7fffffff'])
 def test_an_unknown_result_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         TrajectoryResultDecoder().feed(bytes.fromhex(text))

@@ -59,6 +59,7 @@ def test_there_are_examples():
         'seam_timed',
         'glue',
         'spots',
+        'arc_start',
     }
 
 

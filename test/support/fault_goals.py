@@ -24,6 +24,8 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     Goal,
+    InputKind,
+    InputWait,
     IOCommand,
     OnPathTolerance,
     OutputKind,
@@ -455,23 +457,30 @@ class OutputGoal(BlendGoal):
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
-#: How long the arm rests in a corner [s].
-REST = 0.8
+#: How long the arm rests in a corner, and how long after the fault an input comes for which it
+#: waits in another one [s]; the number of that input.
+REST, COMES_AFTER, AWAITED = 0.8, 0.4, 6
 
 
 @lru_cache
 def rest_plan(start):
-    """Return the plan of two sides of a square with a rest between them."""
+    """Return the plan of three sides of a square with a rest and a wait between them."""
     state = start.state
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     goal = Goal(
-        waypoints=(
-            Waypoint(pose=Pose((x, y + SIDE, z), turned)),
-            Waypoint(pose=Pose((x + SIDE, y + SIDE, z), turned)),
+        waypoints=tuple(
+            Waypoint(pose=Pose((x + dx, y + dy, z), turned))
+            for dx, dy in ((0.0, SIDE), (SIDE, SIDE), (SIDE, 0.0))
         ),
         segments=(
             Segment(velocity=0.25, acceleration=2.0, dwell=REST),
             Segment(velocity=0.25, acceleration=2.0),
+            Segment(velocity=0.25, acceleration=2.0),
+        ),
+        input_waits=(
+            InputWait(
+                waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=AWAITED, value=1.0, timeout=5.0
+            ),
         ),
         path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
         goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
@@ -482,13 +491,29 @@ def rest_plan(start):
 
 
 class RestGoal(BlendGoal):
-    """Two sides of a square, with a rest between them."""
+    """Three sides of a square, with a rest and a wait for an input between them."""
+
+    def __init__(self, cell):
+        self._inputs = cell.robot.controller.io.digital_in.standard
+        self._inputs[AWAITED] = False
+        self._comes = None
+        super().__init__(cell)
 
     def plan_from(self, start):
         return rest_plan(start)
 
     def is_in(self, phase):
-        return self.points_begun() == 2 and self.cell.at_rest()
+        begun = {'resting': 2, 'waiting for an input': 4}[phase]
+        return self.points_begun() == begun and self.cell.at_rest()
+
+    def send_remaining_points(self, phase):
+        self._comes = self.cell.loop.call_later(
+            COMES_AFTER, self._inputs.__setitem__, AWAITED, True
+        )
+
+    def record_end(self):
+        if self._comes is not None:
+            self._comes.cancel()
 
 
 @lru_cache

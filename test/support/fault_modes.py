@@ -358,10 +358,18 @@ OUTPUTS = _mode(
 
 AT_A_POINT = _mode(
     'At a point',
-    'PRIMITIVES with a `dwell`. Whatever ends the goal ends the rest, and nothing moves then.',
-    {'resting': 'the arm rests at the first point'},
-    2.0,
-    {},
+    'PRIMITIVES with a `dwell` and an `input_waits` entry, whose input comes 0.4 s after the '
+    'fault. Whatever ends the goal ends rest and wait, and nothing moves then.',
+    {
+        'resting': 'the arm rests at the first point',
+        'waiting for an input': 'the arm rests at the second point, the input has not come',
+    },
+    3.0,
+    # Nothing tells that the end was lost: the arm stands there for two seconds.
+    {
+        fault: {'': {'result_within': 5.0, 'rest_within': 3.0}}
+        for fault in ("the program's answers are lost", 'the trajectory socket is half-open')
+    },
     faults=tuple(
         name
         for name in FAULTS

@@ -21,9 +21,12 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    InputKind,
+    InputWait,
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    PayloadChange,
     Posture,
     SafeOutput,
     Segment,
@@ -83,6 +86,17 @@ def goal_from_fields(message: Message) -> GoalTable:
         on_path_tolerance=_member(OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'),
         stall_timeout=seconds(message.stall_timeout),
         min_speed_fraction=message.min_speed_fraction,
+        input_waits=tuple(
+            _input_wait(wait, f'input_waits[{i}]') for i, wait in enumerate(message.input_waits)
+        ),
+        payload_changes=tuple(
+            PayloadChange(
+                waypoint=change.point_index,
+                mass=change.mass,
+                center_of_gravity=_three(change.center_of_gravity),
+            )
+            for change in message.payload_changes
+        ),
     )
 
 
@@ -183,6 +197,18 @@ def _io_command(command: Message, field: str) -> IOCommand:
         pin=command.pin,
         value=command.value,
         domain=_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
+    )
+
+
+def _input_wait(wait: Message, field: str) -> InputWait:
+    return InputWait(
+        waypoint=wait.point_index,
+        input=_member(InputKind, wait.input, f'{field}.input'),
+        pin=wait.pin,
+        value=wait.value,
+        below=wait.below,
+        timeout=wait.timeout,
+        go_on=wait.go_on,
     )
 
 

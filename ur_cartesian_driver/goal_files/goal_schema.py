@@ -85,6 +85,18 @@ GOAL: Mapping[str, Any] = {
     'goal_time_tolerance': TIME,
     'segments': [SEGMENT],
     'io_commands': [{'point_index': UINT32, 'offset': TIME, **OUTPUT}],
+    'input_waits': [
+        {
+            'point_index': UINT32,
+            'input': UINT8,
+            'pin': UINT8,
+            'value': 0.0,
+            'below': False,
+            'timeout': 0.0,
+            'go_on': False,
+        }
+    ],
+    'payload_changes': [{'point_index': UINT32, 'mass': 0.0, 'center_of_gravity': VECTOR}],
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,

@@ -47,6 +47,25 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
             'goal_time_tolerance': _duration(table.goal_time_tolerance),
             'segments': _segments(table.segments),
             'io_commands': [_io_command(command) for command in table.io_commands],
+            'input_waits': [
+                {
+                    'point_index': wait.waypoint,
+                    'input': int(wait.input),
+                    'pin': wait.pin,
+                    'value': wait.value,
+                    'timeout': wait.timeout,
+                    **_given({'below': wait.below, 'go_on': wait.go_on}),
+                }
+                for wait in table.input_waits
+            ],
+            'payload_changes': [
+                {
+                    'point_index': change.waypoint,
+                    'mass': change.mass,
+                    'center_of_gravity': _vector(change.center_of_gravity),
+                }
+                for change in table.payload_changes
+            ],
             'execution': int(table.execution),
             'keep_open': table.keep_open,
             'safe_outputs': [

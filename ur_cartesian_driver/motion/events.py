@@ -23,6 +23,8 @@ class TrajectoryResult(IntEnum):
     SUCCESS = 0
     CANCELED = 1
     FAILURE = 2
+    #: Of our own program only.
+    INPUT_MISSING = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

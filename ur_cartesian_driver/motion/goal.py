@@ -56,6 +56,23 @@ class OnPathTolerance(IntEnum):
 
 #: How long the motion waits for an arm that is off its path where the goal does not say it [s].
 DEFAULT_STALL_TIMEOUT = 10.0
+
+
+class InputKind(IntEnum):
+    """Which input an :class:`InputWait` waits for."""
+
+    STANDARD_DIGITAL = 0
+    CONFIGURABLE_DIGITAL = 1
+    TOOL_DIGITAL = 2
+    STANDARD_ANALOG = 3
+    TOOL_ANALOG = 4
+
+    @property
+    def is_analog(self) -> bool:
+        """Whether it has a level [A] or [V]."""
+        return self >= InputKind.STANDARD_ANALOG
+
+
 #: How much later than planned the end may come where the goal does not say it [s], also how long
 #: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -127,6 +144,33 @@ class IOCommand:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class InputWait:
+    """Wait at a waypoint, where the arm stops, until an input has a value."""
+
+    waypoint: int
+    input: InputKind
+    pin: int
+    #: Digital 0 or 1; analog the level to be reached [A] or [V], or the one to fall below.
+    value: float
+    below: bool = False
+    #: Longest wait [s].
+    timeout: float
+    #: Whether the motion goes on then; if not, the goal ends.
+    go_on: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadChange:
+    """Set the payload of the controller at a waypoint, where the arm stops."""
+
+    waypoint: int
+    #: [kg]
+    mass: float
+    #: In the flange [m].
+    center_of_gravity: Vector3 = ZERO3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafeOutput:
     """The value that an output takes when the motion does not go on as planned."""
 
@@ -183,3 +227,5 @@ class Goal:
     stall_timeout: float = 0.0
     #: The part of the speed asked for below which the goal is refused; 0 = not demanded.
     min_speed_fraction: float = 0.0
+    input_waits: tuple[InputWait, ...] = ()
+    payload_changes: tuple[PayloadChange, ...] = ()

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
-    Wait,
+    Stop,
 )
 from ur_cartesian_driver.motion.vectors import vector6
 
@@ -149,8 +149,8 @@ def has_optimized(primitives: Sequence[Primitive]) -> bool:
     return bool(in_rows.any()) or has_optimized(tuple(primitives.others.values()))
 
 
-def has_waits(primitives: Sequence[Primitive]) -> bool:
-    """Tell whether some primitive lets the arm rest."""
+def stops(primitives: Sequence[Primitive]) -> dict[int, Stop]:
+    """Return by row what is done where the arm stands."""
     if isinstance(primitives, SplineRows | MoveRows):
-        return False
-    return any(isinstance(primitive, Wait) for primitive in primitives)
+        return {}
+    return {row: each for row, each in enumerate(primitives) if isinstance(each, Stop)}

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput, Wait
+from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, Stop, SwitchOutput
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import vector6
 
@@ -186,7 +186,7 @@ class PlannedRows(Rows[PlannedSegment]):
         return {
             waypoint: type(primitive).__name__
             for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True)
-            if not isinstance(primitive, Wait)
+            if not isinstance(primitive, Stop)
         }
 
     def __len__(self) -> int:

@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
 
 Joints: TypeAlias = Vector6
 Target: TypeAlias = Pose | Joints
@@ -147,6 +147,42 @@ class Wait:
     duration: float
 
 
-Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Wait
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AwaitInput:
+    """
+    The arm rests until the level of an input is at a threshold or above, or below it.
+
+    :param threshold: [A] or [V]; a digital input has the level 0 or 1.
+    :param timeout: longest wait [s], of real time in which the program runs.
+    :param go_on: whether the program goes on after that; if not, it ends the trajectory.
+    """
+
+    input: InputKind
+    pin: int
+    threshold: float
+    below: bool
+    timeout: float
+    go_on: bool = False
+
+    @property
+    def condition(self) -> str:
+        """What is waited for, as part of a sentence."""
+        name = f'{self.input.name.lower().replace("_", " ")} input {self.pin}'
+        if not self.input.is_analog:
+            return f'{name} {"off" if self.below else "on"}'
+        return f'{name} {"below" if self.below else "at"} {self.threshold:g}'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangePayload:
+    """The robot program sets the payload: mass [kg], and centre of gravity in the flange [m]."""
+
+    mass: float
+    center_of_gravity: Vector3
+
+
+#: What the robot program does while the arm stands; it counts each as a motion.
+Stop: TypeAlias = Wait | AwaitInput | ChangePayload
+Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Stop
 #: One record of a trajectory on the wire.
 Instruction: TypeAlias = Primitive | SwitchOutput

@@ -26,7 +26,19 @@ from ur_cartesian_driver.path.orientations import (
     Y,
     Z,
 )
-from ur_cartesian_driver.path.outputs import analog, configurable, digital, Output, tool_digital
+from ur_cartesian_driver.path.outputs import (
+    analog,
+    analog_input,
+    configurable,
+    configurable_input,
+    digital,
+    digital_input,
+    Input,
+    Output,
+    tool_analog_input,
+    tool_digital,
+    tool_digital_input,
+)
 from ur_cartesian_driver.path.path_builder import FREE, Path
 from ur_cartesian_driver.path.units import deg, mm
 
@@ -36,6 +48,7 @@ __all__ = [
     'AnalogDomain',
     'ExecutionMode',
     'Frames',
+    'Input',
     'Output',
     'Path',
     'Pose',
@@ -46,12 +59,17 @@ __all__ = [
     'Z',
     'against',
     'analog',
+    'analog_input',
     'axis_angle',
     'configurable',
+    'configurable_input',
     'deg',
     'digital',
+    'digital_input',
     'mm',
     'roll_pitch_yaw',
     'tilted',
+    'tool_analog_input',
     'tool_digital',
+    'tool_digital_input',
 ]

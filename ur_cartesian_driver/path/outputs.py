@@ -1,13 +1,19 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The outputs of a robot, to be set at points of a path."""
+"""The outputs of a robot, to be set at points of a path, and the inputs to wait for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal import (
+    InputKind,
+    InputWait,
+    IOCommand,
+    OutputKind,
+    SafeOutput,
+)
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.planning.output_names import output_fault, output_name
 
@@ -79,3 +85,48 @@ def tool_digital(pin: int) -> Output:
 def analog(pin: int, domain: AnalogDomain = AnalogDomain.CURRENT) -> Output:
     """Return a standard analog output, 0 or 1; its values are fractions of its range."""
     return Output(OutputKind.STANDARD_ANALOG, pin, domain)
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One input of the robot; :func:`digital_input` and its like make it."""
+
+    kind: InputKind
+    pin: int
+
+    def wait(self, value: float, timeout: float, below: bool, go_on: bool) -> InputWait:
+        """Return the wait for a value; it is not checked."""
+        return InputWait(
+            waypoint=0,
+            input=self.kind,
+            pin=self.pin,
+            value=value,
+            below=below,
+            timeout=float(timeout),
+            go_on=go_on,
+        )
+
+
+def digital_input(pin: int) -> Input:
+    """Return a standard digital input, 0 to 7; its values are True and False."""
+    return Input(InputKind.STANDARD_DIGITAL, pin)
+
+
+def configurable_input(pin: int) -> Input:
+    """Return a configurable digital input, 0 to 7."""
+    return Input(InputKind.CONFIGURABLE_DIGITAL, pin)
+
+
+def tool_digital_input(pin: int) -> Input:
+    """Return a digital input of the tool connector, 0 or 1."""
+    return Input(InputKind.TOOL_DIGITAL, pin)
+
+
+def analog_input(pin: int) -> Input:
+    """Return a standard analog input, 0 or 1; its levels are in A or V."""
+    return Input(InputKind.STANDARD_ANALOG, pin)
+
+
+def tool_analog_input(pin: int) -> Input:
+    """Return an analog input of the tool connector, 0 or 1."""
+    return Input(InputKind.TOOL_ANALOG, pin)

@@ -30,7 +30,9 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     Goal,
+    InputWait,
     OnPathTolerance,
+    PayloadChange,
     Segment,
     SegmentType,
     Tolerance,
@@ -41,7 +43,7 @@ from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.pose import IDENTITY, multiply, Pose, Quaternion, rotate
 from ur_cartesian_driver.motion.vectors import add, Vector6, ZERO6
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, RestToRest, turned
-from ur_cartesian_driver.path.outputs import Output
+from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal
 from ur_cartesian_driver.path.path_numbers import (
     amount,
@@ -66,7 +68,12 @@ from ur_cartesian_driver.path.path_points import (
     seen_from,
 )
 from ur_cartesian_driver.path.weave import strokes, woven
-from ur_cartesian_driver.planning.request.dwells import MAX_DWELL
+from ur_cartesian_driver.planning.request.stops import (
+    check_input_wait,
+    check_payload,
+    MAX_DWELL,
+    MAX_OFFSET,
+)
 
 #: A place: a position x y z [m], or a pose.
 Place: TypeAlias = Sequence[float] | Pose
@@ -468,10 +475,59 @@ class Path:
 
         :raises InvalidGoal: there is no point, or it is passed with a blend or a twist of its own.
         """
-        if not self._points:
-            raise InvalidGoal('dwell()', 'comes before the first point', 'add a motion first')
-        where, point = f'dwell() at point {len(self) - 1}', self._points[-1]
+        where, point = self._stop('dwell')
         length = to_nanoseconds(where, amount(where, 'time', time, MAX_DWELL, 's')) / NANOSECONDS
+        segment = replace(point.segment, dwell=length)
+        return self._with(_points=(*self._points[:-1], replace(point, segment=segment)))
+
+    def wait_for(
+        self,
+        what: Input,
+        value: float = True,
+        *,
+        timeout: float,
+        below: bool = False,
+        go_on: bool = False,
+    ) -> Path:
+        """
+        Let the arm rest at the point before until an input has a value; there it has no blend.
+
+        A :meth:`dwell` there, and the time of an output, count from when the input has come.
+
+        :param value: True or False of a digital input, the level of an analog one [A] or [V].
+        :param timeout: longest wait [s].
+        :param below: until an analog input is below the level, not at it or above.
+        :param go_on: go on if the input does not come; else the goal fails.
+        :raises InvalidGoal: as :meth:`dwell`, or there is no such input or level.
+        """
+        where, point = self._stop('wait_for')
+        wait = what.wait(float(value), timeout, below, go_on)
+        check_input_wait(where, wait)
+        if any(isinstance(other, InputWait) for other in point.stops):
+            raise InvalidGoal(where, 'waits for a second input', 'add a point for it')
+        point = replace(point, stops=(*point.stops, wait))
+        return self._with(_points=(*self._points[:-1], point))
+
+    def payload(self, mass: float, center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> Path:
+        """
+        Set the payload where the arm stops at the point before; there it has no blend.
+
+        :param mass: [kg].
+        :param center_of_gravity: in the flange frame [m].
+        :raises InvalidGoal: as :meth:`dwell`, or a number cannot be meant.
+        """
+        where, point = self._stop('payload')
+        cog = vector(where, center_of_gravity, MAX_OFFSET)
+        change = PayloadChange(waypoint=0, mass=float(mass), center_of_gravity=cog)
+        check_payload(where, change)
+        point = replace(point, stops=(*point.stops, change))
+        return self._with(_points=(*self._points[:-1], point))
+
+    def _stop(self, name: str) -> tuple[str, PathPoint]:
+        """Return where the method is, and the last point as one at which the arm stops."""
+        if not self._points:
+            raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
+        where, point = f'{name}() at point {len(self) - 1}', self._points[-1]
         segment, waypoint = point.segment, point.waypoint
         own_blend = segment.blend_radius > 0.0 and not point.feed_blend
         moves = any(abs(rate) > 0.0 for rate in (*waypoint.twist, *waypoint.acceleration))
@@ -482,11 +538,11 @@ class Path:
         point = replace(
             point,
             waypoint=waypoint,
-            segment=replace(segment, dwell=length, blend_radius=0.0),
+            segment=replace(segment, blend_radius=0.0),
             feed_blend=False,
             auto_blend=False,
         )
-        return self._with(_points=(*self._points[:-1], point))
+        return where, point
 
     # ---- the path as a whole -------------------------------------------------------------------
 
@@ -628,9 +684,11 @@ class Path:
         """
         if self._start is None:
             raise InvalidGoal('reversed()', 'has no start to go back to', 'write Path(start)')
-        if any(point.outputs for point in self._points):
+        if any(point.outputs or point.stops for point in self._points):
             raise InvalidGoal(
-                'reversed()', 'has outputs, which have no reverse', 'set them afterwards'
+                'reversed()',
+                'has outputs, inputs or payloads, which have no reverse',
+                'set them afterwards',
             )
         if not self._points:
             return self

@@ -8,14 +8,24 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from itertools import accumulate
 from math import inf
+from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import (
+    Goal,
+    InputWait,
+    IOCommand,
+    PayloadChange,
+    Segment,
+    SegmentType,
+)
 from ur_cartesian_driver.motion.goal_table import GoalTable, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, PathSettings, SAME_POSITION
+
+_Event = TypeVar('_Event', IOCommand, InputWait, PayloadChange)
 
 #: The blend of a point on a process that has none [m], and how long the tool is in it at least
 #: [s]: the cycle of the slowest controller is 8 ms, and a blend that is passed in one is left out.
@@ -67,6 +77,18 @@ def goal_of_points(
             for i, point in enumerate(points)
             for command in point.outputs
         ),
+        input_waits=tuple(
+            replace(stop, waypoint=i)
+            for i, point in enumerate(points)
+            for stop in point.stops
+            if isinstance(stop, InputWait)
+        ),
+        payload_changes=tuple(
+            replace(stop, waypoint=i)
+            for i, point in enumerate(points)
+            for stop in point.stops
+            if isinstance(stop, PayloadChange)
+        ),
         **{each.name: getattr(settings, each.name) for each in fields(settings)},
     )
 
@@ -86,13 +108,9 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
         )
     times = [to_nanoseconds(f'points[{i}]', point.time) for i, point in enumerate(points)]
     rests = [_nanoseconds(segment.dwell) for segment in segments] or [0] * len(points)
-    outputs: dict[int, list[IOCommand]] = {}
-    for command in goal.io_commands:
-        if not 0 <= command.waypoint < len(points):
-            raise InvalidGoal(
-                'io_commands', f'names point {command.waypoint}, which is none', 'name another'
-            )
-        outputs.setdefault(command.waypoint, []).append(replace(command, waypoint=0))
+    outputs = _by_point('io_commands', goal.io_commands, len(points))
+    waits = _by_point('input_waits', goal.input_waits, len(points))
+    payloads = _by_point('payload_changes', goal.payload_changes, len(points))
     in_spline = any(times) and (
         goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
         or any(any(point.twist) or any(point.acceleration) for point in points[:-1])
@@ -103,10 +121,23 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
             segment=segments[i] if segments else Segment(),
             duration=times[i] - (times[i - 1] + rests[i - 1] if i and times[i] else 0),
             outputs=tuple(outputs.get(i, ())),
+            stops=(*waits.get(i, ()), *payloads.get(i, ())),
             in_spline=in_spline,
         )
         for i, point in enumerate(points)
     )
+
+
+def _by_point(field: str, events: Sequence[_Event], count: int) -> dict[int, list[_Event]]:
+    """Return what happens at points by the point, with the waypoint 0."""
+    found: dict[int, list[_Event]] = {}
+    for event in events:
+        if not 0 <= event.waypoint < count:
+            raise InvalidGoal(
+                field, f'names point {event.waypoint}, which is none', 'name another'
+            )
+        found.setdefault(event.waypoint, []).append(replace(event, waypoint=0))
+    return found
 
 
 def _nanoseconds(time: float) -> int:

@@ -10,8 +10,10 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    InputWait,
     IOCommand,
     OnPathTolerance,
+    PayloadChange,
     SafeOutput,
     Segment,
     Tolerance,
@@ -49,6 +51,7 @@ class PathPoint:
     duration: int = 0
     #: With the waypoint 0, whichever point this is.
     outputs: tuple[IOCommand, ...] = ()
+    stops: tuple[InputWait | PayloadChange, ...] = ()
     #: Whether the blend is that of the feed, which the last point of a path does without, and
     #: whether it is chosen when the path is finished.
     feed_blend: bool = False

@@ -29,9 +29,12 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
     before = start
     for i, point in enumerate(points):
         where = f'weave() at point {i}'
-        if point.outputs or point.duration or point.waypoint.posture or point.segment.dwell:
+        segment, has_events = point.segment, point.outputs or point.stops
+        if has_events or point.duration or point.waypoint.posture or segment.dwell:
             raise InvalidGoal(
-                where, 'has outputs, a duration, a posture or a dwell', 'give them to the result'
+                where,
+                'has outputs or inputs, a duration, a posture or a dwell',
+                'give them to the result',
             )
         stroke = _stroke(before, point)
         if stroke is None or stroke.length <= SAME_POSITION:

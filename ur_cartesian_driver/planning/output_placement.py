@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.goal import IOCommand
 from ur_cartesian_driver.motion.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput, Wait
+from ur_cartesian_driver.motion.primitive import Spline, Stop, SwitchOutput, Wait
 from ur_cartesian_driver.motion.vectors import subtract, Vector6
 from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
@@ -108,18 +108,19 @@ class _TimedPath:
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self.blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
         self.returns: Floats = self.ends - self.blend_halves
-        rests = (segments.lengths == 0.0) & (np.diff(segments.waypoints, prepend=-1) == 0)
-        #: By the row of a motion: until when the arm rests behind it [s].
-        self.rests_until = {
-            k - 1: float(self.ends[k])
-            for k in np.flatnonzero(rests).tolist()
-            if isinstance(segments.primitives[k], Wait)
+        still = (segments.lengths == 0.0) & (np.diff(segments.waypoints, prepend=-1) == 0)
+        stops = {
+            k: segments.primitives[k]
+            for k in np.flatnonzero(still).tolist()
+            if isinstance(segments.primitives[k], Stop)
+        }
+        #: By waypoint: the row of its rest.
+        self.rests = {
+            int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
         }
         #: The row whose motion leads to each point.
         self.index = {
-            waypoint: k
-            for k, waypoint in enumerate(segments.waypoints.tolist())
-            if k - 1 not in self.rests_until
+            waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist()) if k not in stops
         }
 
     def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
@@ -139,8 +140,8 @@ class _TimedPath:
                 self._at_point(report_index),
                 self._where(report_index),
             )
-        elif time <= self.rests_until.get(report_index, 0.0):
-            after_index, trigger_time, delay = report_index, None, command.offset
+        elif (rest := self.rests.get(command.waypoint)) is not None and time <= self.ends[rest]:
+            after_index, trigger_time, delay = rest - 1, None, command.offset
             where = f'{command.offset:.3f} s after stopping there'
         elif late > -_SAME_TIME:
             after_index, trigger_time, delay = last, None, max(late, 0.0)

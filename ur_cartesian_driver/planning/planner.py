@@ -46,8 +46,8 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
+    Stop,
     Target,
-    Wait,
 )
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
@@ -90,7 +90,6 @@ from ur_cartesian_driver.planning.request.dialect_adaptation import (
     adapt_to_dialect,
     explain_poses_only,
 )
-from ur_cartesian_driver.planning.request.dwells import Dwells
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     point_field,
@@ -100,6 +99,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 )
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
+from ur_cartesian_driver.planning.request.stops import Stops
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
@@ -176,7 +176,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     find_slow_stretches = cache(
         partial(slow_move_stretches, geometries, timings, motion, slower_by(goal))
     )
-    goal, segments, reference = planner.dwells.insert(goal, segments, motion)
+    goal, segments, reference = planner.stops.insert(goal, segments, motion)
     segments = place_outputs(
         segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
     )
@@ -209,7 +209,7 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
     )
     if goal.min_speed_fraction:
         check_min_speed(goal, found.find_slow_stretches())
-    goal, segments, reference = planner.dwells.insert(
+    goal, segments, reference = planner.stops.insert(
         stretch_times(goal, found.stretch), found.segments, found.reference
     )
     segments = place_outputs(segments, reference, goal.io_commands)
@@ -233,8 +233,8 @@ class GoalPlanner:
         options: PlanningOptions,
         running: PlannedSegment | None = None,
     ) -> None:
-        self.dwells = Dwells(retargeted.goal)
-        goal, state = self.dwells.moving_goal, retargeted.state
+        self.stops = Stops(retargeted.goal)
+        goal, state = self.stops.moving_goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
         self.running = running
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
@@ -443,7 +443,7 @@ class GoalPlanner:
             primitive = self._arc(geometries, moves, row, joints)
         else:
             move = moves[row]
-            assert not isinstance(move, MoveC | Spline | Wait)
+            assert not isinstance(move, MoveC | Spline | Stop)
             primitive = move
             if kind in JOINT_SPACE_TYPES or row in geometries.waypoints.postures:
                 primitive = replace(move, q_near=self._q_near(point, joints))

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveJ,
     OptimoveL,
     Spline,
-    Wait,
+    Stop,
 )
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 
@@ -107,7 +107,7 @@ def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
 
 
 def _line(segments: Sequence[PlannedSegment]) -> str:
-    moving = [segment for segment in segments if not isinstance(segment.primitive, Wait)]
+    moving = [segment for segment in segments if not isinstance(segment.primitive, Stop)]
     primitive, pieces = moving[-1].primitive, len(moving)
     name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
@@ -130,9 +130,10 @@ def _time(segments: Sequence[PlannedSegment]) -> str:
 def _spline(plan: Plan) -> JointSpline:
     pieces = (
         Spline(target=segment.joints, velocities=ZERO6, duration=segment.duration)
-        if isinstance(segment.primitive, Wait)
+        if isinstance(segment.primitive, Stop)
         else segment.primitive
         for segment in plan.segments
+        if segment.duration > 0.0
     )
     return JointSpline.of(plan.start, (piece for piece in pieces if isinstance(piece, Spline)))
 

@@ -31,7 +31,7 @@ import re
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.goal import InputKind, OutputKind
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
@@ -257,6 +257,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
+    yield from _enum('INPUT', InputKind)
     # Column of a field in the row of a pending output.
     for field, name in OUTPUT_COLUMNS.items():
         yield f'OUTPUT_{name} = {field.value}'

@@ -236,6 +236,10 @@ class GoalMachine:
             case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
                 self._deadline = now + EARLY_CANCELED_TIMEOUT
                 return NO_MEANING
+            case TrajectoryEnded(result=TrajectoryResult.INPUT_MISSING) if (
+                clause := self._monitor.missing_input()
+            ):
+                return GoalSignal.FAILURE, clause
             case TrajectoryEnded(result=result):
                 return RESULT_SIGNALS[result]
             case CancelRequested(reason=reason):

@@ -281,6 +281,17 @@ class GoalMonitor:
             )
         )
 
+    def missing_input(self) -> str:
+        """Return for which input the program has waited in vain, as a clause; empty = unknown."""
+        return self._input_wait()[1]
+
+    def _input_wait(self) -> tuple[float, str]:
+        """Return the wait at the point to which the last motion led; 0 s = there is none."""
+        running = None
+        if self.job.input_waits:
+            running = self.records.running_waypoints(self._motions_begun())
+        return (0.0, '') if running is None else self.job.input_waits.get(running[0], (0.0, ''))
+
     def goal_violation(self, state: RobotState) -> str | None:
         """Return how far the arm is outside the goal tolerance, as a clause, or None."""
         return self._violation(self._goal_check, self._tracker.pose(), state)
@@ -316,6 +327,8 @@ class GoalMonitor:
     def _stall_fault(self) -> Fault | None:
         """Return that the arm stands although nothing holds it, or None."""
         if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
+            return None
+        if self._stalled_time < self._input_wait()[0] + STALL_MARGIN:
             return None
         return GoalSignal.STALLED, (
             f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '

@@ -271,6 +271,10 @@ RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = {
         GoalSignal.FAILURE,
         'the robot program reported a failure; its log on the pendant says why',
     ),
+    TrajectoryResult.INPUT_MISSING: (
+        GoalSignal.FAILURE,
+        'an input of input_waits did not come in time',
+    ),
 }
 
 

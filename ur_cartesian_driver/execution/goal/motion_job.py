@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,11 +19,11 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
 )
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, has_waits
+from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, stops
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.primitive import AwaitInput, Spline
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
@@ -70,8 +71,10 @@ class MotionJob:
     keep_open: bool = False
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
-    #: Whether the robot program lets the arm rest at points.
-    has_waits: bool = False
+    #: Whether the robot program does something where the arm stands.
+    has_stops: bool = False
+    #: By waypoint: the time-out of its input [s], and that it has not come, as a clause.
+    input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
     #: What outputs become when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
@@ -97,8 +100,8 @@ class MotionJob:
         """What only our robot program can do of this, as part of a sentence; empty = nothing."""
         if not self.is_motion.all():
             return 'outputs (io_commands)'
-        if self.has_waits:
-            return 'rests at points (dwell)'
+        if self.has_stops:
+            return 'what is done at points (dwell, input_waits, payload_changes)'
         if self.safe_outputs:
             return 'outputs that have to be safe (safe_outputs)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
@@ -140,6 +143,7 @@ def job_from_plan(
     first_records = np.cumsum(records) - records
     is_motion = np.zeros(int(records.sum()), dtype=np.bool_)
     is_motion[first_records] = True
+    standing = stops(rows.primitives)
     return MotionJob(
         points=len(is_motion),
         reference=plan.reference,
@@ -161,7 +165,16 @@ def job_from_plan(
         if goal.on_path_tolerance is OnPathTolerance.STALL
         else 0.0,
         ending_records=ending_records,
-        has_waits=has_waits(rows.primitives),
+        has_stops=bool(standing),
+        input_waits={
+            int(rows.waypoints[row]): (
+                stop.timeout,
+                f'{stop.condition} did not come within {stop.timeout:g} s at point '
+                f'{rows.waypoints[row]}',
+            )
+            for row, stop in standing.items()
+            if isinstance(stop, AwaitInput)
+        },
         has_speed_profile=not (
             goal.keep_open
             or plan.execution.traits.streams_setpoints

@@ -21,9 +21,9 @@ from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.dwells import refuse_dwells_of_open_goals
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
+from ur_cartesian_driver.planning.request.stops import refuse_dwells_of_open_goals
 from ur_cartesian_driver.planning.request.validate import check_list_lengths
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline, Wait
+from ur_cartesian_driver.motion.primitive import Spline, Stop
 from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
@@ -187,7 +187,7 @@ class SpeedRequests:
     def _request_again(self, running: PlannedSegment) -> None:
         """Ask for what has been sent already."""
         sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
-        assert not isinstance(sent, Spline | Wait)
+        assert not isinstance(sent, Spline | Stop)
         acceleration = sent.acceleration * self.acceleration_unit[0]
         self.speed[0], self.acceleration[0] = sent.velocity, acceleration
         self.max_acceleration[0] = acceleration

@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
-    Wait,
+    Stop,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
@@ -38,7 +38,7 @@ def adapt_to_dialect(
     :raises NotAvailable: the dialect cannot express it.
     """
     dialect, reason = options.dialect, ''
-    if dialect.supports_q_near or isinstance(primitive, MoveC | Spline | Wait):
+    if dialect.supports_q_near or isinstance(primitive, MoveC | Spline | Stop):
         pass
     elif isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
         _check_calibration(primitive, point, options)

@@ -43,7 +43,6 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
-from ur_cartesian_driver.planning.request.dwells import check_dwells
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_optimized,
     is_spline,
@@ -65,6 +64,7 @@ from ur_cartesian_driver.planning.request.number_rules import (
     check_tolerance_numbers,
 )
 from ur_cartesian_driver.planning.request.spline_rules import check_spline
+from ur_cartesian_driver.planning.request.stops import check_stops
 
 #: Larger joint values in postures are mistakes, such as degrees [rad].
 MAX_JOINT_VALUE = 8.0 * pi
@@ -276,7 +276,7 @@ RULES: tuple[Rule, ...] = (
     _segment_rules,
     _postures,
     check_blends,
-    check_dwells,
+    check_stops,
     _motions,
 )
 

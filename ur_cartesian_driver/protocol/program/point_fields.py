@@ -39,8 +39,18 @@ no time:
 20       motion type                                                            1
 =======  =====================================================================  =====
 
-WAIT is of our own program, too: a motion that goes nowhere. Its word 18 is the time from the end
-of the motion before until the next one may begin [s], with the factor T; all others are zeros.
+These are of our own program, too, and motions that go nowhere. WAIT lets the arm rest: word 18 is
+the time from the end of the motion before until the next one may begin. AWAIT_INPUT rests until an
+input has a level, and CHANGE_PAYLOAD sets a payload. The other words are zeros:
+
+=======  =====================================================================  =====
+12, 13   AWAIT_INPUT: kind of input, pin                                        S
+14, 15   AWAIT_INPUT: threshold [A], [V] or 0 to 1; 1 = wait until below it     S
+16       AWAIT_INPUT: 1 = go on after the time-out, 0 = end                     S
+0 - 3    CHANGE_PAYLOAD: mass [kg], centre of gravity x y z in the flange [m]   S
+18       WAIT: the time; AWAIT_INPUT: longest wait [s]                          T
+20       motion type                                                            1
+=======  =====================================================================  =====
 """
 
 from __future__ import annotations
@@ -53,12 +63,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
+    AwaitInput,
+    ChangePayload,
     Instruction,
     MoveC,
     MoveJ,
@@ -68,6 +80,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
+    Stop,
     SwitchOutput,
     Target,
     Wait,
@@ -114,6 +127,10 @@ class MotionType(IntEnum):
     SWITCH_OUTPUT = 200
     #: the arm stands for a time; our own robot program only
     WAIT = 201
+    #: the arm stands until an input has a level; our own robot program only
+    AWAIT_INPUT = 202
+    #: sets the payload; our own robot program only
+    CHANGE_PAYLOAD = 203
 
 
 class SplineKind(IntEnum):
@@ -136,6 +153,11 @@ class PointField(IntEnum):
     OUTPUT_PIN = 13
     OUTPUT_VALUE = 14
     OUTPUT_DOMAIN = 15
+    INPUT_KIND = 12
+    INPUT_PIN = 13
+    INPUT_THRESHOLD = 14
+    INPUT_BELOW = 15
+    INPUT_GOES_ON = 16
     HAS_TRIGGER_POSE = 16
     STARTS_BEYOND = 17
     DURATION = 18
@@ -192,8 +214,13 @@ _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is
 #: The kinds of rows up to this one take a duration.
 _LAST_TIMED = MOVES.index(MoveL)
 _POSE_TYPES = np.array([_TYPES[move][1] for move in MOVES])
-#: Records whose word 18 counts from the end of the motion before.
-_WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, MotionType.WAIT))
+_STOPS: dict[type[Stop], MotionType] = {
+    Wait: MotionType.WAIT,
+    AwaitInput: MotionType.AWAIT_INPUT,
+    ChangePayload: MotionType.CHANGE_PAYLOAD,
+}
+#: Records whose word 18 is no duration of a move.
+_WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
@@ -212,8 +239,8 @@ def motion_type(primitive: Instruction) -> MotionType:
         return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
     if isinstance(primitive, Spline):
         return MotionType.SPLINE
-    if isinstance(primitive, Wait):
-        return MotionType.WAIT
+    if isinstance(primitive, Stop):
+        return _STOPS[type(primitive)]
     try:
         return _TYPES[type(primitive)][isinstance(primitive.target, Pose)]
     except KeyError:
@@ -234,8 +261,8 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
         return _output_fields(primitive)
     if isinstance(primitive, Spline):
         return _spline_fields(primitive)
-    if isinstance(primitive, Wait):
-        return (*(0.0,) * 18, primitive.duration, 0, MotionType.WAIT)
+    if isinstance(primitive, Stop):
+        return _stop_fields(primitive)
     target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
         via, mode, radius = _numbers(primitive.via), primitive.mode, primitive.blend_radius
@@ -323,6 +350,32 @@ def _output_fields(output: SwitchOutput) -> PointFields:
     )
 
 
+def _stop_fields(stop: Stop) -> PointFields:
+    kind = _STOPS[type(stop)]
+    match stop:
+        case AwaitInput():
+            wanted = (stop.input, stop.pin, stop.threshold, stop.below, stop.go_on, 0)
+            return (*ZERO6, *ZERO6, *wanted, stop.timeout, 0, kind)
+        case ChangePayload():
+            return (stop.mass, *stop.center_of_gravity, *(0.0,) * 14, 0, 0, kind)
+    return (*(0.0,) * 18, stop.duration, 0, kind)
+
+
+def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
+    if kind is MotionType.AWAIT_INPUT:
+        return AwaitInput(
+            input=_enum_member(InputKind, fields[12], 'kind of input (word 12)'),
+            pin=int(fields[13]),
+            threshold=fields[14],
+            below=bool(fields[15]),
+            timeout=fields[18],
+            go_on=bool(fields[16]),
+        )
+    if kind is MotionType.CHANGE_PAYLOAD:
+        return ChangePayload(mass=fields[0], center_of_gravity=(fields[1], fields[2], fields[3]))
+    return Wait(duration=fields[18])
+
+
 def _spline_fields(piece: Spline) -> PointFields:
     kind = SplineKind.CUBIC if piece.accelerations is None else SplineKind.QUINTIC
     accelerations = piece.accelerations or ZERO6
@@ -345,8 +398,8 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> I
         return _spline(fields)
     if kind is MotionType.SWITCH_OUTPUT:
         return _output(fields)
-    if kind is MotionType.WAIT:
-        return Wait(duration=fields[18])
+    if kind in _STOPS.values():
+        return _stop(fields, kind)
     return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind, dialect)
 
 

@@ -14,11 +14,11 @@ dialect  library        time scale  motion types         words 6 - 17 of moves  
 2.0      2.0 - 2.9      1000        0 - 3, 51            v x 6, a x 6           no
 2.10     2.10, 2.11     1,000,000   0 - 5, 51            v x 6, a x 6           no
 2.12     2.12, 2.13     1,000,000   0 - 13, 51           q_near, v, a, flag     no
-2.14     since 2.14     1,000,000   0 - 13, 51, 200, 201 q_near, v, a, flag     yes
+2.14     since 2.14     1,000,000   0 - 13, 51, from 200 q_near, v, a, flag     yes
 =======  =============  ==========  ===================  =====================  =======
 
-Types from 200 on switch an output and let the arm rest. Only our own robot program knows them; the
-library's programs skip them silently.
+Types from 200 on switch outputs and do what is done while the arm stands. Only our own robot
+program knows them; the library's programs skip them silently.
 
 "Moves" are all types except MOVEC* and SPLINE, whose words never changed. Blend radii have the
 time scale, too. With a scale of 1000, times are whole milliseconds and radii whole millimetres.
@@ -46,7 +46,7 @@ _OPTIMOVES = frozenset((4, 5))
 _OTHER_TARGETS = frozenset(range(6, 14))
 _SPLINE = frozenset((51,))
 _OUTPUTS = frozenset((200,))
-_WAITS = frozenset((201,))
+_STOPS = frozenset((201, 202, 203))
 
 #: Names of words 6 to 17 of a move in errors, with and without q_near.
 _NAMES_WITH_Q_NEAR = (
@@ -104,9 +104,9 @@ class Dialect:
         return self.motion_types >= _OUTPUTS
 
     @property
-    def supports_waits(self) -> bool:
-        """Whether a trajectory may let the arm rest between two motions."""
-        return self.motion_types >= _WAITS
+    def supports_stops(self) -> bool:
+        """Whether the program does something where the arm stands, rests for example."""
+        return self.motion_types >= _STOPS
 
     @property
     def is_coarse(self) -> bool:
@@ -170,7 +170,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
                 | _OTHER_TARGETS
                 | _SPLINE
                 | _OUTPUTS
-                | _WAITS,
+                | _STOPS,
                 supports_q_near=True,
                 supports_append=True,
                 supports_tcp_change=True,
