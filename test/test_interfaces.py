@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.goal import ArcMode, FreeAxis, OutputKind, SegmentType
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.robot_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
@@ -155,8 +155,9 @@ def test_error_codes_are_distinct_and_without_gaps():
 @pytest.mark.parametrize(
     ('message', 'pattern', 'values'),
     [
-        (MotionSegment, '(?!ARC_)', range(7)),
+        (MotionSegment, '(?!ARC_|FREE_)', range(7)),
         (MotionSegment, 'ARC_', range(2)),
+        (MotionSegment, 'FREE_', range(4)),
         (IOCommand, '.*_(DIGITAL|ANALOG)$', range(4)),
         (FollowCartesianTrajectory.Goal, 'EXECUTION_', range(4)),
         (DriverStatus, '(?!ROBOT_MODE_|SAFETY_MODE_)', range(7)),
@@ -172,8 +173,9 @@ def test_constants_of_an_enumeration_count_up(message, pattern, values):
     [
         (ErrorCode, FollowCartesianTrajectory.Result, '', {}),
         (ExecutionMode, FollowCartesianTrajectory.Goal, 'EXECUTION_', {}),
-        (SegmentType, MotionSegment, '(?!ARC_)', {}),
+        (SegmentType, MotionSegment, '(?!ARC_|FREE_)', {}),
         (ArcMode, MotionSegment, 'ARC_', {}),
+        (FreeAxis, MotionSegment, 'FREE_', {}),
         (OutputKind, IOCommand, '(?=.*_(DIGITAL|ANALOG)$)', {}),
         (RobotMode, DriverStatus, 'ROBOT_MODE_', {'UNKNOWN': -2}),
         (SafetyMode, DriverStatus, 'SAFETY_MODE_', {'UNKNOWN': 0}),

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, isfinite, nan, pi
 
 from hypothesis import event, given, HealthCheck, settings
@@ -14,6 +15,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     Goal,
     Posture,
     Segment,
@@ -149,13 +151,24 @@ frames = st.sampled_from(
     plain=st.booleans(),
     tolerance=tolerances,
     frame=frames,
+    free=st.sampled_from((None, None, (0.0, 0.0), (-0.5, 0.5), (0.1, 0.1))),
     options=choices,
 )
 def test_any_goal_is_refused_in_words_or_planned_and_can_be_sent(
-    make_cell, q, drawn, timed, plain, tolerance, frame, options
+    make_cell, q, drawn, timed, plain, tolerance, frame, free, options
 ):
     cell = make_cell(q)
     goal = goal_of(cell, drawn, timed, plain, tolerance, frame)
+    if free is not None and goal.segments:
+        low, high = free
+        axis = {'free_axis': FreeAxis.Z, 'free_min': low, 'free_max': high}
+        goal = replace(
+            goal,
+            segments=tuple(
+                segment if i % 3 == 1 else replace(segment, **axis)
+                for i, segment in enumerate(goal.segments)
+            ),
+        )
     chosen = PlanningOptions(self_collision='off', max_segment_time=1000.0, **options)
     try:
         made = plan(goal, cell.state, cell.arm, chosen)

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     Goal,
     InputKind,
     InputWait,
@@ -85,6 +86,7 @@ def turned(*quaternion):
 SIX_NAN = (0.0, 0.0, nan, 0.0, 0.0, 0.0)
 ONE = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 VIA = Pose((0.15, 0.05, 0.0))
+FREE = {'free_axis': FreeAxis.Z}
 ARC = {'type': TYPE.CIRCULAR, 'via': VIA}
 
 REFUSALS = [
@@ -114,6 +116,63 @@ REFUSALS = [
     (with_fields(PLAIN, execution=7), InvalidGoal, 'execution is 7; allowed are AUTO = 0'),
     (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
     (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
+    (with_segment(PLAIN, 1, free_axis=4), InvalidGoal, 'segments[1].free_axis is 4; allowed are'),
+    # free axes
+    (
+        with_segment(PLAIN, 1, free_max=1.0),
+        InvalidGoal,
+        'segments[1].free_max is set, but free_axis is NONE',
+    ),
+    (
+        with_segment(PLAIN, 1, **FREE, free_min=0.5, free_max=0.4),
+        InvalidGoal,
+        'segments[1].free_min is 0.5 rad, more than free_max = 0.4 rad',
+    ),
+    (
+        with_segment(PLAIN, 1, **FREE, free_min=-90.0, free_max=90.0),
+        InvalidGoal,
+        'segments[1].free_min is -90 rad, more than a full turn; give radians, not degrees',
+    ),
+    (
+        with_segment(PLAIN, 1, **FREE, free_min=-4.0, free_max=4.0),
+        InvalidGoal,
+        'segments[1].free_max is 8 rad above free_min, more than a full turn',
+    ),
+    (
+        with_segment(PLAIN, 1, **FREE, free_max=inf),
+        InvalidGoal,
+        'segments[1].free_max contains inf',
+    ),
+    (
+        with_segment(PLAIN, 1, **ARC, **FREE, arc_mode=ArcMode.FIXED),
+        InvalidGoal,
+        'segments[1].arc_mode is FIXED, which ties the tool to the arc',
+    ),
+    (
+        replace(
+            PLAIN,
+            segments=(
+                Segment(free_axis=FreeAxis.Z),
+                Segment(type=TYPE.CIRCULAR, via=VIA, arc_mode=ArcMode.FIXED),
+                Segment(),
+            ),
+        ),
+        InvalidGoal,
+        'segments[1].arc_mode is FIXED, which takes its orientation from points[0]',
+    ),
+    (
+        replace(
+            PLAIN,
+            segments=(Segment(free_axis=FreeAxis.Z), Segment(), Segment(free_axis=FreeAxis.X)),
+        ),
+        InvalidGoal,
+        'segments[2].free_axis is X, but that of another segment is Z',
+    ),
+    (
+        replace(with_segment(PLAIN, 1, **FREE), keep_open=True),
+        NotAvailable,
+        'segments[1].free_axis is set in a goal with keep_open',
+    ),
     # not finite
     (with_point(PLAIN, 2, time=nan), InvalidGoal, 'trajectory.points[2].time_from_start contains'),
     (

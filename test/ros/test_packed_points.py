@@ -40,11 +40,13 @@ def converted(message):
 def any_goal(seed):
     """Return a goal of the plain form in which every column may be used, or none."""
     rng = np.random.default_rng(seed)
-    uses = iter(rng.random(9) < 0.6)
+    uses = iter(rng.random(10) < 0.6)
     n = int(rng.integers(1, 12))
     goal = FollowCartesianTrajectory.Goal(keep_open=bool(rng.random() < 0.5))
     goal.trajectory.header.frame_id = 'base'
-    times, twists, accelerations, postures, segments, speeds, arcs, via_postures, radii = uses
+    times, twists, accelerations, postures, segments, speeds, arcs, via_postures, radii, free = (
+        uses
+    )
     for i in range(n):
         point = CartesianTrajectoryPoint(pose=any_pose(rng))
         if times:
@@ -63,6 +65,9 @@ def any_goal(seed):
             segment.velocity, segment.acceleration = map(float, rng.random(2))
         if radii:
             segment.blend_radius = float(rng.random())
+        if free:
+            segment.free_axis = int(rng.integers(0, 4))
+            segment.free_min, segment.free_max = map(float, rng.random(2))
         if arcs and segment.type == MotionSegment.CIRCULAR:
             segment.via, segment.arc_mode = any_pose(rng), int(rng.integers(0, 2))
             segment.via_posture = any_posture(rng) if via_postures else CartesianPosture()
@@ -154,6 +159,8 @@ def test_nan_is_no_preference_for_a_joint():
         ({'types': [1]}, r'packed\.types has 1 numbers'),
         ({'types': [1, 9]}, r'packed\.types\[1\] is 9; it must be one of AUTO \(0\)'),
         ({'arc_modes': [2, 0]}, r'packed\.arc_modes\[0\] is 2'),
+        ({'free_axes': [0, 4]}, r'packed\.free_axes\[1\] is 4; it must be one of NONE \(0\)'),
+        ({'free_minima': [0.0]}, r'packed\.free_minima has 1 numbers for 2 points'),
         ({'postures': [1.0, 2.0]}, r'packed\.postures has numbers, but posture_joint_names'),
         (
             {'postures': [1.0], 'posture_joint_names': ['elbow_joint']},

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.goal import Posture
-from ur_cartesian_driver.motion.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal_table import Integers, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.pose_rows import Floats
 
@@ -29,7 +29,7 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
         do not fit, or numbers of types that do not exist.
     """
     names = _joint_names([*points.postures.values(), *segments.via_postures.values()])
-    numbers = np.concatenate((segments.types, segments.arc_modes))
+    numbers = np.concatenate((segments.types, segments.arc_modes, segments.free_axes))
     if points.jerks.any() or names is None or (numbers != numbers.astype(np.uint8)).any():
         return None
     packed: dict[str, Any] = {
@@ -42,18 +42,25 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
     }
     if segments:
         packed |= {
-            'types': array('B', segments.types.astype(np.uint8).tobytes()),
-            'arc_modes': array('B', segments.arc_modes.astype(np.uint8).tobytes()),
+            'types': _bytes(segments.types),
+            'arc_modes': _bytes(segments.arc_modes),
             'blend_radii': _given(segments.blend_radii),
             'dwells': _given(segments.dwells),
             'velocities': _given(segments.velocities),
             'segment_accelerations': _given(segments.accelerations),
             'via_postures': _posture_numbers(segments.via_postures, len(segments), names),
+            'free_axes': _bytes(segments.free_axes) if segments.free_axes.any() else array('B'),
+            'free_minima': _given(segments.free_minima),
+            'free_maxima': _given(segments.free_maxima),
         }
         if segments.has_via.any():
             vias = np.where(segments.has_via[:, None], segments.vias, IDENTITY.row())
             packed['vias'] = _floats(vias)
     return packed
+
+
+def _bytes(values: Integers) -> array[int]:
+    return array('B', values.astype(np.uint8).tobytes())
 
 
 def _floats(values: Floats) -> array[float]:

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     InputKind,
     InputWait,
     IOCommand,
@@ -48,6 +49,11 @@ from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
 _NO_POSTURE = Posture()
+_PACKED_ENUMS: tuple[tuple[str, type[IntEnum]], ...] = (
+    ('types', SegmentType),
+    ('arc_modes', ArcMode),
+    ('free_axes', FreeAxis),
+)
 _SEGMENT_FIELDS = (
     'types',
     'arc_modes',
@@ -57,6 +63,9 @@ _SEGMENT_FIELDS = (
     'segment_accelerations',
     'vias',
     'via_postures',
+    'free_axes',
+    'free_minima',
+    'free_maxima',
 )
 
 
@@ -109,7 +118,7 @@ def rows_of_points(
     if given := field if points else 'segments' if message.segments else '':
         raise InvalidGoal('packed', f'is given beside {given}', 'use one form or the other')
     waypoints, segments = rows_from_message(message.packed)
-    for name, enum in (('types', SegmentType), ('arc_modes', ArcMode)):
+    for name, enum in _PACKED_ENUMS:
         column = getattr(segments, name)
         for i in rows_where(~np.isin(column, list(enum)))[:1]:
             _member(enum, int(column[i]), f'packed.{name}[{i}]')
@@ -181,6 +190,9 @@ def _segment(segment: Message, field: str) -> Segment:
         via=via,
         via_posture=_posture(segment.via_posture),
         arc_mode=_member(ArcMode, segment.arc_mode, f'{field}.arc_mode'),
+        free_axis=_member(FreeAxis, segment.free_axis, f'{field}.free_axis'),
+        free_min=segment.free_min,
+        free_max=segment.free_max,
     )
 
 
@@ -305,6 +317,9 @@ def rows_from_message(packed: Message) -> tuple[WaypointRows, SegmentRows]:
         vias=vias if len(packed.vias) else np.broadcast_to(identity, (n, 7)),
         has_via=has_via | is_arc,
         arc_modes=_column(packed, 'arc_modes', n).astype(np.int64),
+        free_axes=_column(packed, 'free_axes', n).astype(np.int64),
+        free_minima=_column(packed, 'free_minima', n),
+        free_maxima=_column(packed, 'free_maxima', n),
         via_postures=_postures(packed, 'via_postures', n, names),
     )
 

@@ -56,6 +56,9 @@ SEGMENT = {
     'via': POSE,
     'via_posture': POSTURE,
     'arc_mode': UINT8,
+    'free_axis': UINT8,
+    'free_min': 0.0,
+    'free_max': 0.0,
 }
 OUTPUT = {'output': UINT8, 'pin': UINT8, 'value': 0.0, 'analog_domain': UINT8}
 PACKED = {
@@ -73,6 +76,9 @@ PACKED = {
     'segment_accelerations': [0.0],
     'vias': [0.0],
     'via_postures': [0.0],
+    'free_axes': [UINT8],
+    'free_minima': [0.0],
+    'free_maxima': [0.0],
 }
 GOAL: Mapping[str, Any] = {
     'trajectory': {

@@ -116,6 +116,9 @@ def _segments(segments: SegmentRows) -> list[Fields]:
                 'via': None if segment.via is None else _pose(segment.via.row()),
                 'via_posture': _posture(segment.via_posture),
                 'arc_mode': int(segment.arc_mode),
+                'free_axis': int(segment.free_axis),
+                'free_min': segment.free_min,
+                'free_max': segment.free_max,
             }
         )
         for segment in segments

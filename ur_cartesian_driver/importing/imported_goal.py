@@ -87,7 +87,8 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         poses, vias = transform_rows(options.origin, poses), transform_rows(options.origin, vias)
     speeds, accelerations = _speeds(path, options), _accelerations(path, options)
     times = np.nan_to_num(path.times)
-    segments = SegmentRows(
+    segments = replace(
+        SegmentRows.plain(len(path)),
         types=path.types,
         blend_radii=_blends(path, options, speeds, remarks),
         dwells=np.zeros(len(path)),

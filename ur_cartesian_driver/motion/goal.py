@@ -38,6 +38,15 @@ class ArcMode(IntEnum):
     FIXED = 1
 
 
+class FreeAxis(IntEnum):
+    """An axis about which the tool may turn; the numbers of ``MotionSegment.free_axis``."""
+
+    NONE = 0
+    X = 1
+    Y = 2
+    Z = 3
+
+
 class OutputKind(IntEnum):
     """Which output an :class:`IOCommand` switches."""
 
@@ -126,6 +135,11 @@ class Segment:
     via: Pose | None = None
     via_posture: Posture = Posture()
     arc_mode: ArcMode = ArcMode.UNCONSTRAINED
+    #: About which axis the driver may turn the waypoint's pose, from ``free_min`` to ``free_max``
+    #: [rad]; both 0 = anyhow.
+    free_axis: FreeAxis = FreeAxis.NONE
+    free_min: float = 0.0
+    free_max: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.declared_types import with_declared_types
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     Goal,
     Posture,
     Segment,
@@ -214,6 +215,10 @@ class SegmentRows(Rows[Segment]):
     has_via: NDArray[np.bool_]
     #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.ArcMode`
     arc_modes: Integers
+    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.FreeAxis`, and the ranges [rad]
+    free_axes: Integers
+    free_minima: Floats
+    free_maxima: Floats
     #: Postures at the vias that are not empty, by row.
     via_postures: Mapping[int, Posture] = field(default_factory=dict)
 
@@ -241,6 +246,9 @@ class SegmentRows(Rows[Segment]):
             else zeros(len(plain), 7),
             has_via=has_via,
             arc_modes=np.array([segment.arc_mode for segment in plain], dtype=np.int64),
+            free_axes=np.array([segment.free_axis for segment in plain], dtype=np.int64),
+            free_minima=np.array([segment.free_min for segment in plain], dtype=np.float64),
+            free_maxima=np.array([segment.free_max for segment in plain], dtype=np.float64),
             via_postures=_postures([segment.via_posture for segment in plain]),
         )
 
@@ -258,6 +266,9 @@ class SegmentRows(Rows[Segment]):
             vias=zeros(n, 7),
             has_via=np.broadcast_to(np.zeros((), dtype=np.bool_), (n,)),
             arc_modes=number,
+            free_axes=number,
+            free_minima=zero,
+            free_maxima=zero,
         )
 
     def via(self, row: int) -> Pose | None:
@@ -269,7 +280,7 @@ class SegmentRows(Rows[Segment]):
 
     def __iter__(self) -> Iterator[Segment]:
         postures = self.via_postures
-        for i, (kind, radius, dwell, velocity, acceleration, via, mode) in enumerate(
+        for i, (kind, radius, dwell, velocity, acceleration, via, mode, *free) in enumerate(
             zip(
                 self.types.tolist(),
                 self.blend_radii.tolist(),
@@ -278,6 +289,9 @@ class SegmentRows(Rows[Segment]):
                 self.accelerations.tolist(),
                 map(self.via, range(len(self))),
                 self.arc_modes.tolist(),
+                self.free_axes.tolist(),
+                self.free_minima.tolist(),
+                self.free_maxima.tolist(),
                 strict=True,
             )
         ):
@@ -290,6 +304,9 @@ class SegmentRows(Rows[Segment]):
                 via=via,
                 via_posture=postures.get(i, NO_POSTURE),
                 arc_mode=_MODES.get(mode, mode),
+                free_axis=_AXES.get(free[0], free[0]),
+                free_min=free[1],
+                free_max=free[2],
             )
 
 
@@ -330,6 +347,7 @@ def goal_table(goal: Goal) -> GoalTable:
 
 _TYPES: dict[int, Any] = {int(kind): kind for kind in SegmentType}
 _MODES: dict[int, Any] = {int(mode): mode for mode in ArcMode}
+_AXES: dict[int, Any] = {int(axis): axis for axis in FreeAxis}
 
 
 def _plain_objects(
@@ -360,10 +378,13 @@ def _are_plain_points(points: Sequence[Waypoint]) -> bool:
 
 def _are_plain_segments(segments: Sequence[Segment]) -> bool:
     vias = [segment.via for segment in segments if segment.via is not None]
-    numbers = attrgetter('blend_radius', 'dwell', 'velocity', 'acceleration')
+    numbers = attrgetter(
+        'blend_radius', 'dwell', 'velocity', 'acceleration', 'free_min', 'free_max'
+    )
     return (
         _only({SegmentType}, (segment.type for segment in segments))
         and _only({ArcMode}, (segment.arc_mode for segment in segments))
+        and _only({FreeAxis}, (segment.free_axis for segment in segments))
         and _only({float}, chain.from_iterable(map(numbers, segments)))
         and _only({Pose}, vias)
         and _are_floats([via.position for via in vias], 3)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
-from math import nan
+from math import nan, tau
 import os
 from pathlib import Path as FilePath
 from typing import Any, TypeAlias
@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     Goal,
     InputWait,
     OnPathTolerance,
@@ -47,6 +48,7 @@ from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal
 from ur_cartesian_driver.path.path_numbers import (
     amount,
+    any_number,
     NANOSECONDS,
     posture_near,
     six_numbers,
@@ -63,6 +65,7 @@ from ur_cartesian_driver.path.path_points import (
     moved,
     PathPoint,
     PathSettings,
+    POINT_FIELDS,
     SAME_ANGLE,
     SAME_POSITION,
     seen_from,
@@ -93,6 +96,7 @@ _MAX_SPEED = {_TOOL: (5.0, 100.0), _JOINTS: (20.0, 200.0), _FRACTION: (1.0, 1.0)
 _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+_FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
 _BY_NAME = {
     'line': SegmentType.LINEAR,
     'joint': SegmentType.JOINT,
@@ -212,7 +216,7 @@ class Path:
         :raises InvalidGoal: a value is negative, or looks like millimetres or degrees.
         """
         where = f'at() after {len(self)} points'
-        given = {
+        given: dict[str, Any] = {
             name: number
             for name, value, bound, hint in (
                 ('speed', speed, _MAX_SPEED[_TOOL][0], 'm/s'),
@@ -229,6 +233,40 @@ class Path:
         if start is not None and not self._points and 'blend' in given:  # for the way back
             segment = replace(start.segment, blend_radius=given['blend'])
             start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
+        return self._with(_feed=replace(self._feed, **given), _start=start)
+
+    def free(self, axis: str | None, low: float | None = None, high: float | None = None) -> Path:
+        """
+        Let the tool turn about an axis of its own at the points that follow; the driver chooses.
+
+        :param axis: ``x``, ``y`` or ``z``; None ends it.
+        :param low: the least rotation from the orientation of each point [rad], with ``high``;
+            without both any will do.
+        :raises InvalidGoal: there is no such axis, or the range is none.
+        """
+        where = f'free() after {len(self)} points'
+        if axis is not None and axis not in _FREE_AXES:
+            raise InvalidGoal(where, f'has the axis {axis!r:.60}', 'use x, y, z or None')
+        if (low is None) != (high is None) or (axis is None and low is not None):
+            raise InvalidGoal(where, 'has half a range, or one of no axis', 'give both, or none')
+        least = 0.0 if low is None else any_number(where, 'low', low)
+        greatest = 0.0 if high is None else any_number(where, 'high', high)
+        if low is not None and not (
+            -tau <= least <= greatest <= tau and 0.0 < greatest - least <= tau
+        ):
+            raise InvalidGoal(
+                where,
+                f'has the range {least:g} to {greatest:g} rad',
+                'give it in radians, of at most a full turn; deg() converts',
+            )
+        given: dict[str, Any] = {
+            'free_axis': FreeAxis.NONE if axis is None else _FREE_AXES[axis],
+            'free_min': least,
+            'free_max': greatest,
+        }
+        start = self._start
+        if start is not None and not self._points:  # for the way back
+            start = replace(start, segment=replace(start.segment, **given))
         return self._with(_feed=replace(self._feed, **given), _start=start)
 
     # ---- motions -------------------------------------------------------------------------------
@@ -330,6 +368,12 @@ class Path:
             raise InvalidGoal(
                 where, 'has an orientation, but the arc turns the tool', 'give the position only'
             )
+        if follow and self._feed.free_axis:
+            raise InvalidGoal(
+                where,
+                'turns the tool with the arc, but its axis is free',
+                'write free(None) first',
+            )
         pose = self._pose(where, place, orientation, 'end')
         T_via = self._pose(where, via, pose.quaternion, 'via')
         if self.end is not None:
@@ -386,7 +430,10 @@ class Path:
             posture=posture_near(f'{where}: posture', posture),
         )
         point = PathPoint(
-            waypoint=waypoint, duration=self._nanoseconds(where, duration), in_spline=True
+            waypoint=waypoint,
+            segment=Segment(**self._feed.free),
+            duration=self._nanoseconds(where, duration),
+            in_spline=True,
         )
         settings = self._settings
         if settings.execution is ExecutionMode.AUTO:
@@ -700,8 +747,7 @@ class Path:
                 waypoint=backwards(place.waypoint),
                 segment=replace(
                     motion.segment,
-                    blend_radius=place.segment.blend_radius,
-                    dwell=place.segment.dwell,
+                    **{name: getattr(place.segment, name) for name in POINT_FIELDS},
                 ),
                 feed_blend=place.feed_blend,
                 auto_blend=place.auto_blend,
@@ -711,7 +757,7 @@ class Path:
         end = places[-1]
         start = PathPoint(
             waypoint=backwards(end.waypoint),
-            segment=Segment(blend_radius=end.segment.blend_radius, dwell=end.segment.dwell),
+            segment=Segment(**{name: getattr(end.segment, name) for name in POINT_FIELDS}),
             feed_blend=end.feed_blend,
             auto_blend=end.auto_blend,
         )
@@ -930,6 +976,7 @@ class Path:
                 blend_radius=blend or 0.0,
                 velocity=velocity,
                 acceleration=acceleration,
+                **self._feed.free,
                 **(arc_fields or {}),
             ),
             duration=duration,

@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    FreeAxis,
     InputWait,
     IOCommand,
     OnPathTolerance,
@@ -25,6 +27,9 @@ from ur_cartesian_driver.motion.vectors import add, Vector6, vector6, ZERO6
 
 #: Poses that are nearer are the same [m], [rad].
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
+#: What belongs to the point at which a segment ends, not to the motion.
+FREE_FIELDS = ('free_axis', 'free_min', 'free_max')
+POINT_FIELDS = ('blend_radius', 'dwell', *FREE_FIELDS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +44,15 @@ class Feed:
     joint_acceleration: float = 0.0
     turn_speed: float = 0.0
     turn_acceleration: float = 0.0
+    #: As in a segment.
+    free_axis: FreeAxis = FreeAxis.NONE
+    free_min: float = 0.0
+    free_max: float = 0.0
+
+    @property
+    def free(self) -> dict[str, Any]:
+        """The fields of a segment that let its point turn."""
+        return {name: getattr(self, name) for name in FREE_FIELDS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,12 +26,13 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
     InvalidGoal,
     InvalidPosture,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, SegmentType
-from ur_cartesian_driver.motion.goal_table import NO_POSTURE, rows_where
+from ur_cartesian_driver.motion.goal_table import GoalTable, NO_POSTURE, rows_where
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
@@ -52,6 +53,8 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.planning.free_axis.free_rotations import as_named, choose_rotations
+from ur_cartesian_driver.planning.free_axis.rotation_lattice import NoRotation
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
 from ur_cartesian_driver.planning.min_speed import (
     check_min_speed,
@@ -145,11 +148,49 @@ def plan(
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
     table = check(goal, options)
+    if table.segments.free_axes.any():
+        return _plan_free(table, state, arm, options)
+    return _plan_fixed(table, state, arm, options, running)
+
+
+def _plan_fixed(
+    table: GoalTable,
+    state: RobotState,
+    arm: Arm,
+    options: PlanningOptions,
+    running: PlannedSegment | None = None,
+) -> Plan:
+    """Return the plan of a checked goal without a free axis."""
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
     retargeted = retarget_to_tcp(table, at_set_point(state, arm), options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
     plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
     return plan_goal(planner)
+
+
+def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
+    """
+    Return the plan of a checked goal whose rotations about its free axis are to be chosen.
+
+    Where no choice passes, the orientations that the goal names may.
+    """
+    refusal: GoalRefused | None = None
+    try:
+        chosen = choose_rotations(table, at_set_point(state, arm), arm, options)
+        plan = _plan_fixed(chosen.goal, state, arm, options)
+        return replace(plan, remarks=(*chosen.remarks, *plan.remarks))
+    except NoRotation:
+        found = 'no rotation about the free axis was found that leads along the whole path'
+    except GoalRefused as error:
+        refusal, found = error, 'no better rotation about the free axis was found'
+    try:
+        plan = _plan_fixed(as_named(table), state, arm, options)
+    except GoalRefused as error:
+        first = refusal or error
+        raise first.reworded(f'{str(first).rstrip(".")} ({found}).') from None
+    return replace(
+        plan, remarks=(f'free axis: rotations as given, because {found}', *plan.remarks)
+    )
 
 
 def plan_moves(planner: GoalPlanner) -> Plan:

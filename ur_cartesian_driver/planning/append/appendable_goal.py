@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.goal_table import (
     goal_table,
     rows_where,
@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
 from ur_cartesian_driver.planning.request.stops import refuse_dwells_of_open_goals
@@ -113,6 +114,8 @@ def check_appended_points(
         if_too_many='append them in several requests',
     )
     refuse_dwells_of_open_goals(appended.segments, keep_open=True, first=first)
+    for i in rows_where(SegmentRows.of(appended.segments).free_axes != FreeAxis.NONE)[:1]:
+        raise keep_open_error(i + first)
     for i, command in enumerate(appended.io_commands):
         if not first <= command.waypoint < first + count:
             raise InvalidGoal(

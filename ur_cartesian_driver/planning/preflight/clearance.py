@@ -87,6 +87,17 @@ class Clearance:
         if planes := parse_planes(options.workspace_planes):
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
 
+    def too_close(self, q: Floats) -> Flags:
+        """Tell which configurations (n, 6) [rad] are too close, wherever the arm starts."""
+        close = np.zeros(len(q), dtype=np.bool_)
+        for checker in self._checkers:
+            exact = np.zeros(len(checker.bounds), dtype=np.bool_)
+            for begin in range(0, len(q), _BLOCK):
+                rows = slice(begin, begin + _BLOCK)
+                _, distances = checker.measure(q[rows], exact)
+                close[rows] |= (distances < checker.bounds).any(axis=1)
+        return close
+
     def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
         """
         Return the first row that is too close, and the smallest distance.

@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
     DEFAULT_STALL_TIMEOUT,
+    FreeAxis,
     SegmentType,
     Waypoint,
 )
@@ -38,10 +39,12 @@ def check_enums(goal: GoalTable, options: PlanningOptions) -> None:
     _check_enum('execution', goal.execution, ExecutionMode)
     segments = goal.segments
     known = np.isin(segments.types, list(SegmentType)) & np.isin(segments.arc_modes, list(ArcMode))
+    known &= np.isin(segments.free_axes, list(FreeAxis))
     for i in rows_where(~known):
         segment = segments[i]
         _check_enum(segment_field(i, 'type'), segment.type, SegmentType)
         _check_enum(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
+        _check_enum(segment_field(i, 'free_axis'), segment.free_axis, FreeAxis)
 
 
 def check_frame_numbers(goal: GoalTable, options: PlanningOptions) -> None:
@@ -79,6 +82,7 @@ def check_segment_numbers(goal: GoalTable, options: PlanningOptions) -> None:
     )
     vias = segments.vias
     fine = (np.isfinite(numbers) & (numbers >= 0.0)).all(axis=0)
+    fine &= np.isfinite(segments.free_minima) & np.isfinite(segments.free_maxima)
     fine &= ~segments.has_via | (np.isfinite(vias).all(axis=1) & _are_units(vias[:, 3:]))
     for i in rows_where(~fine):
         segment = segments[i]
@@ -89,6 +93,8 @@ def check_segment_numbers(goal: GoalTable, options: PlanningOptions) -> None:
                 raise InvalidGoal(
                     segment_field(i, field), f'is {value:g}; it must not be negative'
                 )
+        for field in ('free_min', 'free_max'):
+            check_finite(segment_field(i, field), (getattr(segment, field),))
         if segment.via is not None:
             check_finite(segment_field(i, 'via.position'), segment.via.position)
             check_finite(segment_field(i, 'via.orientation'), segment.via.quaternion)

@@ -43,6 +43,7 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
+from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_optimized,
     is_spline,
@@ -274,6 +275,7 @@ RULES: tuple[Rule, ...] = (
     _times,
     check_spline,
     _segment_rules,
+    check_free_axes,
     _postures,
     check_blends,
     check_stops,

@@ -1,0 +1,467 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Choose the rotations of a goal whose tool may turn about an axis of its own.
+
+The result is the goal with the chosen orientations and without a free axis; it is planned and
+checked like any other. So what is searched here only has to be good, not exact: the search knows
+the nominal arm, samples of the path, and no blends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import degrees, inf, nan, pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.goal import ArcMode, FreeAxis, Posture, SegmentType
+from ur_cartesian_driver.motion.goal_table import GoalTable, SegmentRows
+from ur_cartesian_driver.motion.pose import (
+    IDENTITY,
+    multiply,
+    normalize,
+    pose_from_row,
+    Quaternion,
+    rotate,
+)
+from ur_cartesian_driver.motion.pose_rows import (
+    angle_rows,
+    conjugate_rows,
+    cross_rows,
+    distance_rows,
+    Floats,
+    interpolate_rows,
+    multiply_rows,
+    normalized_rows,
+    transform_rows,
+)
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import cross, dot, Vector3, vector6
+from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
+    Layer,
+    MAX_AXIS_DEVIATION,
+    RotationLattice,
+    RotationPath,
+    RotationSamples,
+)
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import Clearance
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import named_joints
+from ur_cartesian_driver.planning.request.controlled_frame import SAME_TCP
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_spline,
+    is_timed,
+    OPTIMIZED_TYPES,
+)
+
+#: Samples on a segment: one for so much length [m] and tilt of the axis [rad], to a limit.
+_SAMPLE_LENGTH = 0.02
+_SAMPLE_TILT = pi / 18.0
+_MAX_SAMPLES = 32
+#: Where all rotations are allowed they are chosen this far apart; evenly in between.
+_KNOT_LENGTH = 0.01
+_KNOT_TILT = pi / 36.0
+#: Length [m] that counts as much as a radian in the size of a path.
+_LENGTH_PER_RADIAN = 0.05
+#: Searches, each without the collisions that the ones before found.
+_MAX_SEARCHES = 8
+#: What a rotation costs with less than so much clearance more than it must have [m].
+_NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
+#: Passes of smoothing, and how far they may move a rotation [rad].
+_SMOOTHING_PASSES = 40
+_MAX_SMOOTHING = pi / 120.0
+
+#: How far a rotation may change for each sample of a segment [rad].
+_MAX_CHANGE_PER_SAMPLE = pi / 6.0
+
+_AXES: dict[int, Vector3] = {
+    FreeAxis.X: (1.0, 0.0, 0.0),
+    FreeAxis.Y: (0.0, 1.0, 0.0),
+    FreeAxis.Z: (0.0, 0.0, 1.0),
+}
+_JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+Flags = NDArray[np.bool_]
+
+
+def as_named(goal: GoalTable) -> GoalTable:
+    """Return a goal in the orientations that it names, or the nearest allowed; no axis is free."""
+    segments = goal.segments
+    return _turned(goal, np.clip(0.0, segments.free_minima, segments.free_maxima))
+
+
+def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
+    """Return a goal with its poses turned about the free axis (n,) [rad], and no free axis."""
+    points, segments = goal.waypoints, goal.segments
+    free, plain = segments.free_axes != FreeAxis.NONE, SegmentRows.plain(len(segments))
+    half = 0.5 * turns[free, None]
+    axes = np.array([_AXES[axis] for axis in segments.free_axes[free].tolist()])
+    poses = points.poses.copy()
+    poses[free, 3:] = normalized_rows(
+        multiply_rows(poses[free, 3:], np.concatenate([np.sin(half) * axes, np.cos(half)], axis=1))
+    )
+    points = replace(points, poses=poses)
+    if is_spline(goal):  # the rates of the rotation are chosen with it
+        rates = {}
+        for name in ('twists', 'accelerations'):
+            rows = getattr(points, name).copy()
+            rows[(turns != 0.0) & rows.any(axis=1), 3:] = nan
+            rates[name] = rows
+        points = replace(points, **rates)
+    segments = replace(
+        segments,
+        free_axes=plain.free_axes,
+        free_minima=plain.free_minima,
+        free_maxima=plain.free_maxima,
+    )
+    return replace(goal, waypoints=points, segments=segments)
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenGoal:
+    """A goal without a free axis, and what its report says about the choice."""
+
+    goal: GoalTable
+    remarks: tuple[str, ...] = ()
+
+
+def choose_rotations(
+    goal: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions
+) -> ChosenGoal:
+    """
+    Return a checked goal with its rotations about the free axis chosen.
+
+    :param state: where the arm is at the start.
+    :raises NoRotation: none leads along the path.
+    """
+    path = _FreePath(goal, state, options)
+    if not path.is_open.any():  # every range is a single rotation
+        return ChosenGoal(as_named(goal))
+    if not path.can_turn:
+        return ChosenGoal(
+            as_named(goal),
+            (
+                f'free axis {path.name}: rotations as given, because a frame other than the '
+                'active TCP must not turn (allow_tcp_change is false)',
+            ),
+        )
+    lattice = path.lattice(arm)
+    found = _search_without_collisions(lattice, path)
+    turns = path.turns(lattice.layers, found)
+    chosen = _turned(goal, turns)
+    return ChosenGoal(
+        path.with_postures(chosen, lattice.layers, found), (path.remark(chosen, turns),)
+    )
+
+
+def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
+    """Return the best way on which nothing collides; the best one found, if all do."""
+    least = path.options.min_clearance
+
+    def too_close(q: Floats, more: float) -> Flags:
+        options = replace(path.options, min_clearance=least + more)
+        checks = (Clearance(lattice.arm, T_flange_tip, options) for T_flange_tip in path.tool_tips)
+        close: Flags = np.any([check.too_close(q) for check in checks], axis=0)
+        return close
+
+    known: set[tuple[int, int]] = set()
+    for _ in range(_MAX_SEARCHES):
+        found = lattice.search()
+        close = np.flatnonzero(too_close(lattice.joints_along(found), max(_NEARNESS)))
+        branches = lattice.sample_branches(found)[close]
+        new = {*zip(close.tolist(), branches.tolist(), strict=True)} - known
+        if not new:
+            break
+        known |= new
+        for sample, branch in new:
+            around = lattice.coarse_joints(sample, branch)
+            costs = sum(cost * too_close(around, more) for more, cost in _NEARNESS.items())
+            lattice.charge(sample, branch, np.asarray(costs, dtype=np.float64))
+    return found
+
+
+class _FreePath:
+    """The path of a goal with a free axis, in base."""
+
+    def __init__(self, goal: GoalTable, state: RobotState, options: PlanningOptions) -> None:
+        self.goal, self.options = goal, options
+        T_flange_controlled = goal.T_flange_controlled or state.T_flange_tcp
+        T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
+        segments = goal.segments
+        free = segments.free_axes != FreeAxis.NONE
+        first = int(np.argmax(free))
+        #: Whether the controlled frame is or becomes the TCP, which alone can turn on a line.
+        self.can_turn = options.allow_tcp_change or (
+            T_tcp_controlled.distance_to(IDENTITY) <= SAME_TCP
+            and T_tcp_controlled.angle_to(IDENTITY) <= SAME_TCP
+        )
+        self.tool_tips = {state.T_flange_tcp, T_flange_controlled}
+        self.T_controlled_flange = T_flange_controlled.inverse()
+        self.q_start = state.actual_q
+        self.name = FreeAxis(int(segments.free_axes[first])).name.lower()
+        self.axis = _AXES[int(segments.free_axes[first])]
+        self.free = free
+        self.is_joint = np.isin(segments.types, _JOINT_TYPES)
+        self.low, self.high = segments.free_minima, segments.free_maxima
+        self.is_any = free & (self.low == 0.0) & (self.high == 0.0)
+        #: (n,) which rotations are a choice.
+        self.is_open = free & (self.is_any | (self.high > self.low))
+        poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
+        self.start = state.actual_tcp_pose @ T_tcp_controlled
+        self.poses = self._with_arc_ends(poses)
+        self.references, self.rotations = self._references()
+        if is_timed(goal) and goal.waypoints.times[0] == 0.0 and free[0]:
+            # The arm is there already: as it stands, if it may.
+            turn = _wrapped(-self.rotations[:1], 0.5 * (self.low + self.high)[:1])
+            may = self.is_any[0] or self.low[0] <= turn[0] <= self.high[0]
+            self.low, self.high = self.low.copy(), self.high.copy()
+            self.low[0] = self.high[0] = turn[0] if may else 0.0
+            self.is_any[0] = self.is_open[0] = False
+
+    def _with_arc_ends(self, poses: Floats) -> Floats:
+        """Return the poses in which arcs that follow their tangent arrive."""
+        self.arcs: dict[int, ArcCurve] = {}
+        segments = self.goal.segments
+        for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
+            before = pose_from_row(poses[row - 1]) if row else self.start
+            via = segments.via(row)
+            assert via is not None
+            mode = ArcMode(int(segments.arc_modes[row]))
+            try:
+                arc = ArcCurve.through(
+                    before,
+                    (self.goal.T_base_frame @ via).position,
+                    pose_from_row(poses[row]),
+                    mode,
+                )
+            except ValueError:  # the planner refuses it
+                continue
+            self.arcs[row] = arc
+            if mode is ArcMode.FIXED:
+                poses[row] = arc.end.row()
+        return poses
+
+    def _references(self) -> tuple[Floats, Floats]:
+        """
+        Return the reference orientations (n, 4), and the rotations (n,) of the poses from them.
+
+        A reference is the one before, turned the shortest way to where the axis points.
+        """
+        references = np.empty((len(self.poses), 4))
+        reference, axis = self.start.quaternion, rotate(self.start.quaternion, self.axis)
+        for row, (x, y, z, w) in enumerate(self.poses[:, 3:].tolist()):
+            axis_there = rotate((x, y, z, w), self.axis)
+            reference = multiply(_shortest_turn(axis, axis_there), reference)
+            references[row], axis = reference, axis_there
+        references = normalized_rows(references)
+        turn = multiply_rows(conjugate_rows(references), self.poses[:, 3:])
+        rotations = 2.0 * np.arctan2(turn[:, :3] @ np.array(self.axis), turn[:, 3])
+        return references, rotations - tau * np.rint(rotations / tau)
+
+    # -- the lattice -----------------------------------------------------------------------------
+
+    def lattice(self, arm: Arm) -> RotationLattice:
+        """Return the lattice of the path, with a layer for each of its ``knots``."""
+        before = np.concatenate([[self.start.row()], self.poses[:-1]])
+        lengths = distance_rows(before, self.poses)
+        for arc_row, arc in self.arcs.items():
+            lengths[arc_row] = arc.length
+        references = np.concatenate([[self.start.quaternion], self.references])
+        tilts = angle_rows(references[:-1], references[1:])
+        self.sizes = lengths / _LENGTH_PER_RADIAN + tilts
+        self.knots = self._knots(lengths, tilts)
+        counts = np.ceil(np.maximum(lengths / _SAMPLE_LENGTH, tilts / _SAMPLE_TILT))
+        counts = np.where(self.is_joint, 1, np.clip(counts, 1, _MAX_SAMPLES)).astype(np.intp)
+        row = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(1, len(row) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
+        u = number / counts[row]
+        ends = np.concatenate([self.poses[:, :3], self.references], axis=1)
+        begins = np.concatenate([[self.start.row()], ends[:-1]])
+        poses = interpolate_rows(begins[row], ends[row], u)
+        for arc_row, arc in self.arcs.items():
+            here = slice(*np.searchsorted(row, (arc_row, arc_row + 1)).tolist())
+            poses[here, :3] = arc.rows(u[here])[:, :3]
+        layer = np.searchsorted(self.knots, row)
+        sizes = self.sizes[row] / counts[row]
+        behind = np.cumsum(sizes)
+        layer_ends = np.searchsorted(layer, np.arange(len(self.knots)), side='right')
+        at_ends = np.concatenate([[0.0], behind[layer_ends - 1]])
+        whole = np.maximum(np.diff(at_ends), 1e-12)
+        samples = RotationSamples(
+            poses=poses,
+            fractions=np.minimum(1.0, (behind - at_ends[layer]) / whole[layer]),
+            sizes=np.maximum(sizes, 1e-6),
+            times=self._times(lengths)[row] / counts[row],
+        )
+        return RotationLattice(
+            arm=arm,
+            axis=self.axis,
+            T_controlled_flange=self.T_controlled_flange,
+            samples=samples,
+            layers=self._layers(layer_ends, whole, tilts),
+            q_start=self.q_start,
+            options=self.options,
+        )
+
+    def _knots(self, lengths: Floats, tilts: Floats) -> NDArray[np.intp]:
+        """Return the rows whose rotations are searched; those between them follow evenly."""
+        extent = np.maximum(lengths / _KNOT_LENGTH, tilts / _KNOT_TILT)
+        full = np.diff(np.floor(np.cumsum(np.minimum(extent, 1.0))), prepend=0.0) > 0.0
+        after_any = np.append(self.is_any[1:] & ~self.is_joint[1:], False)
+        return np.flatnonzero(full | ~self.is_any | ~after_any | self.is_joint)
+
+    def _layers(self, ends: NDArray[np.intp], whole: Floats, tilts: Floats) -> list[Layer]:
+        postures = self.goal.waypoints.postures
+        # The commanded change of the rotation must be possible where it is not free.
+        commanded = np.abs(np.diff(self.rotations, prepend=0.0))
+        bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
+        tilted = tilts * self.sizes  # how far the axis leaves its way is tilt x turn / 8
+        layers: list[Layer] = []
+        begin = first = 0
+        for number, (end, row) in enumerate(zip(ends.tolist(), self.knots.tolist(), strict=True)):
+            change = inf
+            if first:  # the arm comes to the first point as it stands
+                share = float(tilted[first : row + 1].max()) / whole[number]
+                change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
+            change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE)
+            if bound[row]:
+                change = max(change, float(commanded[row]) + _MAX_CHANGE_PER_SAMPLE)
+            posture = postures.get(row)
+            named = named_joints(posture, self.options.tf_prefix) if posture else {}
+            fixed = not self.is_open[row]
+            low = high = float(self.rotations[row]) + (
+                float(self.low[row]) if self.free[row] else 0.0
+            )
+            if not fixed:
+                low, high = (
+                    (-inf, inf)
+                    if self.is_any[row]
+                    else (low, float(self.rotations[row] + self.high[row]))
+                )
+            layers.append(
+                Layer(
+                    begin=begin,
+                    end=end,
+                    low=low,
+                    high=high,
+                    is_joint=bool(self.is_joint[row]),
+                    is_nearest=fixed and not named,
+                    max_change=change,
+                    posture=vector6(named.get(k, nan) for k in range(6)) if named else None,
+                )
+            )
+            begin, first = end, row + 1
+        return layers
+
+    def _times(self, lengths: Floats) -> Floats:
+        """Return how long each segment takes (n,) [s], inf where that is not known."""
+        goal, segments = self.goal, self.goal.segments
+        if is_timed(goal):
+            return np.where(self.is_joint, inf, np.diff(goal.waypoints.times, prepend=0.0))
+        speeds = np.where(
+            segments.velocities > 0.0, segments.velocities, self.options.linear_velocity
+        )
+        known = ~self.is_joint & ~np.isin(segments.types, OPTIMIZED_TYPES) & (lengths > 0.0)
+        return np.where(known, lengths / speeds, inf)
+
+    # -- the choice ------------------------------------------------------------------------------
+
+    def turns(self, layers: Sequence[Layer], found: RotationPath) -> Floats:
+        """Return how far each pose is turned (n,) [rad]: smoothed, and within its range."""
+        chosen = self._smoothed(layers, found.rotations)
+        at = np.cumsum(self.sizes)
+        at_knots = at[self.knots]
+        rotations = np.interp(at, np.append(0.0, at_knots), np.append(0.0, chosen))
+        rotations[self.knots] = chosen
+        turns = rotations - self.rotations
+        middle = 0.5 * (self.low + self.high)
+        turns = _wrapped(turns, middle)
+        turns = np.where(self.is_any, turns, np.clip(turns, self.low, self.high))
+        return np.where(self.free, turns, 0.0)
+
+    def _smoothed(self, layers: Sequence[Layer], rotations: Floats) -> Floats:
+        """Return rotations (layers,) without the steps of the search."""
+        low, high = rotations - _MAX_SMOOTHING, rotations + _MAX_SMOOTHING
+        for number, layer in enumerate(layers):
+            if not layer.is_any:
+                turns = layer.turns(rotations[number])
+                low[number] = max(low[number], layer.low + turns)
+                high[number] = min(high[number], layer.high + turns)
+        place = np.cumsum(self.sizes)[self.knots]
+        before, after = np.diff(place)[:-1], np.diff(place)[1:]
+        joint = np.array([layer.is_joint for layer in layers])
+        inner = ~(joint[1:-1] | joint[2:])
+        part = before / np.maximum(before + after, 1e-12)
+        smooth = rotations.copy()
+        for _ in range(_SMOOTHING_PASSES):
+            middle = smooth[:-2] + part * (smooth[2:] - smooth[:-2])
+            smooth[1:-1] = np.where(inner, 0.5 * (smooth[1:-1] + middle), smooth[1:-1])
+            smooth = np.clip(smooth, low, high)
+        return smooth
+
+    def with_postures(
+        self, goal: GoalTable, layers: Sequence[Layer], found: RotationPath
+    ) -> GoalTable:
+        """Return the goal with the configurations in which joint moves to free points end."""
+        names = tuple(self.options.tf_prefix + name for name in JOINT_NAMES)
+        postures = dict(goal.waypoints.postures)
+        for number, row in enumerate(self.knots.tolist()):
+            if layers[number].is_joint and self.is_open[row] and row not in postures:
+                values = vector6(found.joints[number].tolist())
+                postures[row] = Posture(names=names, values=values)
+        return replace(goal, waypoints=replace(goal.waypoints, postures=postures))
+
+    def remark(self, goal: GoalTable, turns: Floats) -> str:
+        """Return what the report says about the choice."""
+        rows = np.flatnonzero(self.is_open)
+        points = f'points {rows[0]} to {rows[-1]}' if len(rows) > 1 else f'point {rows[0]}'
+        low, high = degrees(turns[rows].min()), degrees(turns[rows].max())
+        text = (
+            f'free axis {self.name}: {points} turned by {low:.1f} to {high:.1f} degrees about it'
+        )
+        deviation = degrees(self._axis_deviation(goal))
+        if deviation < 0.05:
+            return text
+        return f'{text}; between points the axis leaves its way by up to {deviation:.1f} degrees'
+
+    def _axis_deviation(self, goal: GoalTable) -> float:
+        """Return how far the axis is from the shortest way between points, at most [rad]."""
+        poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
+        counts = self.free[1:] & ~self.is_joint[1:]
+        if not counts.any():
+            return 0.0
+        half = np.full(len(poses) - 1, 0.5)
+        turned = interpolate_rows(poses[:-1], poses[1:], half)
+        ends = np.concatenate([poses[:, :3], self.references], axis=1)
+        straight = interpolate_rows(ends[:-1], ends[1:], half)
+        a, b = (_rotated(rows[counts, 3:], self.axis) for rows in (turned, straight))
+        across = np.linalg.norm(cross_rows(a, b), axis=1)
+        return float(np.arctan2(across, np.einsum('ij,ij->i', a, b)).max())
+
+
+def _wrapped(angles: Floats, middle: Floats) -> Floats:
+    """Return angles within half a turn of others."""
+    return angles - tau * np.rint((angles - middle) / tau)
+
+
+def _rotated(quaternions: Floats, axis: Vector3) -> Floats:
+    """Return an axis in the orientations (n, 4)."""
+    u, w = quaternions[:, :3], quaternions[:, 3:]
+    v = np.broadcast_to(np.array(axis), u.shape)
+    t = 2.0 * cross_rows(u, v)
+    rotated: Floats = v + w * t + cross_rows(u, t)
+    return rotated
+
+
+def _shortest_turn(a: Vector3, b: Vector3) -> Quaternion:
+    """Return the rotation that turns one unit vector into another the shortest way."""
+    w = 1.0 + dot(a, b)
+    if w < 1e-9:  # opposite: about any axis across
+        side = cross(a, (1.0, 0.0, 0.0) if abs(a[0]) < 0.7 else (0.0, 1.0, 0.0))
+        return normalize((*side, 0.0))
+    return normalize((*cross(a, b), w))

@@ -1,0 +1,486 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Search the rotation about a free axis along a path: a lattice, and dynamic programming over it.
+
+A *layer* is a place at which the rotation can be chosen, and its *nodes* are rotations. An *edge*
+joins nodes of two layers; along it the rotation changes evenly, as on a line of the robot, and the
+arm is solved on the *samples* in between. Each branch has a closed form, so all rotations of all
+samples are solved at once into a table, and edges look them up. Each node keeps the joints of the
+best way to it, so that full turns are counted and joint limits hold for the way taken.
+
+The search is first coarse, over all rotations, then finer and finer around the best way.
+
+Rotations are angles [rad] about the axis from the reference orientation, which goes along the path
+without turning about it. They are not wrapped: a rotation and the same after a full turn are two
+nodes, because the joints tell them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf, pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.closed_form_rows import branch_rows, BRANCHES, TargetPoses
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats, multiply_rows
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    singularity_distance_rows,
+    SINGULARITY_MEASURES,
+)
+
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: Rotations of a full turn in the coarse search, and its step [rad]. The finer searches try so
+#: many rotations beside the best one, each with half the step before.
+TURN_COUNT = 72
+COARSE_STEP = tau / TURN_COUNT
+_FINE_STEPS = tuple(0.5**k * COARSE_STEP for k in range(1, 6))
+_FINE_REACH = 2
+#: Full turns before and behind the first one in which a rotation may lie.
+_COPIES = (-1, 0, 1)
+#: How far the rotation may change from layer to layer [rad]: below half a turn, whose direction is
+#: ambiguous.
+_MAX_CHANGE = 0.95 * pi
+#: A joint that turns farther between two samples jumps [rad].
+_MAX_JOINT_STEP = 1.0
+#: How far the axis may leave the shortest way between two points, because the tool turns and tilts
+#: at once [rad].
+MAX_AXIS_DEVIATION = pi / 180.0
+
+#: The cost of an edge: the turns of all joints [rad]; a quadratic part, which spreads turns;
+_EVENNESS = 2.0
+#: nearness to limits and singularities, for each unit of the path, from this margin on, which is a
+#: part of its scale;
+_WIDE_MARGIN = 0.6
+_NEARNESS = 1.0
+#: where the planner would refuse: too near to a singularity; too fast for a joint [1/rad]; off the
+#: posture of a point [1/rad].
+_REFUSED = 50.0
+_TOO_FAST = 50.0
+_OFF_POSTURE = 20.0
+#: Sources of a joint move: so many of the best.
+_JOINT_SOURCES = 24
+_SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """A place at which the rotation can be chosen, and the samples of the path to it."""
+
+    #: Slice of the samples; the last one is the place itself.
+    begin: int
+    end: int
+    #: Allowed rotations [rad]: any, or from ``low`` to ``high`` and the same in other full turns.
+    low: float = -inf
+    high: float = inf
+    #: Whether a joint move leads there, which may change branch and turns; to the nearest solution
+    #: where the rotation is fixed and there is no posture.
+    is_joint: bool = False
+    is_nearest: bool = False
+    #: Largest change of the rotation from the layer before [rad].
+    max_change: float = _MAX_CHANGE
+    #: Joint positions [rad] to be near to, NaN where none is asked for.
+    posture: Joints | None = None
+
+    def turns(self, rotation: float) -> float:
+        """Return the full turns [rad] between the range and the same around a rotation."""
+        return tau * round((rotation - 0.5 * (self.low + self.high)) / tau)
+
+    @property
+    def is_any(self) -> bool:
+        """Whether all rotations are allowed."""
+        return self.low == -inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RotationSamples:
+    """The samples of a path; columns (n,)."""
+
+    #: (n, 7) the reference pose of the controlled frame in base.
+    poses: Floats
+    #: Which part of the way from layer to layer is behind, (0, 1].
+    fractions: Floats
+    #: The length of the path from the sample before, in units of 5 cm or a radian, and the time
+    #: that it takes [s], inf where it is not known.
+    sizes: Floats
+    times: Floats
+
+    def __len__(self) -> int:
+        return len(self.fractions)
+
+
+@dataclass(slots=True)
+class RotationPath:
+    """The rotation at each layer, and the arm there."""
+
+    #: (layers,) [rad].
+    rotations: Floats
+    #: (layers,) number of the branch; (layers, 6) joint positions [rad].
+    branches: Ints
+    joints: Floats
+
+
+class NoRotation(Exception):
+    """There is no way through the lattice; ``layer`` is the first that cannot be reached."""
+
+    def __init__(self, layer: int) -> None:
+        super().__init__(layer)
+        self.layer = layer
+
+
+@dataclass(slots=True)
+class _Tables:
+    """The arm on each sample: (n, branches, rotations, ...)."""
+
+    #: First rotation of each sample (n,) [rad], their step, and whether they go all the way round.
+    first: Floats
+    step: float
+    is_round: bool
+    #: [rad], and the cost of being there: inf where there is no solution.
+    q: Floats
+    cost: Floats
+
+    def look_up(self, sample: int, rotations: Floats) -> Ints:
+        """Return the numbers of the nearest rotations."""
+        index: Ints = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
+        count = self.q.shape[2]
+        return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
+
+
+@dataclass(slots=True)
+class RotationLattice:
+    """
+    The lattice of one path.
+
+    :param axis: unit vector of the free axis in the controlled frame.
+    :param T_controlled_flange: the flange in the controlled frame.
+    """
+
+    arm: Arm
+    axis: tuple[float, float, float]
+    T_controlled_flange: Pose
+    samples: RotationSamples
+    layers: Sequence[Layer]
+    q_start: Joints
+    options: PlanningOptions
+    #: By sample: what coarse rotations cost more (8, 72).
+    _charges: dict[int, Floats] = field(default_factory=dict)
+    _coarse: _Tables | None = None
+
+    def search(self) -> RotationPath:
+        """
+        Return the best way through the lattice.
+
+        :raises NoRotation: there is none.
+        """
+        if self._coarse is None:
+            branches = range(8) if any(layer.is_joint for layer in self.layers) else (self._start,)
+            self._coarse = self._tables(
+                np.zeros(len(self.samples)), COARSE_STEP, TURN_COUNT, tuple(branches)
+            )
+        tables = self._coarse
+        nodes = [self._coarse_nodes(layer) for layer in self.layers]
+        found = self._best_path(tables, nodes, COARSE_STEP, None)
+        for step in _FINE_STEPS:
+            found = self._refined(found, step)
+        return found
+
+    def along(self, rotations: Floats) -> Floats:
+        """Return the rotation (n,) at each sample, evenly between those of the layers."""
+        begins = [layer.begin for layer in self.layers]
+        counts = np.diff([*begins, len(self.samples)])
+        number = np.repeat(np.arange(len(begins)), counts)
+        before = np.concatenate([[0.0], rotations])[number]
+        joint = np.array([layer.is_joint for layer in self.layers])[number]
+        part = np.where(joint, 1.0, self.samples.fractions)
+        along: Floats = before + part * (rotations[number] - before)
+        return along
+
+    def joints_along(self, path: RotationPath) -> Floats:
+        """Return the joint positions (n, 6) [rad] at each sample, up to full turns."""
+        rotations = self.along(path.rotations)
+        tables = self._tables(rotations, COARSE_STEP, 1, self.sample_branches(path))
+        return tables.q[:, 0, 0]
+
+    def charge(self, sample: int, branch: int, costs: Floats) -> None:
+        """Let the coarse rotations (72,) at a sample, in a branch, cost more."""
+        known = self._charges.setdefault(sample, np.zeros((8, TURN_COUNT)))
+        known[branch] += costs
+        if self._coarse is not None:
+            self._coarse.cost[sample, branch if self._coarse.cost.shape[1] > 1 else 0] += costs
+
+    def coarse_joints(self, sample: int, branch: int) -> Floats:
+        """Return the joint positions (72, 6) [rad] of all coarse rotations at a sample."""
+        poses = self._flange_poses(
+            np.full(TURN_COUNT, sample), COARSE_STEP * np.arange(TURN_COUNT, dtype=np.float64)
+        )
+        solution = branch_rows(ideal_arm_of(self.arm), TargetPoses.of(poses), BRANCHES[branch])
+        return solution.q.T
+
+    def sample_branches(self, path: RotationPath) -> Ints:
+        """Return the branch of a path at each sample (n,)."""
+        begins = [layer.begin for layer in self.layers]
+        return np.repeat(path.branches, np.diff([*begins, len(self.samples)]))
+
+    @property
+    def _start(self) -> int:
+        return int(branch_measures(self.arm, np.array([self.q_start])).branch[0])
+
+    # -- tables ----------------------------------------------------------------------------------
+
+    def _flange_poses(self, samples: Ints, rotations: Floats) -> Floats:
+        """Return the flange (n, 7) at rotated samples."""
+        half = 0.5 * rotations[:, None]
+        turn = np.concatenate([np.sin(half) * np.array(self.axis), np.cos(half)], axis=1)
+        rows = self.samples.poses[samples].copy()
+        rows[:, 3:] = multiply_rows(rows[:, 3:], turn)
+        return compose_rows(rows, self.T_controlled_flange)
+
+    def _tables(
+        self, first: Floats, step: float, count: int, branches: tuple[int, ...] | Ints
+    ) -> _Tables:
+        """
+        Solve the arm on all samples.
+
+        :param branches: the same for all samples, or the branch of each sample (n,).
+        """
+        n = len(self.samples)
+        sample = np.repeat(np.arange(n), count)
+        rotations = np.repeat(first, count) + step * np.tile(np.arange(count), n)
+        targets = TargetPoses.of(self._flange_poses(sample, rotations))
+        ideal = ideal_arm_of(self.arm)
+        if isinstance(branches, tuple):
+            columns = [self._solve(branch_rows(ideal, targets, BRANCHES[b])) for b in branches]
+            q = np.stack([q for q, _ in columns], axis=1)
+            cost = np.stack([cost for _, cost in columns], axis=1)
+            numbers = np.broadcast_to(np.array(branches), (n, len(branches)))
+        else:
+            q, cost = np.empty((n * count, 1, 6)), np.empty((n * count, 1))
+            of_row = np.repeat(branches, count)
+            for b in np.unique(branches):
+                rows = np.flatnonzero(of_row == b)
+                q[rows, 0], cost[rows, 0] = self._solve(
+                    branch_rows(ideal, targets.rows(rows), BRANCHES[b])
+                )
+            numbers = branches[:, None]
+        width = q.shape[1]
+        q = q.reshape(n, count, width, 6).swapaxes(1, 2)
+        cost = cost.reshape(n, count, width).swapaxes(1, 2)
+        cost = cost * self.samples.sizes[:, None, None]
+        for row, charges in self._charges.items():
+            which = np.rint((first[row] + step * np.arange(count)) / COARSE_STEP).astype(np.int64)
+            cost[row] += charges[numbers[row]][:, which % TURN_COUNT]
+        is_round = count * step > tau - 1e-9
+        return _Tables(first=first, step=step, is_round=is_round, q=q, cost=cost)
+
+    def _solve(self, solution: object) -> tuple[Floats, Floats]:
+        """Return joints (n, 6), and the cost of nearness to singularities for each unit (n,)."""
+        q = solution.q.T  # type: ignore[attr-defined]
+        distances = singularity_distance_rows(self.arm, q)
+        bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
+        margin = (distances / _SCALES).min(axis=1)
+        cost = _nearness(margin)
+        cost += np.where((distances < bounds).any(axis=1), _REFUSED, 0.0)
+        cost[~solution.exists] = inf  # type: ignore[attr-defined]
+        return q, cost
+
+    # -- nodes -----------------------------------------------------------------------------------
+
+    def _coarse_nodes(self, layer: Layer) -> Floats:
+        """Return the rotations of a layer in the coarse search, ascending."""
+        if layer.is_any:
+            one = COARSE_STEP * (np.arange(TURN_COUNT) - TURN_COUNT // 2)
+        else:
+            count = int(np.ceil((layer.high - layer.low) / COARSE_STEP)) + 1
+            one = np.linspace(layer.low, layer.high, count)
+            one = one - tau * np.rint(one.mean() / tau)
+        return np.concatenate([one + tau * k for k in _COPIES])
+
+    def _refined(self, path: RotationPath, step: float) -> RotationPath:
+        """Return the best way around another one."""
+        first = self.along(path.rotations) - _FINE_REACH * step
+        tables = self._tables(first, step, 2 * _FINE_REACH + 1, self.sample_branches(path))
+        offsets = step * np.arange(-_FINE_REACH, _FINE_REACH + 1)
+        nodes = []
+        for layer, rotation in zip(self.layers, path.rotations.tolist(), strict=True):
+            around = rotation + offsets
+            if not layer.is_any:
+                turns = layer.turns(rotation)
+                around = np.unique(np.clip(around, layer.low + turns, layer.high + turns))
+            nodes.append(around)
+        return self._best_path(tables, nodes, step, path)
+
+    # -- dynamic programming ---------------------------------------------------------------------
+
+    def _best_path(
+        self, tables: _Tables, nodes: list[Floats], step: float, around: RotationPath | None
+    ) -> RotationPath:
+        """
+        Return the best way through nodes.
+
+        :param around: the way around which the nodes lie; None = all branches are searched.
+        """
+        width = tables.q.shape[1]
+        branches = np.arange(8)[None] if width == 8 else np.array([[self._start]])
+        cost = np.where(np.equal(branches.T, self._start), 0.0, inf)
+        if around is not None:
+            branches, cost = around.branches[:, None], np.zeros((1, 1))
+        q = np.broadcast_to(np.array(self.q_start), (len(cost), 1, 6))
+        rotations = np.zeros(1)
+        back: list[tuple[Ints, Floats, Floats]] = []
+        for number, (layer, targets) in enumerate(zip(self.layers, nodes, strict=True)):
+            if layer.is_joint:
+                near = None if around is None else around.joints[number]
+                step_to = self._joint_edges(tables, layer, targets, cost, q, near)
+            else:
+                step_to = self._edges(tables, layer, targets, rotations, cost, q, step)
+            cost, q, source, targets = step_to
+            if not np.isfinite(cost).any():
+                raise NoRotation(number)
+            back.append((source, targets, q))
+            rotations = targets
+        branches = np.broadcast_to(branches, (len(back), width))
+        return self._read_back(back, cost, branches)
+
+    @staticmethod
+    def _read_back(
+        back: list[tuple[Ints, Floats, Floats]], cost: Floats, branches: Ints
+    ) -> RotationPath:
+        """
+        Return the way to the best node of the last layer.
+
+        :param branches: (layers, b) the numbers of the branches in the nodes' first index.
+        """
+        n = len(back)
+        path = RotationPath(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 6)))
+        b, k = divmod(int(np.argmin(cost)), cost.shape[1])
+        for number in range(n - 1, -1, -1):
+            source, rotations, q = back[number]
+            path.rotations[number], path.joints[number] = rotations[k], q[b, k]
+            path.branches[number] = branches[number, b]
+            width = len(back[number - 1][1]) if number else 1
+            b, k = divmod(int(source[b, k]), width)
+        return path
+
+    def _edges(
+        self,
+        tables: _Tables,
+        layer: Layer,
+        targets: Floats,
+        rotations: Floats,
+        cost: Floats,
+        q: Floats,
+        step: float,
+    ) -> tuple[Floats, Floats, Ints, Floats]:
+        """Return cost (b, k), joints (b, k, 6) and source (b, k) of the nodes of a layer."""
+        reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
+        alive = np.flatnonzero(np.isfinite(cost).any(axis=0))
+        first, last = int(alive[0]), int(alive[-1]) + 1
+        sources = rotations[first:last]
+        targets = targets[(targets >= sources[0] - reach) & (targets <= sources[-1] + reach)]
+        if not len(targets):
+            return np.full((len(cost), 1), inf), q[:, :1], np.zeros((len(cost), 1), int), targets
+        low = np.searchsorted(sources, targets - reach)
+        width = int((np.searchsorted(sources, targets + reach, side='right') - low).max())
+        index = np.minimum(low[:, None] + np.arange(width), len(sources) - 1)
+        change = targets[:, None] - sources[index]
+        size = float(self.samples.sizes[layer.begin : layer.end].sum())
+        total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
+        index = index + first
+        total = cost[:, index] + total
+        here = q[:, index]
+        speed = np.array(self.arm.model.max_joint_speed)
+        for sample in range(layer.begin, layer.end):
+            if sample == layer.end - 1:
+                entry = tables.look_up(sample, targets)[:, None]
+            else:
+                part = self.samples.fractions[sample]
+                entry = tables.look_up(sample, sources[index - first] + part * change)
+            turn = tables.q[sample][:, entry] - here
+            turn -= tau * np.rint(turn / tau)
+            here = here + turn
+            turn = np.abs(turn)
+            total = total + turn.sum(axis=-1) + tables.cost[sample][:, entry]
+            total += self._limits(here, float(self.samples.sizes[sample]))
+            total[turn.max(axis=-1) > _MAX_JOINT_STEP] = inf
+            if (time := self.samples.times[sample]) < inf:
+                excess = turn - (speed * time + step)
+                total += _TOO_FAST * np.maximum(excess, 0.0).sum(axis=-1)
+        total = total + self._off_posture(layer, here)
+        best = np.argmin(total, axis=2)[:, :, None]
+        chosen = np.take_along_axis(total, best, axis=2)[:, :, 0]
+        joints = np.take_along_axis(here, best[..., None], axis=2)[:, :, 0]
+        k = np.take_along_axis(np.broadcast_to(index, total.shape), best, axis=2)[:, :, 0]
+        return chosen, joints, k + len(rotations) * np.arange(len(cost))[:, None], targets
+
+    def _joint_edges(
+        self,
+        tables: _Tables,
+        layer: Layer,
+        targets: Floats,
+        cost: Floats,
+        q: Floats,
+        near: Floats | None,
+    ) -> tuple[Floats, Floats, Ints, Floats]:
+        """
+        Return the same of a layer to which a joint move leads: from any node to any other.
+
+        :param near: where the move ends; None = anywhere.
+        """
+        sample = layer.end - 1
+        flat = cost.ravel()
+        sources = np.argsort(flat)[:_JOINT_SOURCES]
+        sources = sources[np.isfinite(flat[sources])]
+        there = tables.q[sample][:, tables.look_up(sample, targets)]  # (b, k, 6)
+        start = q.reshape(-1, 6)[sources]
+        if near is None:
+            turn = there[:, :, None] - start
+            turn -= tau * np.rint(turn / tau)
+            # The copies of a rotation are the turns of the last joint before and behind.
+            turn[..., 5] += np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))[
+                None, :, None
+            ]
+        else:
+            turn = (there + tau * np.rint((near - there) / tau))[:, :, None] - start
+        end = start + turn
+        total = flat[sources] + np.abs(turn).sum(axis=-1)
+        total = total + tables.cost[sample][:, tables.look_up(sample, targets)][:, :, None]
+        total += self._limits(end, 1.0)
+        if layer.is_nearest and near is None:
+            distance = np.where(np.isfinite(total), np.linalg.norm(turn, axis=-1), inf)
+            nearest = distance.min(axis=(0, 1))
+            total = np.where(distance <= nearest + 1e-9, total, inf)
+        total += self._off_posture(layer, end)
+        best = np.argmin(total, axis=2)[:, :, None]
+        chosen = np.take_along_axis(total, best, axis=2)[:, :, 0]
+        joints = np.take_along_axis(end, best[..., None], axis=2)[:, :, 0]
+        return chosen, joints, sources[best[:, :, 0]], targets
+
+    def _limits(self, q: Floats, size: float) -> Floats:
+        """Return the cost (...) of nearness to joint limits on a part of the path."""
+        low, high = np.array(self.arm.model.position_limits).T
+        margin = np.minimum(q - low, high - q).min(axis=-1)
+        return np.where(margin < 0.0, inf, _nearness(margin) * size)
+
+    @staticmethod
+    def _off_posture(layer: Layer, q: Floats) -> Floats | float:
+        if layer.posture is None:
+            return 0.0
+        off: Floats = np.nan_to_num(np.abs(q - np.array(layer.posture))).sum(axis=-1)
+        return _OFF_POSTURE * off
+
+
+def _nearness(margin: Floats) -> Floats:
+    cost: Floats = _NEARNESS * np.maximum(0.0, 1.0 - margin / _WIDE_MARGIN) ** 2
+    return cost
