@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 #: Those of an e-Series: the robot program follows splines from cycle to cycle [s].
 CYCLE = 0.002
-PATHS = int(os.environ.get('ANNOUNCED_SPEEDS', '8'))
+PATHS = int(os.environ.get('ANNOUNCED_SPEEDS', '6'))
 SEED = int(os.environ.get('ANNOUNCED_SPEEDS_SEED', '1'))
 ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(max_tool_speed=1.0, on_too_fast='slow', self_collision='off')

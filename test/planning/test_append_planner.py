@@ -156,7 +156,7 @@ def joined(rows, part):
             name: np.concatenate(
                 [getattr(rows, name)[kept], getattr(part.plan.reference, name)[new]]
             )
-            for name in ('poses', 'point', 'time', 'blend_tolerance')
+            for name in ('poses', 'point', 'time', 'blend_tolerance', 'fraction')
         },
     )
 

@@ -35,6 +35,14 @@ class Senders:
         y = self._cell.sim.state().T_base_tcp.position[1]
         goal = self._scratch / 'goal.yaml'
         goal.write_text(GOAL % (y + (0.25 if y < 0.0 else -0.25)))
+        process = self.command(goal, *options, stdout=stdout)
+        if until_moving:
+            wait_for(lambda: self.moving or process.poll() is not None, 30.0)
+            assert process.poll() is None, process.communicate()
+        return process
+
+    def command(self, goal, *options, stdout=PIPE):
+        """Return the process that sends a goal."""
         process = subprocess.Popen(
             [sys.executable, '-m', 'ur_cartesian_driver.cli', 'send', str(goal), *options],
             stdout=stdout,
@@ -42,9 +50,6 @@ class Senders:
             text=True,
         )
         self._running.append(process)
-        if until_moving:
-            wait_for(lambda: self.moving or process.poll() is not None, 30.0)
-            assert process.poll() is None, process.communicate()
         return process
 
     @property
@@ -90,6 +95,20 @@ def test_a_signal_ends_the_sender_after_its_goal(senders, number):
     assert process.returncode == 128 + number
     assert output.splitlines()[-1].startswith('CANCELED, CANCELLED (-16): ')
     assert not errors
+
+
+def test_a_goal_that_was_stopped_is_taken_up_again(senders, tmp_path):
+    process = senders.start()
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=10.0)
+    goal, note = tmp_path / 'goal.yaml', tmp_path / 'goal.yaml.stopped'
+    line = output.splitlines()[-2]
+    assert line.startswith('stopped on the way to point 0, at '), output
+    assert line.endswith(f'"ur-cartesian send --resume {goal}" goes on from there')
+    again = senders.command(goal, '--resume')
+    output, errors = again.communicate(timeout=60.0)
+    assert again.returncode == 0, output + errors
+    assert not note.exists()
 
 
 def test_a_sender_whose_output_is_closed_cancels_its_goal(senders):

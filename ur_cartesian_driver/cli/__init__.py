@@ -286,6 +286,25 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
     send.add_argument(
+        '--resume',
+        action='store_true',
+        help='go on where the goal of this file was stopped (noted in FILE.stopped)',
+    )
+    send.add_argument(
+        '--overlap',
+        type=float,
+        default=5.0,
+        metavar='MM',
+        help='how far before that place the path is taken up again (5 mm)',
+    )
+    send.add_argument(
+        '--approach',
+        type=float,
+        default=30.0,
+        metavar='MM',
+        help='from how far behind the path, along the z axis of the tool (30 mm)',
+    )
+    send.add_argument(
         '--report', action='store_true', help='print the report: what was done, and why'
     )
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')

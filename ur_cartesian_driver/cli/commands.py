@@ -14,13 +14,14 @@ import sys
 from time import monotonic
 from typing import Any, BinaryIO
 
+from ur_cartesian_driver.cli.stopped_place import read_place, write_place
 from ur_cartesian_driver.kinematics.robot_models import (
     DhTable,
     JOINT_NAMES,
     robot_model,
     RobotModel,
 )
-from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.resources import share_path
@@ -147,7 +148,21 @@ def send(arguments: argparse.Namespace) -> int:
     from ur_cartesian_driver.ros import client
 
     goal = read_goal(arguments)
-    goal.validate_only = goal.validate_only or arguments.validate_only
+    validate_only = goal.validate_only or arguments.validate_only
+    left = None
+    if arguments.resume:
+        place = read_place(_named_file(arguments))
+        try:
+            goal, left = client.resumed_goal(
+                goal,
+                place,
+                overlap=1e-3 * arguments.overlap,
+                approach=1e-3 * arguments.approach,
+            )
+        except InvalidGoal as refusal:
+            print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
+            return 1
+    goal.validate_only = validate_only
     with (
         # Without a buffer: a disk that is full is noticed while the arm moves.
         open(arguments.record, 'wb', buffering=0)
@@ -164,10 +179,40 @@ def send(arguments: argparse.Namespace) -> int:
         print(*result.report, sep='\n')
     if result.error_code:
         status += f', {code_text(result.error_code)}'
+    if arguments.file != '-' and not validate_only:
+        _note_place(arguments, result, left)
     print(f'{status}: {result.error_string}')
     if status == 'SUCCEEDED':
         return 0
     return SIGNAL_STATUS + sender.signal_number if sender.signal_number else 1
+
+
+def _named_file(arguments: argparse.Namespace) -> Path:
+    if arguments.file == '-':
+        raise ValueError('a goal from standard input cannot be taken up again: name its file')
+    return goal_file(arguments.file)
+
+
+def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
+    """Note where a goal was stopped, and say how it is taken up again."""
+    from ur_cartesian_driver.ros.messages.action_messages import outcome_of
+
+    outcome = outcome_of(result)
+    place = outcome.stopped
+    if place is None and not outcome.succeeded:
+        return  # nothing has moved: what was known before still holds
+    if place is not None and left is not None:
+        place = left.original(place)
+    try:
+        written = write_place(_named_file(arguments), place)
+    except OSError as error:
+        print(f'where it was stopped cannot be noted: {error}', file=sys.stderr)
+        return
+    if written is not None and place is not None:
+        print(
+            f'stopped on the way to point {place.point}, at {100.0 * place.fraction:.1f} % of its '
+            f'segment; "ur-cartesian send --resume {arguments.file}" goes on from there'
+        )
 
 
 def read_goal(arguments: argparse.Namespace) -> Any:

@@ -136,12 +136,26 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PathPlace:
+    """A place on the path of a goal."""
+
+    #: Index of the point to which its segment leads.
+    point: int
+    #: How much of the segment lies before it, 0 to 1: of its length, of a joint motion's travel,
+    #: of a spline's time. In a blend it runs on to the point, and on from there.
+    fraction: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """How a goal ended: a code, a sentence, and the report."""
 
     code: ErrorCode
     text: str
     report: tuple[str, ...] = ()
+    #: Where on its path a goal was when it was stopped; the arm came to rest some millimetres
+    #: later. None = it succeeded, the arm had not begun to move, or nobody knows.
+    stopped: PathPlace | None = None
 
     @property
     def succeeded(self) -> bool:

@@ -43,14 +43,19 @@ class ReferencePath:
     #: (m, 2) [m], [rad] how far the robot's own blend may lie beside the sample: 0 outside blends,
     #: of which UR publishes the size and not the shape. Empty = 0 everywhere.
     blend_tolerance: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    #: (m,) how much of its segment lies before the sample, as in :class:`~.events.PathPlace`.
+    #: Empty = 0 everywhere.
+    fraction: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
         m = len(self.poses)
         if not len(self.blend_tolerance):
             object.__setattr__(self, 'blend_tolerance', np.zeros((m, 2)))
-        arrays = (self.poses, self.point, self.time, self.blend_tolerance)
-        if [array.shape for array in arrays] != [(m, 7), (m,), (m,), (m, 2)]:
+        if not len(self.fraction):
+            object.__setattr__(self, 'fraction', np.zeros(m))
+        arrays = (self.poses, self.point, self.time, self.blend_tolerance, self.fraction)
+        if [array.shape for array in arrays] != [(m, 7), (m,), (m,), (m, 2), (m,)]:
             raise ValueError(
                 'reference path shapes differ: ' + ', '.join(str(array.shape) for array in arrays)
             )

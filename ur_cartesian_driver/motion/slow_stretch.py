@@ -28,9 +28,11 @@ class SlowCause(Enum):
     BLEND = 'enlarge blend_radius, raise the acceleration, or use PROCESS'
     IN_BLEND = 'enlarge blend_radius, or use a SPLINE, whose speed is known'
     SHORT = 'raise the acceleration, lengthen the segments, or put a SPLINE through the points'
-    JOINT_LIMIT = 'take another posture, stay away from singularities, or ask for less speed'
+    JOINT_LIMIT = (
+        'take another posture, a free_axis, a path away from singularities, or less speed'
+    )
     TOOL_LIMIT = 'raise max_tool_speed, or ask for less speed'
-    TURN = 'turn the tool less, or over more of the path'
+    TURN = 'turn the tool less, or over more of the path, or leave its axis free (free_axis)'
     TIMES = 'space points and times evenly, with twists of .nan (chosen by the driver)'
 
 

@@ -11,6 +11,7 @@ Compose a path of the tool in a few lines, without ROS and for ROS.
     driver.execute(square).raise_for_error()
 """
 
+from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
@@ -40,6 +41,7 @@ from ur_cartesian_driver.path.outputs import (
     tool_digital_input,
 )
 from ur_cartesian_driver.path.path_builder import FREE, Path
+from ur_cartesian_driver.path.resumption import resume, ResumedGoal
 from ur_cartesian_driver.path.units import deg, mm
 
 __all__ = [
@@ -51,7 +53,9 @@ __all__ = [
     'Input',
     'Output',
     'Path',
+    'PathPlace',
     'Pose',
+    'ResumedGoal',
     'StaticFrame',
     'Tolerance',
     'X',
@@ -67,6 +71,7 @@ __all__ = [
     'digital',
     'digital_input',
     'mm',
+    'resume',
     'roll_pitch_yaw',
     'tilted',
     'tool_analog_input',

@@ -26,6 +26,7 @@ from ur_cartesian_driver.goal_files import (
 )
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
 from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
@@ -70,6 +71,7 @@ from ur_cartesian_driver.path.path_points import (
     SAME_POSITION,
     seen_from,
 )
+from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.weave import strokes, woven
 from ur_cartesian_driver.planning.request.stops import (
     check_input_wait,
@@ -762,6 +764,19 @@ class Path:
             auto_blend=end.auto_blend,
         )
         return self._with(_start=start, _points=tuple(points[::-1]))
+
+    def resumed(
+        self, place: PathPlace, *, overlap: float = OVERLAP, approach: float = APPROACH
+    ) -> Path:
+        """
+        Return what is left of the path when it was stopped at a place (``outcome.stopped``).
+
+        As :func:`~.resumption.resume`: overlap and approach are lengths [m].
+
+        :raises InvalidGoal: the path is kept open, or a number is out of its range.
+        """
+        left = resume(self._table(), place, overlap=overlap, approach=approach, start=self.start)
+        return Path.from_goal(left.goal)
 
     def repeated(
         self,

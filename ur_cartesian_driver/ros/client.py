@@ -28,12 +28,19 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
-from ur_cartesian_driver.goal_files.goal_reading import is_packed, point_rows, segment_rows
-from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
-from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.goal_files.goal_reading import (
+    goal_from_fields,
+    is_packed,
+    point_rows,
+    segment_rows,
+)
+from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.events import Outcome, PathPlace
 from ur_cartesian_driver.msg import CartesianTrajectory, DriverStatus
-from ur_cartesian_driver.path import Path
-from ur_cartesian_driver.ros.messages.goal_messages import message_of
+from ur_cartesian_driver.path import Path, resume, ResumedGoal
+from ur_cartesian_driver.ros.messages.action_messages import outcome_of
+from ur_cartesian_driver.ros.messages.goal_messages import goal_message, message_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_points
 
 Message: TypeAlias = Any
@@ -83,6 +90,19 @@ def add_tf_prefix(
 
 def _prefixed(tf_prefix: str, name: str) -> str:
     return tf_prefix + name if name else ''
+
+
+def resumed_goal(
+    goal: FollowCartesianTrajectory.Goal, place: PathPlace, *, overlap: float, approach: float
+) -> tuple[FollowCartesianTrajectory.Goal, ResumedGoal]:
+    """
+    Return what is left of a goal that was stopped at a place, as a message and in our own terms.
+
+    :param overlap: as ``approach`` a length [m], see :func:`~ur_cartesian_driver.path.resume`.
+    :raises InvalidGoal: it cannot be taken up again.
+    """
+    left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
+    return goal_message(fields_of_goal(left.goal)), left
 
 
 def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
@@ -260,11 +280,7 @@ class GoalClient:
         the start of the path, which a message does not hold.
         """
         _, result = self.send(path.to_message(), on_feedback, timeout)
-        return Outcome(
-            code=ErrorCode(result.error_code),
-            text=result.error_string,
-            report=tuple(result.report),
-        )
+        return outcome_of(result)
 
     def wait_ready(self, timeout: float) -> None:
         """

@@ -497,11 +497,14 @@ class GoalMachine:
             text = failure_text(self._text, 'at the last point')
         else:
             text = failure_text(self._text, self.feeder.location(started=self._has_moved))
+        stopped = None
+        if code is not ErrorCode.SUCCESSFUL and len(self.job.waypoint):
+            stopped = self._monitor.place()
         report = (
             *tcp_report(self.temporary_tcp, self._monitor.latest),
             *self.feeder.report_lines(),
         )
         return [
             *self._final_progress(),
-            Finish(outcome=Outcome(code=code, text=text, report=report)),
+            Finish(outcome=Outcome(code=code, text=text, report=report, stopped=stopped)),
         ]

@@ -19,7 +19,7 @@ from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
-from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.events import PathPlace, Progress
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
@@ -159,6 +159,10 @@ class GoalMonitor:
     def waypoint(self) -> int:
         """Return the index of the next point of the goal."""
         return self._tracker.waypoint()
+
+    def place(self) -> PathPlace | None:
+        """Return how far the arm is on the path of the goal; None = it has not begun."""
+        return self._tracker.place() if self._has_begun else None
 
     def buffered(self, sent: int) -> float:
         """Return the planned time of the records that were sent and lie ahead of the arm [s]."""

@@ -27,6 +27,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.vectors import Vector6
@@ -272,7 +273,7 @@ class PathTracker:
                     name: np.concatenate(
                         [getattr(old, name)[first:end], getattr(path, name)[new:]]
                     )
-                    for name in ('poses', 'point', 'time', 'blend_tolerance')
+                    for name in ('poses', 'point', 'time', 'blend_tolerance', 'fraction')
                 }
             )
         )
@@ -298,6 +299,16 @@ class PathTracker:
         """Return the index of the goal's point that comes next."""
         row = self.path_position.row + (1 if self.path_position.fraction > 0.0 else 0)
         return self._points[min(row, self.last_row)]
+
+    def place(self) -> PathPlace:
+        """Return the present position as a place on the path of the goal."""
+        point, row = self.waypoint(), self.path_position.row
+        fractions, last = self.path.fraction, min(row + 1, self.last_row)
+        # A segment begins where the one before it ends.
+        begin = float(fractions[row]) if self._points[row] == point else 0.0
+        end = float(fractions[last]) if self._points[last] == point else begin
+        part = begin + self.path_position.fraction * (end - begin)
+        return PathPlace(point=point, fraction=min(max(part, 0.0), 1.0))
 
     def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
         """Return the rows between which the tool may be."""

@@ -395,6 +395,7 @@ class _PartPlanner:
             poses=tcp_rows(self._arm, self._T_flange_tcp, q),
             time=end.time + times,
             point=np.full(len(times), self._points - 1, dtype=np.int32),
+            fraction=np.ones(len(times)),
         )
 
     def _place_outputs(
@@ -520,6 +521,7 @@ def _path_from(
         time=path.time[row:].copy(),
         point=path.point[row:].copy(),
         blend_tolerance=path.blend_tolerance[row:].copy(),
+        fraction=path.fraction[row:].copy(),
     )
 
 
@@ -532,6 +534,7 @@ def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
         time=np.concatenate([first.time, second.time[1:]]),
         point=np.concatenate([first.point, second.point[1:]]),
         blend_tolerance=np.concatenate([first.blend_tolerance, second.blend_tolerance[1:]]),
+        fraction=np.concatenate([first.fraction, second.fraction[1:]]),
     )
 
 

@@ -36,12 +36,18 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
     poses = np.concatenate([[start.row()], path.rows(number, at)])
     keep_hemisphere(poses)
+    # Half of a blend counts to each of its segments.
+    behind = np.append(path.u_join[1:], 0.0)[row]
+    rounded = np.where(
+        at > 0.5, (2.0 * at - 1.0) * behind, 1.0 - (1.0 - 2.0 * at) * (1.0 - path.u_leave[row])
+    )
     time = _times(path, times, row + is_blend, is_blend, at)
     return ReferencePath(
         poses=poses,
         point=np.concatenate([[begin], points]).astype(np.int32),
         time=np.maximum.accumulate(np.concatenate([[0.0], time])),
         blend_tolerance=np.concatenate([[(0.0, 0.0)], blend_tolerance]),
+        fraction=np.append(0.0, np.where(is_blend, rounded, at)),
     )
 
 

@@ -349,7 +349,7 @@ def _resting_path(path: ReferencePath, points: Any, durations: Floats) -> Refere
     at = np.searchsorted(path.point, points, side='right')
     columns = {
         name: np.insert(getattr(path, name), at, getattr(path, name)[at - 1], axis=0)
-        for name in ('poses', 'point', 'time', 'blend_tolerance')
+        for name in ('poses', 'point', 'time', 'blend_tolerance', 'fraction')
     }
     delays = np.zeros(len(columns['time']))
     delays[at + np.arange(len(at))] = durations

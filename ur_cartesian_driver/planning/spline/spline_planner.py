@@ -348,7 +348,7 @@ def _clearance_remarks(
 def _reference(path: SplinePath) -> ReferencePath:
     poses = path.poses.copy()
     keep_hemisphere(poses)
-    return ReferencePath(poses=poses, point=path.points, time=path.times)
+    return ReferencePath(poses=poses, point=path.points, time=path.times, fraction=path.u)
 
 
 def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]:

@@ -10,13 +10,14 @@ values that are not known: jerk, and acceleration where the robot does not repor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Accel, Twist
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import Outcome, PathPlace, Progress
 from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate
 from ur_cartesian_driver.motion.vectors import subtract6, Vector6
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
@@ -73,8 +74,24 @@ def feedback_message(
 
 def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
     """Return the result message of an outcome."""
+    stopped = outcome.stopped
     return FollowCartesianTrajectory.Result(
-        error_code=int(outcome.code), error_string=outcome.text, report=list(outcome.report)
+        error_code=int(outcome.code),
+        error_string=outcome.text,
+        report=list(outcome.report),
+        stopped_point=stopped.point if stopped else 0,
+        stopped_fraction=stopped.fraction if stopped else nan,
+    )
+
+
+def outcome_of(result: FollowCartesianTrajectory.Result) -> Outcome:
+    """Return the outcome of a result message."""
+    stopped = PathPlace(point=result.stopped_point, fraction=result.stopped_fraction)
+    return Outcome(
+        code=ErrorCode(result.error_code),
+        text=result.error_string,
+        report=tuple(result.report),
+        stopped=None if isnan(stopped.fraction) else stopped,
     )
 
 

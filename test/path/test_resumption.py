@@ -1,0 +1,241 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The goal that is left of another one: its points, outputs and times, and what is refused.
+
+That put together they are the whole: ``test/acceptance/test_taken_up_again.py``.
+"""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    FreeAxis,
+    Goal,
+    InputKind,
+    InputWait,
+    IOCommand,
+    OutputKind,
+    PayloadChange,
+    Posture,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.path import Path, PathPlace, resume
+
+LINEAR, JOINT, PROCESS = SegmentType.LINEAR, SegmentType.JOINT, SegmentType.PROCESS
+FLAT = (0.0, 0.0, 0.0, 1.0)
+#: Ten centimetres from point to point.
+CORNERS = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.1, 0.1)
+PINNED = Posture(names=('elbow_joint',), values=(1.0,))
+
+
+def goal(*segments, times=(), **fields):
+    return Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose(place, FLAT), time=time)
+            for place, time in zip(CORNERS, times or (0.0,) * 4, strict=True)
+        ),
+        segments=segments or (Segment(velocity=0.1),) * 4,
+        **fields,
+    )
+
+
+def switch(waypoint, value, offset=0.0, pin=1):
+    return IOCommand(
+        waypoint=waypoint,
+        offset=offset,
+        output=OutputKind.STANDARD_DIGITAL,
+        pin=pin,
+        value=value,
+    )
+
+
+def places(left):
+    return [tuple(np.round(point.pose.position, 9)) for point in left.goal.waypoints]
+
+
+def at(point, fraction):
+    return PathPlace(point=point, fraction=fraction)
+
+
+def test_a_line_is_taken_up_before_its_place_and_from_behind_the_path():
+    left = resume(goal(), at(1, 0.5), overlap=0.01, approach=0.02)
+    assert places(left) == [(0.04, 0.0, -0.02), (0.04, 0.0, 0.0), *CORNERS[1:]]
+    assert [segment.type for segment in left.goal.segments[:2]] == [JOINT, LINEAR]
+    assert left.begin == at(1, pytest.approx(0.4))
+    straight = resume(goal(), at(1, 0.5), overlap=0.01, approach=0.0)
+    assert places(straight) == [(0.04, 0.0, 0.0), *CORNERS[1:]]
+
+
+def test_the_overlap_goes_round_corners_and_ends_at_joint_motions():
+    assert resume(goal(), at(2, 0.05), overlap=0.01).begin == at(1, pytest.approx(0.95))
+    joint = goal(Segment(), Segment(type=JOINT), Segment(), Segment())
+    assert resume(joint, at(2, 0.05), overlap=0.01).begin == at(2, 0.0)
+    assert resume(goal(), at(1, 0.05), overlap=0.01).begin == at(1, 0.0)
+    # A joint motion is done again, and so is the way to the first point.
+    assert places(resume(joint, at(1, 0.7))) == list(CORNERS[1:])
+    assert places(resume(goal(), at(0, 0.7))) == list(CORNERS)
+
+
+@pytest.mark.parametrize('stopped', [at(1, 0.9), at(2, 0.03), at(2, 0.21)])
+def test_nothing_is_taken_up_within_a_blend(stopped):
+    blended = goal(*(Segment(type=PROCESS, blend_radius=0.02),) * 4)
+    begin = resume(blended, stopped, overlap=0.005).begin
+    assert begin.point == 1
+    assert begin.fraction <= 0.8
+
+
+@pytest.mark.parametrize('mode', ArcMode)
+def test_what_is_left_of_an_arc_is_of_the_same_circle(mode):
+    via = Pose((0.1 - 0.1 * np.sqrt(0.5), 0.1 - 0.1 * np.sqrt(0.5), 0.0), FLAT)
+    arc = goal(
+        Segment(),
+        Segment(),
+        Segment(type=SegmentType.CIRCULAR, via=via, arc_mode=mode, via_posture=PINNED),
+        Segment(),
+    )
+    arc = replace(
+        arc,
+        waypoints=(
+            Waypoint(pose=Pose((0.0, 0.0, 0.0), FLAT)),
+            Waypoint(pose=Pose((0.0, 0.1, 0.0), FLAT)),
+            Waypoint(pose=Pose((0.1, 0.0, 0.0), FLAT)),
+            Waypoint(pose=Pose((0.2, 0.0, 0.0), FLAT)),
+        ),
+    )
+    left = resume(arc, at(2, 0.5), overlap=0.01).goal
+    center = np.array([0.1, 0.1, 0.0])
+    _, begin, end, _ = (np.array(point.pose.position) for point in left.waypoints)
+    via_left = np.array(left.segments[2].via.position)
+    for place in (begin, via_left, end):
+        assert np.linalg.norm(place - center) == pytest.approx(0.1)
+    # Half of a quarter less 1 cm lies behind it.
+    assert np.linalg.norm(begin - end) == pytest.approx(
+        0.2 * np.sin(0.5 * (np.pi / 4 + 0.1)), abs=1e-9
+    )
+    assert not left.segments[2].via_posture
+
+
+def test_outputs_get_the_state_of_the_place_and_the_rest_of_the_commands():
+    commands = (
+        switch(0, 1.0),
+        switch(1, 0.0),
+        switch(0, 1.0, offset=0.3, pin=2),
+        switch(0, 1.0, offset=0.7, pin=3),
+        switch(2, 1.0),
+        switch(3, 0.0, offset=0.2),
+    )
+    left = resume(goal(io_commands=commands), at(1, 0.5), overlap=0.0).goal
+    assert sorted(left.io_commands, key=repr) == sorted(
+        (
+            switch(1, 1.0),
+            switch(1, 1.0, pin=2),
+            switch(2, 0.0),
+            # 5 cm at 0.1 m/s were 0.5 s of the 0.7 s.
+            switch(1, 1.0, offset=0.2, pin=3),
+            switch(3, 1.0),
+            switch(4, 0.0, offset=0.2),
+        ),
+        key=repr,
+    )
+
+
+def test_what_happens_at_points_happens_there_and_the_last_of_before_again():
+    waits = tuple(
+        InputWait(waypoint=k, input=InputKind.STANDARD_DIGITAL, pin=k, value=1.0, timeout=2.0)
+        for k in (0, 1, 3)
+    )
+    changes = (PayloadChange(waypoint=0, mass=1.0), PayloadChange(waypoint=2, mass=2.0))
+    of = goal(input_waits=waits, payload_changes=changes)
+    left = resume(of, at(2, 0.5)).goal
+    assert [(each.waypoint, each.pin) for each in left.input_waits] == [(1, 1), (3, 3)]
+    assert [(each.waypoint, each.mass) for each in left.payload_changes] == [(1, 1.0), (2, 2.0)]
+
+
+def test_a_free_axis_is_free_at_the_place_too():
+    free = Segment(free_axis=FreeAxis.Z, free_min=-0.5, free_max=0.5)
+    left = resume(goal(*(free,) * 4), at(2, 0.5)).goal
+    assert {segment.free_axis for segment in left.segments} == {FreeAxis.Z}
+
+
+def test_times_of_the_rest_stay_and_the_approach_has_some():
+    times = (1.0, 3.0, 5.0, 7.0)
+    left = resume(goal(*(Segment(),) * 4, times=times), at(2, 0.75), overlap=0.0).goal
+    steps = np.diff([point.time for point in left.waypoints], prepend=0.0)
+    # A quarter of the way from rest to rest takes half of the time with the same acceleration.
+    assert steps[2:] == pytest.approx([1.0, 2.0])
+    assert (steps[:2] > 0.0).all()
+
+
+def test_a_spline_has_its_curve_and_gathers_speed_on_it():
+    spline = replace(
+        goal(*(Segment(),) * 4, times=(1.0, 2.0, 3.0, 4.0)), execution=ExecutionMode.SPLINE
+    )
+    twists = (0.1, 0.0, 0.0), (0.05, 0.05, 0.0), (0.0, 0.05, 0.05), (0.0, 0.0, 0.0)
+    spline = replace(
+        spline,
+        segments=(),
+        waypoints=tuple(
+            replace(point, twist=(*twist, 0.0, 0.0, 0.0))
+            for point, twist in zip(spline.waypoints, twists, strict=True)
+        ),
+    )
+    left = resume(spline, at(2, 0.5), overlap=0.01)
+    points = left.goal.waypoints
+    assert points[1].twist == (0.0,) * 6
+    speeds = [np.linalg.norm(point.twist[:3]) for point in points[1:10]]
+    assert speeds == sorted(speeds)
+    for mine, its in zip(points[-2:], spline.waypoints[-2:], strict=True):
+        assert mine.pose.position == pytest.approx(its.pose.position)
+    assert points[-2].twist == pytest.approx(spline.waypoints[-2].twist)
+    assert points[-1].time - points[-2].time == pytest.approx(1.0)
+    with pytest.raises(InvalidGoal, match=r'segments\[2\]\.dwell is in a spline'):
+        resume(
+            replace(spline, segments=(*(Segment(),) * 2, Segment(dwell=0.1), Segment())),
+            at(2, 0.5),
+        )
+
+
+def test_a_place_on_the_rest_is_a_place_on_the_whole():
+    left = resume(goal(), at(1, 0.5), overlap=0.01)
+    assert left.original(at(0, 0.3)) == left.begin
+    assert left.original(at(1, 0.3)) == left.begin
+    assert left.original(at(2, 0.5)) == at(1, pytest.approx(0.7))
+    assert left.original(at(3, 0.25)) == at(2, pytest.approx(0.25))
+    assert left.original(at(4, 1.0)) == at(3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ('of', 'place', 'numbers', 'text'),
+    [
+        (goal(keep_open=True), at(1, 0.5), {}, 'keep_open is true, so the goal does not hold'),
+        (goal(), at(4, 0.5), {}, 'stopped_point, stopped_fraction are 4 and 0.5'),
+        (goal(), at(1, nan), {}, 'are 1 and nan'),
+        (goal(), at(1, 0.5), {'overlap': -0.1}, 'overlap is -0.1 m, but must be from 0 to 1 m'),
+        (goal(), at(1, 0.5), {'approach': 5.0}, 'approach is 5 m, but must be from 0 to 1 m'),
+        (
+            goal(*(Segment(),) * 4, io_commands=(switch(0, 1.0, offset=2.0),)),
+            at(1, 0.5),
+            {},
+            'offset is 2 s after .*, but when the arm was there is not known',
+        ),
+    ],
+)
+def test_what_cannot_be_taken_up_is_refused_with_a_sentence(of, place, numbers, text):
+    with pytest.raises(InvalidGoal, match=text):
+        resume(of, place, **numbers)
+
+
+def test_a_path_is_taken_up_as_a_path():
+    path = Path((0.0, 0.0, 0.5), FLAT).at(speed=0.1).by(dx=0.1).by(dy=0.1)
+    left = path.resumed(at(1, 0.5), overlap=0.01, approach=0.02)
+    assert [pose.position for pose in left.poses][1] == pytest.approx((0.1, 0.04, 0.5))

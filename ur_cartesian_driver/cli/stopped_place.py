@@ -1,0 +1,75 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where the goal of a file was stopped, in a file beside it, for ``ur-cartesian send --resume``.
+
+``seam.yaml`` has ``seam.yaml.stopped``: the place, and a hash of the goal to which it belongs.
+That of an example of the package, or of a folder that cannot be written, is in the working
+directory.
+"""
+
+from __future__ import annotations
+
+from hashlib import sha256
+import os
+from pathlib import Path
+
+import yaml
+
+from ur_cartesian_driver.motion.events import PathPlace
+from ur_cartesian_driver.resources import share_path
+
+_SUFFIX = '.stopped'
+
+
+def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
+    """
+    Note where a goal was stopped, None = nowhere: nothing is left to take up again.
+
+    :returns: the file, None = there is none.
+    :raises OSError: it cannot be written.
+    """
+    file = _file(goal_file)
+    if place is None:
+        file.unlink(missing_ok=True)
+        return None
+    noted = {'point': place.point, 'fraction': place.fraction, 'goal': _hash(goal_file)}
+    file.write_text(yaml.safe_dump(noted, sort_keys=False), encoding='utf-8')
+    return file
+
+
+def read_place(goal_file: Path) -> PathPlace:
+    """
+    Return where a goal was stopped.
+
+    :raises ValueError: that is not known, or the goal is another one since.
+    """
+    file = _file(goal_file)
+    try:
+        noted = yaml.safe_load(file.read_text(encoding='utf-8'))
+        place = PathPlace(point=int(noted['point']), fraction=float(noted['fraction']))
+        goal = noted['goal']
+    except FileNotFoundError:
+        raise ValueError(
+            f'{goal_file} cannot be taken up again: there is no {file}, which "send" writes where '
+            'a goal ends on its way'
+        ) from None
+    except (yaml.YAMLError, KeyError, TypeError, ValueError):
+        raise ValueError(f'{file} does not say where a goal was stopped; remove it') from None
+    if goal != _hash(goal_file):
+        raise ValueError(
+            f'{goal_file} cannot be taken up again: it is not the goal any more that was stopped; '
+            f'send what is left by hand, or remove {file}'
+        )
+    return place
+
+
+def _file(goal_file: Path) -> Path:
+    folder = goal_file.parent
+    if folder == share_path() / 'config' / 'examples' or not os.access(folder, os.W_OK):
+        folder = Path.cwd()
+    return folder / (goal_file.name + _SUFFIX)
+
+
+def _hash(goal_file: Path) -> str:
+    return sha256(goal_file.read_bytes()).hexdigest()

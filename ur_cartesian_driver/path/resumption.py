@@ -1,0 +1,500 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The goal that is left of a goal that ended on its way.
+
+It approaches a place some way before the one where the other one was stopped (the overlap), puts
+the outputs in the state that they have there, and follows the same path to its end. What is left
+of a line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which
+the arm gathers speed within the overlap.
+
+A place on a path counts segments: ``k + u`` is on the segment to point k, at the fraction u of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import floor, isfinite, sqrt
+from typing import TypeVar
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.events import PathPlace
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    Goal,
+    InputWait,
+    IOCommand,
+    PayloadChange,
+    Posture,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
+from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
+from ur_cartesian_driver.planning.spline.spline_points import tool_points
+
+#: How far before the place the path is taken up again, and from how far behind the tool comes [m].
+OVERLAP, APPROACH = 0.005, 0.03
+#: Times of the approach where a goal has times: to above the path [s], and down to it [m/s].
+APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
+#: Blends begin somewhat farther from their points on arcs.
+_BLEND_MARGIN = 1.05
+#: What is left of a segment is nothing below this [m]; of the fraction of a segment.
+_NOTHING, _NO_FRACTION = 1e-5, 1e-6
+#: The shortest arc, and the least height over its chord, that is left of an arc [m].
+_MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
+#: The shortest time in which a spline gathers speed [s], and the number of points meanwhile.
+_RAMP_TIME, _RAMP_POINTS = 0.4, 8
+#: Chords that measure the length of a piece of a spline.
+_CHORDS = 64
+_DIGITS = 9
+_Event = TypeVar('_Event', InputWait, PayloadChange)
+_JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResumedGoal:
+    """The goal that is left of another one."""
+
+    goal: Goal
+    #: Where it takes the other one up.
+    begin: PathPlace
+    #: (n,) the places on the path of the other one at which its points are; see the module.
+    places: tuple[float, ...]
+
+    def original(self, place: PathPlace) -> PathPlace:
+        """Return the place on the path of the other goal, for a place on this one."""
+        here = self.places[min(place.point, len(self.places) - 1)]
+        before = self.places[place.point - 1] if place.point else here
+        return _path_place(before + place.fraction * (here - before), round(self.places[-1]))
+
+
+def resume(
+    goal: Goal,
+    place: PathPlace,
+    *,
+    overlap: float = OVERLAP,
+    approach: float = APPROACH,
+    start: Pose | None = None,
+) -> ResumedGoal:
+    """
+    Return the goal that is left of a goal that was stopped at a place.
+
+    :param place: as its outcome says.
+    :param overlap: how far before it the path is taken up again [m]; more where that is in a
+        blend, and never before a joint motion or the first point.
+    :param approach: how far from there the tool comes down to the path, backwards along its own z
+        axis [m]; 0 = straight to the path.
+    :param start: where the tool was when the goal began, in the frame of the goal. Only a spline
+        needs it whose first twist is NaN.
+    :raises InvalidGoal: the goal is kept open, or a number is out of its range.
+    """
+    return _Resumption(goal, place, overlap, approach, start).resumed()
+
+
+class _Resumption:
+    """Makes the goal that is left."""
+
+    def __init__(
+        self, goal: Goal, place: PathPlace, overlap: float, approach: float, start: Pose | None
+    ) -> None:
+        self.goal, self.approach = goal, approach
+        self.points = tuple(goal.waypoints)
+        self.segments = tuple(goal.segments) or (Segment(),) * len(self.points)
+        _check(goal, place, overlap, approach)
+        table = goal_table(replace(goal, T_base_frame=IDENTITY))
+        self.timed, self.mode = is_timed(table), resolve_execution_mode(table)
+        self.spline = _Spline(table, start) if self.mode.traits.is_spline else None
+        self.stopped = place.point + place.fraction
+        self.begin = self._begin(self.stopped, overlap)
+
+    def resumed(self) -> ResumedGoal:
+        """Return what is left."""
+        n, k = len(self.points), min(floor(self.begin), len(self.points) - 1)
+        u = self.begin - k
+        if self._is_new_start(k):
+            points, segments = list(self.points[k:]), list(self.segments[k:])
+            places: list[float] = []
+            times = self._times(k, 0.0)
+        else:
+            points, segments, places = self._approach(k, u)
+            if self.spline is not None:
+                return self._resumed_spline(points)
+            times = self._times(k, u, approach=len(points))
+            if self._length(k) * (1.0 - u) > _NOTHING or self._length(k) <= _NOTHING:
+                points.append(self.points[k])
+                segments.append(self._cut(k, u))
+            else:  # it is there: the next segment follows
+                self.begin = k + 1.0
+                places = [self.begin] * len(points)
+                del times[len(points)]
+            points += self.points[k + 1 :]
+            segments += self.segments[k + 1 :]
+        places += [j + 1.0 for j in range(n - len(points) + len(places), n)]
+        if self.timed:
+            points = [replace(point, time=time) for point, time in zip(points, times, strict=True)]
+        return self._goal(points, segments, places)
+
+    def _goal(
+        self, points: Sequence[Waypoint], segments: Sequence[Segment], places: Sequence[float]
+    ) -> ResumedGoal:
+        goal = replace(
+            self.goal,
+            waypoints=tuple(points),
+            segments=tuple(segments) if self.goal.segments or self.spline is None else (),
+            io_commands=self._outputs(places),
+            input_waits=self._events(self.goal.input_waits, places),
+            payload_changes=self._events(self.goal.payload_changes, places),
+            execution=self.mode,
+            age=None,
+        )
+        return ResumedGoal(
+            goal=goal,
+            begin=_path_place(self.begin, len(self.points)),
+            places=tuple(places),
+        )
+
+    # -- where to begin --------------------------------------------------------------------------
+
+    def _is_new_start(self, k: int) -> bool:
+        """Tell whether a segment is done from wherever the arm is."""
+        return k == 0 or self.segments[k].type in _JOINT_MOTIONS
+
+    def _begin(self, stopped: float, overlap: float) -> float:
+        """Return the place at which the path is taken up again."""
+        k = min(floor(stopped), len(self.points) - 1)
+        if self._is_new_start(k):
+            return float(k)
+        left, u = overlap, stopped - k
+        while (length := self._length(k)) * u < left:
+            left -= length * u
+            if self._is_new_start(k - 1):
+                return float(k)
+            k, u = k - 1, 1.0
+        u -= left / length if length > 0.0 else 0.0
+        return self._before_blends(k, u)
+
+    def _before_blends(self, k: int, u: float) -> float:
+        """Return a place outside of blends, before those in which a place is."""
+        if self.spline is not None:
+            return k + u
+        while True:
+            length = self._length(k)
+            after, before = (
+                _BLEND_MARGIN * self.segments[j].blend_radius if j + 1 < len(self.points) else 0.0
+                for j in (k, k - 1)
+            )
+            if after > 0.0 and length * (1.0 - u) < after:
+                u = max(0.0, 1.0 - after / length)
+            if before <= 0.0 or length * u >= before:
+                return k + self._enough_of_an_arc(k, u)
+            if self._is_new_start(k - 1):
+                return float(k - 1)
+            k, u = k - 1, 1.0
+
+    def _enough_of_an_arc(self, k: int, u: float) -> float:
+        """Return a fraction of a segment that leaves as much of an arc as makes a circle."""
+        if self.segments[k].type is not SegmentType.CIRCULAR:
+            return u
+        arc = self._arc(k)
+        least = max(_MIN_ARC, sqrt(8.0 * _MIN_HEIGHT * arc.radius))
+        return min(u, max(0.0, 1.0 - least / arc.length))
+
+    # -- the curves ------------------------------------------------------------------------------
+
+    def _curve_start(self, k: int) -> Pose:
+        """Return the pose at which a segment begins."""
+        before = self.segments[k - 1]
+        fixed = before.type is SegmentType.CIRCULAR and before.arc_mode is ArcMode.FIXED
+        if fixed and k > 1:
+            return self._arc(k - 1).end
+        return self.points[k - 1].pose
+
+    def _arc(self, k: int) -> ArcCurve:
+        segment, via = self.segments[k], self.segments[k].via
+        assert via is not None
+        try:
+            return ArcCurve.through(
+                self._curve_start(k), via.position, self.points[k].pose, segment.arc_mode
+            )
+        except ValueError as error:
+            raise InvalidGoal(f'segments[{k}].via', f'makes no arc: {error}') from None
+
+    def _length(self, k: int) -> float:
+        if self.spline is not None:
+            return self.spline.length(k)
+        if self.segments[k].type is SegmentType.CIRCULAR:
+            return self._arc(k).length
+        return self._curve_start(k).distance_to(self.points[k].pose)
+
+    def _pose(self, k: int, u: float) -> Pose:
+        if self.spline is not None:
+            return self.spline.pose(k, u)
+        if self.segments[k].type is SegmentType.CIRCULAR:
+            return pose_from_row(self._arc(k).rows(np.array([u]))[0].tolist())
+        return self._curve_start(k).interpolate(self.points[k].pose, u)
+
+    def _cut(self, k: int, u: float) -> Segment:
+        """Return what is left of a segment."""
+        segment = self.segments[k]
+        if segment.type is not SegmentType.CIRCULAR:
+            return segment
+        return replace(segment, via=self._pose(k, 0.5 * (1.0 + u)), via_posture=Posture())
+
+    # -- the approach ----------------------------------------------------------------------------
+
+    def _approach(self, k: int, u: float) -> tuple[list[Waypoint], list[Segment], list[float]]:
+        """Return the points up to the place, at rest, and their places on the path."""
+        there = self._pose(k, u)
+        poses = [there]
+        if self.approach > 0.0:
+            poses.insert(0, there @ Pose((0.0, 0.0, -self.approach)))
+        kinds = [SegmentType.LINEAR] * len(poses)
+        if self.spline is None and (len(poses) > 1 or self.goal.min_speed_fraction):
+            kinds[0] = SegmentType.JOINT
+        if self.goal.min_speed_fraction and self.spline is None:
+            kinds[-1] = SegmentType.JOINT  # a rest between lines would count
+        cut = self.segments[k]
+        free = Segment(free_axis=cut.free_axis, free_min=cut.free_min, free_max=cut.free_max)
+        return (
+            [Waypoint(pose=pose) for pose in poses],
+            [replace(free, type=kind) for kind in kinds],
+            [self.begin] * len(poses),
+        )
+
+    def _approach_times(self) -> list[float]:
+        if self.approach <= 0.0:
+            return [APPROACH_TIME]
+        return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
+
+    def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
+        """Return the times of all points of moves; those of an approach come first."""
+        if not self.timed:
+            return [0.0] * (len(self.points) - k + approach)
+        arrive = [point.time for point in self.points]
+        took = arrive[k] - (arrive[k - 1] if k else 0.0)
+        dwell = self.segments[k - 1].dwell if k else 0.0
+        times = self._approach_times() if approach else []
+        # From rest to rest a part of it takes that much with the same acceleration.
+        took = sqrt(1.0 - u) * (took - dwell)
+        end = times[-1] + took if times else max(took, APPROACH_TIME * (k > 0))
+        return [*times, *(round(end + time - arrive[k], _DIGITS) for time in arrive[k:])]
+
+    # -- splines ---------------------------------------------------------------------------------
+
+    def _resumed_spline(self, points: list[Waypoint]) -> ResumedGoal:
+        """Return what is left of a spline: its time is gathered first, as the arm is at rest."""
+        assert self.spline is not None
+        spline, zero = self.spline, self._approach_times()[: len(points)]
+        points = [replace(point, time=time) for point, time in zip(points, zero, strict=True)]
+        places = [self.begin] * len(points)
+        begin, end = spline.time(self.begin), spline.end
+        ramp = min(max(2.0 * (spline.time(self.stopped) - begin), _RAMP_TIME), end - begin)
+        # In the time t of the ramp the curve's time passes by t^2 / (2 ramp).
+        knots = [time for time in spline.knots if begin + _NO_FRACTION < time]
+        gathered = begin + 0.5 * ramp * np.linspace(0.0, 1.0, _RAMP_POINTS + 1)[1:] ** 2
+        apart = ramp / _RAMP_POINTS**2
+        inner = [x for x in gathered.tolist() if all(abs(x - knot) > apart for knot in knots)]
+        if spline.points.quintic:
+            points[-1] = replace(
+                points[-1], acceleration=spline.waypoint(begin, 0.0, 0.0, 1.0 / ramp).acceleration
+            )
+        after = zero[-1]
+        for time in sorted([*inner, *knots]):
+            passed = time - begin
+            if passed < 0.5 * ramp - _NO_FRACTION:
+                t = sqrt(2.0 * ramp * passed)
+                rate, gain = t / ramp, 1.0 / ramp
+            else:
+                t, rate, gain = passed + 0.5 * ramp, 1.0, 0.0
+            points.append(spline.waypoint(time, after + t, rate, gain))
+            places.append(spline.place(time))
+        last = len(self.segments) - 1
+        segments = [self.segments[min(floor(p - _NO_FRACTION), last)] for p in places]
+        return self._goal(points, segments, places)
+
+    # -- outputs ---------------------------------------------------------------------------------
+
+    def _outputs(self, places: Sequence[float]) -> tuple[IOCommand, ...]:
+        """Return the commands that are left, after the state at the place."""
+        first, state = self._start_index(places), dict[tuple[int, int], IOCommand]()
+        left = []
+        for number, command in sorted(
+            enumerate(self.goal.io_commands), key=lambda each: (each[1].waypoint, each[1].offset)
+        ):
+            if not self._is_passed(command.waypoint):
+                left.append(replace(command, waypoint=_index(places, command.waypoint)))
+                continue
+            due = command.offset - self._time_since(command.waypoint, number, command.offset)
+            if due > 0.0:
+                left.append(replace(command, waypoint=first, offset=round(due, _DIGITS)))
+            else:
+                state[command.output, command.pin] = replace(command, waypoint=first, offset=0.0)
+        return (*state.values(), *left)
+
+    def _events(self, events: Sequence[_Event], places: Sequence[float]) -> tuple[_Event, ...]:
+        """Return what happens at the points that are left, and the last of before at the place."""
+        passed = [each for each in events if self._is_passed(each.waypoint)]
+        left: list[_Event] = [
+            replace(each, waypoint=_index(places, each.waypoint))
+            for each in events
+            if not self._is_passed(each.waypoint)
+        ]
+        first = self._start_index(places)
+        if places[first] > self.begin + _NO_FRACTION:  # the arm need not stop there
+            return tuple(left)
+        last = max((each.waypoint for each in passed), default=0)
+        again: list[_Event] = [
+            replace(each, waypoint=first) for each in passed if each.waypoint == last
+        ]
+        return tuple(again + left)
+
+    def _is_passed(self, waypoint: int) -> bool:
+        return waypoint + 1.0 <= self.begin + _NO_FRACTION
+
+    def _start_index(self, places: Sequence[float]) -> int:
+        """Return the number of the point at the place, or of the first one behind it."""
+        return max(sum(place <= self.begin + _NO_FRACTION for place in places) - 1, 0)
+
+    def _time_since(self, waypoint: int, number: int, offset: float) -> float:
+        """Return how long before the place a point was passed [s]; no less than needed."""
+        if offset <= 0.0:
+            return 0.0
+        if self.timed:
+            k = min(floor(self.begin), len(self.points) - 1)
+            before = self.points[k - 1].time if k else 0.0
+            now = before + (self.begin - k) * (self.points[k].time - before)
+            return now - self.points[waypoint].time
+        elapsed = 0.0
+        for k in range(waypoint + 1, len(self.points)):
+            part = min(1.0, self.begin - k)
+            if part <= 0.0:
+                break
+            if not self.segments[k].velocity:
+                raise InvalidGoal(
+                    f'io_commands[{number}].offset',
+                    f'is {offset:g} s after points[{waypoint}], but when the arm was there is not '
+                    f'known: segments[{k}] has no velocity',
+                    'give it one, or switch the output at a point',
+                )
+            elapsed += part * self._length(k) / self.segments[k].velocity
+            elapsed += self.segments[k - 1].dwell
+        return elapsed
+
+
+class _Spline:
+    """The curve of a spline in the frame of its goal, from its first point or its start on."""
+
+    def __init__(self, table: GoalTable, start: Pose | None) -> None:
+        points = table.waypoints
+        #: The number of the first segment that is known.
+        self.first = 1 if start is None else 0
+        if len(points) == self.first:
+            self.curve, self.knots = None, [float(points.times[0])]
+            return
+        begin = ToolPoints(
+            times=np.zeros(1) if start else points.times[:1],
+            poses=np.array([start.row()]) if start else points.poses[:1],
+            twists=np.nan_to_num(points.twists[:1]) if start is None else np.zeros((1, 6)),
+            accelerations=np.zeros((1, 6)),
+            quintic=False,
+        )
+        rest = replace(
+            table,
+            waypoints=points[self.first :],
+            segments=table.segments[self.first :],
+            io_commands=(),
+        )
+        self.points = tool_points(rest, begin)
+        self.curve = ToolSpline.through(self.points)
+        self.knots = points.times.tolist()
+
+    @property
+    def end(self) -> float:
+        """The time of its last point [s]."""
+        return float(self.knots[-1])
+
+    def time(self, place: float) -> float:
+        """Return the time of a place [s]."""
+        k = min(floor(place), len(self.knots) - 1)
+        before = self.knots[k - 1] if k else 0.0
+        return float(before + (place - k) * (self.knots[k] - before))
+
+    def place(self, time: float) -> float:
+        """Return the place at a time [s]."""
+        k = min(int(np.searchsorted(self.knots, time - 1e-9)), len(self.knots) - 1)
+        before = self.knots[k - 1] if k else 0.0
+        return k + min(1.0, (time - before) / (self.knots[k] - before))
+
+    def pose(self, k: int, u: float) -> Pose:
+        """Return the pose at a place."""
+        assert self.curve is not None
+        row = self.curve.at(np.array([self.time(k + u)])).poses[0]
+        return pose_from_row(row.tolist())
+
+    def length(self, k: int) -> float:
+        """Return the length of a segment [m], 0 if it is not known."""
+        if self.curve is None or k < self.first:
+            return 0.0
+        times = np.linspace(self.time(k), self.time(k + 1.0), _CHORDS + 1)
+        return float(
+            np.linalg.norm(np.diff(self.curve.at(times).poses[:, :3], axis=0), axis=1).sum()
+        )
+
+    def waypoint(self, time: float, at: float, rate: float, gain: float) -> Waypoint:
+        """Return the point of a time [s], for a time of which so much passes in a second."""
+        assert self.curve is not None
+        rows = self.curve.at(np.array([time]))
+        last = time >= self.end - 1e-9
+        twist = rows.twists[0] * rate * (not last)
+        acceleration = (rows.accelerations[0] * rate**2 + rows.twists[0] * gain) * (not last)
+        return Waypoint(
+            time=round(at, _DIGITS),
+            pose=pose_from_row(rows.poses[0].tolist()),
+            twist=vector6(twist.tolist()),
+            acceleration=vector6((acceleration * self.points.quintic).tolist()),
+        )
+
+
+def _index(places: Sequence[float], waypoint: int) -> int:
+    """Return the number of a point of the other goal."""
+    return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
+
+
+def _path_place(place: float, points: int) -> PathPlace:
+    k = max(min(floor(place), points - 1), 0)
+    return PathPlace(point=k, fraction=min(1.0, place - k))
+
+
+def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> None:
+    if goal.keep_open:
+        raise InvalidGoal(
+            'keep_open',
+            'is true, so the goal does not hold all points of its path',
+            'send what is left of the path as a goal of its own',
+        )
+    for k, segment in enumerate(goal.segments):
+        if segment.dwell and resolve_execution_mode(goal_table(goal)).traits.is_spline:
+            raise InvalidGoal(
+                f'segments[{k}].dwell',
+                'is in a spline, of which no part can be taken up again',
+                'split the goal at its rests',
+            )
+    if not (0 <= place.point < len(goal.waypoints) and 0.0 <= place.fraction <= 1.0):
+        raise InvalidGoal(
+            'stopped_point, stopped_fraction',
+            f'are {place.point} and {place.fraction:g}, but the goal has points 0 to '
+            f'{len(goal.waypoints) - 1} and fractions from 0 to 1',
+            'take those of the result of this goal',
+        )
+    for name, value in (('overlap', overlap), ('approach', approach)):
+        if not (isfinite(value) and 0.0 <= value <= 1.0):
+            raise InvalidGoal(name, f'is {value:g} m, but must be from 0 to 1 m', 'correct it')
