@@ -23,6 +23,7 @@ from ur_cartesian_driver.path import (
     axis_angle,
     deg,
     digital,
+    digital_input,
     DOWN,
     ExecutionMode,
     Frames,
@@ -431,3 +432,30 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
 def test_a_dwell_that_cannot_be_is_refused(make, text):
     with pytest.raises(InvalidGoal, match=re.escape(text)):
         make()
+
+
+def test_what_happens_at_points_is_that_of_a_goal():
+    pump = analog(1, AnalogDomain.VOLTAGE)
+    path = (
+        Path(HERE)
+        .by(dz=-0.1).wait_for(digital_input(3), timeout=2.0).payload(1.5, (0.0, 0.0, 0.05))
+        .follow_speed(pump, 2.0, filter_time=0.02, lead=0.05)
+        .by(dy=0.1).by(dx=0.1).end_follow_speed(pump, lead=0.1)
+    )  # fmt: skip
+    goal = path.goal()
+    (wait,), (payload,), (output,) = (
+        goal.input_waits,
+        goal.payload_changes,
+        goal.proportional_outputs,
+    )
+    assert (wait.waypoint, wait.pin, wait.value, wait.timeout) == (0, 3, 1.0, 2.0)
+    assert (payload.waypoint, payload.mass) == (0, 1.5)
+    assert (output.first_waypoint, output.last_waypoint, output.pin) == (0, 2, 1)
+    assert (output.begin_lead, output.end_lead, output.gain) == (0.05, 0.1, 2.0)
+    assert Path.from_goal(goal).goal() == goal
+    assert Path.from_yaml(path.to_yaml()).goal() == goal
+    for open_path in (Path(HERE).by(dy=0.1).follow_speed(pump, 1.0),):
+        with pytest.raises(InvalidGoal, match='has no end for analog output 1'):
+            open_path.goal()
+    with pytest.raises(InvalidGoal, match='has no begin for analog output 1'):
+        Path(HERE).by(dy=0.1).end_follow_speed(pump)

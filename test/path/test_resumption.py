@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    ProportionalOutput,
     Segment,
     SegmentType,
     Waypoint,
@@ -159,6 +160,21 @@ def test_what_happens_at_points_happens_there_and_the_last_of_before_again():
     left = resume(of, at(2, 0.5)).goal
     assert [(each.waypoint, each.pin) for each in left.input_waits] == [(1, 1), (3, 3)]
     assert [(each.waypoint, each.mass) for each in left.payload_changes] == [(1, 1.0), (2, 2.0)]
+
+
+def test_an_amount_follows_the_speed_from_the_place_on():
+    stretches = ((0, 1), (1, 3), (2, 3))
+    amounts = tuple(
+        ProportionalOutput(
+            first_waypoint=first, last_waypoint=last, pin=k % 2, gain=1.0, begin_lead=0.1
+        )
+        for k, (first, last) in enumerate(stretches)
+    )
+    left = resume(goal(proportional_outputs=amounts), at(2, 0.5)).goal
+    assert [
+        (each.first_waypoint, each.last_waypoint, each.begin_lead)
+        for each in left.proportional_outputs
+    ] == [(1, 3, 0.0), (2, 3, 0.1)]
 
 
 def test_a_free_axis_is_free_at_the_place_too():

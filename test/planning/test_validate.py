@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    ProportionalOutput,
     SafeOutput,
     Segment,
     SegmentType,
@@ -51,6 +52,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
 
 
 GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
+BEAD = ProportionalOutput(first_waypoint=0, last_waypoint=2, pin=1, gain=2.0)
 BURNING = InputWait(waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=2.0)
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
@@ -558,6 +560,49 @@ REFUSALS = [
         with_fields(PLAIN, input_waits=(BURNING,), keep_open=True),
         NotAvailable,
         'input_waits[0].point_index is set, but a goal with keep_open does nothing at points but',
+    ),
+    (
+        with_fields(PLAIN, proportional_outputs=(replace(BEAD, last_waypoint=3),)),
+        InvalidGoal,
+        'proportional_outputs[0].last_point is 3 and first_point 0, but they must follow each',
+    ),
+    (
+        with_fields(PLAIN, proportional_outputs=(replace(BEAD, gain=nan),)),
+        InvalidGoal,
+        'proportional_outputs[0].gain is nan, outside -1000 to 1000',
+    ),
+    (
+        with_fields(PLAIN, proportional_outputs=(replace(BEAD, minimum=1.0),)),
+        InvalidGoal,
+        'proportional_outputs[0].maximum is 1, not more than minimum = 1; set it to 1 for',
+    ),
+    (
+        with_fields(PLAIN, proportional_outputs=(BEAD, replace(BEAD, first_waypoint=1))),
+        InvalidGoal,
+        'proportional_outputs[1].pin is 1, which another entry uses on the same points; let one',
+    ),
+    (
+        with_fields(
+            PLAIN,
+            proportional_outputs=(BEAD,),
+            io_commands=(
+                IOCommand(
+                    waypoint=1, offset=0.0, output=OutputKind.STANDARD_ANALOG, pin=1, value=0.5
+                ),
+            ),
+        ),
+        InvalidGoal,
+        'io_commands[0].pin is 1, but that standard analog output follows the speed from point 0',
+    ),
+    (
+        with_fields(SPLINE, proportional_outputs=(BEAD,), execution=ExecutionMode.SERVO),
+        NotAvailable,
+        'proportional_outputs is not empty, but SERVO switches no outputs; set execution to',
+    ),
+    (
+        with_fields(PLAIN, proportional_outputs=(BEAD,), keep_open=True),
+        NotAvailable,
+        'proportional_outputs is not empty, but the goal has keep_open; send all points at once',
     ),
     (
         with_fields(PLAIN, payload_changes=(PayloadChange(waypoint=1, mass=101.0),)),

@@ -60,6 +60,7 @@ def test_there_are_examples():
         'glue',
         'spots',
         'arc_start',
+        'bead',
     }
 
 

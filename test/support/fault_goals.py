@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    ProportionalOutput,
     SafeOutput,
     Segment,
     Tolerance,
@@ -383,6 +384,8 @@ class WaitingGoal(ServoGoal):
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the
 #: latter [s].
 AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
+#: The current of an analog output at 0 [A].
+IDLE_CURRENT = 0.004
 #: A goal that ends within this time ended because the robot program stopped at once [s].
 IMMEDIATE_END = 0.3
 
@@ -402,7 +405,8 @@ def output_plan(start, values):
             (1, 2), (0.0, DELAY), (AT_CORNER, AFTER_END), values, strict=True
         )
     )
-    return square_plan(start.state, io_commands=commands)
+    amount = ProportionalOutput(first_waypoint=0, last_waypoint=2, pin=0, gain=2.0)
+    return square_plan(start.state, io_commands=commands, proportional_outputs=(amount,))
 
 
 class OutputGoal(BlendGoal):
@@ -433,6 +437,14 @@ class OutputGoal(BlendGoal):
 
     def record_end(self):
         self._at_end = self._outputs(self.cell)
+
+    async def check_process(self, context):
+        await super().check_process(context)
+        if not self.may_end_in_pause:
+            analog = self.cell.robot.controller.io.analog_out
+            await self.cell.until(
+                lambda: analog[0] <= IDLE_CURRENT, REACHED_WITHIN, f'amount, {context}'
+            )
 
     def check_result(self, row, phase):
         """

@@ -336,7 +336,9 @@ WAITING = _mode(
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
-    'after the end. When a goal does not succeed, pending outputs are switched off, but not on.',
+    'after the end, and an analog one follows the speed between the first point and the last. '
+    'When a goal does not succeed, pending outputs are switched off, but not on; the analog one '
+    'is idle after every end, and in a pause.',
     {
         'before the trigger pose': 'before the output at the second blend',
         'before the time': 'the arm is at rest at the last point, an output is pending',

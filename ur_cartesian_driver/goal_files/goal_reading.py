@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    ProportionalOutput,
     SafeOutput,
     Segment,
     SegmentType,
@@ -53,6 +54,18 @@ _PACKED_ENUMS: tuple[tuple[str, type[IntEnum]], ...] = (
     ('types', SegmentType),
     ('arc_modes', ArcMode),
     ('free_axes', FreeAxis),
+)
+#: The fields of a ``ProportionalOutput`` that are the same in the goal.
+PROPORTIONAL_NUMBERS = (
+    'begin_lead',
+    'end_lead',
+    'pin',
+    'gain',
+    'offset',
+    'minimum',
+    'maximum',
+    'filter_time',
+    'idle',
 )
 _SEGMENT_FIELDS = (
     'types',
@@ -105,6 +118,10 @@ def goal_from_fields(message: Message) -> GoalTable:
                 center_of_gravity=_three(change.center_of_gravity),
             )
             for change in message.payload_changes
+        ),
+        proportional_outputs=tuple(
+            _proportional_output(output, f'proportional_outputs[{i}]')
+            for i, output in enumerate(message.proportional_outputs)
         ),
     )
 
@@ -221,6 +238,15 @@ def _input_wait(wait: Message, field: str) -> InputWait:
         below=wait.below,
         timeout=wait.timeout,
         go_on=wait.go_on,
+    )
+
+
+def _proportional_output(output: Message, field: str) -> ProportionalOutput:
+    return ProportionalOutput(
+        first_waypoint=output.first_point,
+        last_waypoint=output.last_point,
+        domain=_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
+        **{name: getattr(output, name) for name in PROPORTIONAL_NUMBERS},
     )
 
 

@@ -103,6 +103,22 @@ GOAL: Mapping[str, Any] = {
         }
     ],
     'payload_changes': [{'point_index': UINT32, 'mass': 0.0, 'center_of_gravity': VECTOR}],
+    'proportional_outputs': [
+        {
+            'first_point': UINT32,
+            'last_point': UINT32,
+            'begin_lead': 0.0,
+            'end_lead': 0.0,
+            'pin': UINT8,
+            'analog_domain': UINT8,
+            'gain': 0.0,
+            'offset': 0.0,
+            'minimum': 0.0,
+            'maximum': 1.0,
+            'filter_time': 0.0,
+            'idle': 0.0,
+        }
+    ],
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
+from ur_cartesian_driver.goal_files.goal_reading import PROPORTIONAL_NUMBERS
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Posture, SafeOutput, Tolerance
 from ur_cartesian_driver.motion.goal_table import goal_table, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -57,6 +58,16 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
                     **_given({'below': wait.below, 'go_on': wait.go_on}),
                 }
                 for wait in table.input_waits
+            ],
+            'proportional_outputs': [
+                {
+                    'first_point': output.first_waypoint,
+                    'last_point': output.last_waypoint,
+                    **_given({'analog_domain': int(output.domain)}),
+                    **_given({name: getattr(output, name) for name in PROPORTIONAL_NUMBERS}),
+                    'maximum': output.maximum,
+                }
+                for output in table.proportional_outputs
             ],
             'payload_changes': [
                 {

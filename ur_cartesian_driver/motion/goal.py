@@ -185,6 +185,29 @@ class PayloadChange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ProportionalOutput:
+    """An analog output that follows the speed of the tool between two waypoints."""
+
+    first_waypoint: int
+    last_waypoint: int
+    #: How much earlier on the path it begins, and ends [s].
+    begin_lead: float = 0.0
+    end_lead: float = 0.0
+    pin: int
+    domain: AnalogDomain = AnalogDomain.CURRENT
+    #: Fraction of the range per speed [1/(m/s)], and at speed 0.
+    gain: float
+    offset: float = 0.0
+    #: Bounds, fractions of the range.
+    minimum: float = 0.0
+    maximum: float = 1.0
+    #: Time constant of a low-pass filter of first order for the speed [s].
+    filter_time: float = 0.0
+    #: Value when it does not follow the speed.
+    idle: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafeOutput:
     """The value that an output takes when the motion does not go on as planned."""
 
@@ -243,3 +266,4 @@ class Goal:
     min_speed_fraction: float = 0.0
     input_waits: tuple[InputWait, ...] = ()
     payload_changes: tuple[PayloadChange, ...] = ()
+    proportional_outputs: tuple[ProportionalOutput, ...] = ()

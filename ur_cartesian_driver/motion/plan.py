@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, Stop, SwitchOutput
+from ur_cartesian_driver.motion.primitive import Instruction, Joints, OutputRecord, Primitive, Stop
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import vector6
 
@@ -104,7 +104,7 @@ class PlannedSegment:
     #: Where the blend after it begins; None = there is none, or it is not known.
     blend_entry: BlendEntry | None = None
     #: The outputs that follow it on the wire, in this order.
-    outputs: tuple[SwitchOutput, ...] = ()
+    outputs: tuple[OutputRecord, ...] = ()
 
 
 class LateLines(Sequence[str]):
@@ -155,7 +155,7 @@ class PlannedRows(Rows[PlannedSegment]):
     report_lines: Sequence[str]
     notes: Mapping[int, str] = field(default_factory=dict)
     #: By row, those that follow it.
-    outputs: Mapping[int, tuple[SwitchOutput, ...]] = field(default_factory=dict)
+    outputs: Mapping[int, tuple[OutputRecord, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, segments: Iterable[PlannedSegment]) -> PlannedRows:

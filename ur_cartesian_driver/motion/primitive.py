@@ -134,6 +134,28 @@ class SwitchOutput:
     starts_beyond: bool = False
     #: Delay after the end of the last motion [s].
     delay: float = 0.0
+    #: An analog output begins to follow the speed, by the law before it, until its next switch.
+    follows_speed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedLaw:
+    """
+    Not a motion: by which law the next analog output that follows the speed does so.
+
+    The fraction of the range is offset + gain * speed of the tool [m/s], within the bounds; the
+    speed is filtered with a time constant [s].
+    """
+
+    gain: float
+    offset: float = 0.0
+    minimum: float = 0.0
+    maximum: float = 1.0
+    filter_time: float = 0.0
+
+
+#: A record beside the motions.
+OutputRecord: TypeAlias = SwitchOutput | SpeedLaw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,4 +207,4 @@ class ChangePayload:
 Stop: TypeAlias = Wait | AwaitInput | ChangePayload
 Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Stop
 #: One record of a trajectory on the wire.
-Instruction: TypeAlias = Primitive | SwitchOutput
+Instruction: TypeAlias = Primitive | OutputRecord

@@ -34,7 +34,9 @@ from ur_cartesian_driver.motion.goal import (
     Goal,
     InputWait,
     OnPathTolerance,
+    OutputKind,
     PayloadChange,
+    ProportionalOutput,
     Segment,
     SegmentType,
     Tolerance,
@@ -73,6 +75,7 @@ from ur_cartesian_driver.path.path_points import (
 )
 from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.weave import strokes, woven
+from ur_cartesian_driver.planning.request.io_commands import check_proportional_output
 from ur_cartesian_driver.planning.request.stops import (
     check_input_wait,
     check_payload,
@@ -516,6 +519,77 @@ class Path:
         point = replace(point, outputs=(*point.outputs, command))
         return self._with(_points=(*self._points[:index], point, *self._points[index + 1 :]))
 
+    def follow_speed(
+        self,
+        output: Output,
+        gain: float,
+        *,
+        offset: float = 0.0,
+        minimum: float = 0.0,
+        maximum: float = 1.0,
+        filter_time: float = 0.0,
+        lead: float = 0.0,
+        idle: float = 0.0,
+    ) -> Path:
+        """
+        Let an analog output follow the speed of the tool from the point before on.
+
+        It is ``offset + gain * speed``, within the bounds, all fractions of its range.
+
+        :param gain: per speed [1/(m/s)].
+        :param filter_time: time constant of a low-pass filter for the speed [s].
+        :param lead: begin so long before the point [s].
+        :param idle: value at its end, and when the motion does not go on as planned.
+        :raises InvalidGoal: there is no point or no such output, or a number cannot be meant.
+        """
+        where = f'follow_speed() at point {len(self) - 1}'
+        if not self._points:
+            raise InvalidGoal('follow_speed()', 'comes before the first point', 'add a motion')
+        if output.kind is not OutputKind.STANDARD_ANALOG:
+            raise InvalidGoal(where, f'names {output}', 'use analog()')
+        proportional = ProportionalOutput(
+            first_waypoint=0,
+            last_waypoint=1,
+            pin=output.pin,
+            domain=output.domain,
+            gain=float(gain),
+            offset=float(offset),
+            minimum=float(minimum),
+            maximum=float(maximum),
+            filter_time=float(filter_time),
+            begin_lead=float(lead),
+            idle=float(idle),
+        )
+        check_proportional_output(where, proportional, 2)
+        point = self._points[-1]
+        amounts = (*point.amounts, replace(proportional, last_waypoint=0))
+        return self._with(_points=(*self._points[:-1], replace(point, amounts=amounts)))
+
+    def end_follow_speed(self, output: Output, *, lead: float = 0.0) -> Path:
+        """
+        End :meth:`follow_speed` at the point before.
+
+        :param lead: end so long before the point [s].
+        :raises InvalidGoal: the output does not follow the speed, or began to at this point.
+        """
+        last = len(self) - 1
+        for i in range(last - 1, -1, -1):
+            point = self._points[i]
+            for k, proportional in enumerate(point.amounts):
+                if proportional.pin == output.pin and not proportional.last_waypoint:
+                    proportional = replace(
+                        proportional, last_waypoint=last - i, end_lead=float(lead)
+                    )
+                    check_proportional_output('end_follow_speed()', proportional, last + 1)
+                    amounts = (*point.amounts[:k], proportional, *point.amounts[k + 1 :])
+                    point = replace(point, amounts=amounts)
+                    return self._with(_points=(*self._points[:i], point, *self._points[i + 1 :]))
+        raise InvalidGoal(
+            f'end_follow_speed() at point {last}',
+            f'has no begin for analog output {output.pin} at a point before',
+            'call follow_speed() there',
+        )
+
     def dwell(self, time: float) -> Path:
         """
         Let the arm rest at the point before for a time; there it has no blend.
@@ -733,7 +807,7 @@ class Path:
         """
         if self._start is None:
             raise InvalidGoal('reversed()', 'has no start to go back to', 'write Path(start)')
-        if any(point.outputs or point.stops for point in self._points):
+        if any(point.outputs or point.stops or point.amounts for point in self._points):
             raise InvalidGoal(
                 'reversed()',
                 'has outputs, inputs or payloads, which have no reverse',

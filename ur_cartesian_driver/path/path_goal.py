@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.goal import (
     InputWait,
     IOCommand,
     PayloadChange,
+    ProportionalOutput,
     Segment,
     SegmentType,
 )
@@ -89,6 +90,9 @@ def goal_of_points(
             for stop in point.stops
             if isinstance(stop, PayloadChange)
         ),
+        proportional_outputs=tuple(
+            _ended(output, i) for i, point in enumerate(points) for output in point.amounts
+        ),
         **{each.name: getattr(settings, each.name) for each in fields(settings)},
     )
 
@@ -111,6 +115,15 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
     outputs = _by_point('io_commands', goal.io_commands, len(points))
     waits = _by_point('input_waits', goal.input_waits, len(points))
     payloads = _by_point('payload_changes', goal.payload_changes, len(points))
+    amounts: dict[int, list[ProportionalOutput]] = {}
+    for output in goal.proportional_outputs:
+        first, last = output.first_waypoint, output.last_waypoint
+        if not 0 <= first < last < len(points):
+            raise InvalidGoal(
+                'proportional_outputs', f'names points {first} to {last}', 'name others'
+            )
+        output = replace(output, first_waypoint=0, last_waypoint=last - first)
+        amounts.setdefault(first, []).append(output)
     in_spline = any(times) and (
         goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
         or any(any(point.twist) or any(point.acceleration) for point in points[:-1])
@@ -121,6 +134,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
             segment=segments[i] if segments else Segment(),
             duration=times[i] - (times[i - 1] + rests[i - 1] if i and times[i] else 0),
             outputs=tuple(outputs.get(i, ())),
+            amounts=tuple(amounts.get(i, ())),
             stops=(*waits.get(i, ()), *payloads.get(i, ())),
             in_spline=in_spline,
         )
@@ -138,6 +152,16 @@ def _by_point(field: str, events: Sequence[_Event], count: int) -> dict[int, lis
             )
         found.setdefault(event.waypoint, []).append(replace(event, waypoint=0))
     return found
+
+
+def _ended(output: ProportionalOutput, index: int) -> ProportionalOutput:
+    if not output.last_waypoint:
+        raise InvalidGoal(
+            f'follow_speed() at point {index}',
+            f'has no end for analog output {output.pin}',
+            'call end_follow_speed() at a later point',
+        )
+    return replace(output, first_waypoint=index, last_waypoint=index + output.last_waypoint)
 
 
 def _nanoseconds(time: float) -> int:

@@ -16,6 +16,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     PayloadChange,
+    ProportionalOutput,
     SafeOutput,
     Segment,
     Tolerance,
@@ -66,6 +67,9 @@ class PathPoint:
     #: With the waypoint 0, whichever point this is.
     outputs: tuple[IOCommand, ...] = ()
     stops: tuple[InputWait | PayloadChange, ...] = ()
+    #: Those that begin here: with the first waypoint 0, and the number of points to their end as
+    #: the last one; 0 = not ended yet.
+    amounts: tuple[ProportionalOutput, ...] = ()
     #: Whether the blend is that of the feed, which the last point of a path does without, and
     #: whether it is chosen when the path is finished.
     feed_blend: bool = False

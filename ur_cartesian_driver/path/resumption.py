@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     PayloadChange,
     Posture,
+    ProportionalOutput,
     Segment,
     SegmentType,
     Waypoint,
@@ -153,6 +154,7 @@ class _Resumption:
             io_commands=self._outputs(places),
             input_waits=self._events(self.goal.input_waits, places),
             payload_changes=self._events(self.goal.payload_changes, places),
+            proportional_outputs=self._amounts(places),
             execution=self.mode,
             age=None,
         )
@@ -356,6 +358,21 @@ class _Resumption:
             replace(each, waypoint=first) for each in passed if each.waypoint == last
         ]
         return tuple(again + left)
+
+    def _amounts(self, places: Sequence[float]) -> tuple[ProportionalOutput, ...]:
+        """Return what follows the speed on the rest of the path, from the place on."""
+        left = []
+        for output in self.goal.proportional_outputs:
+            if self._is_passed(output.last_waypoint):
+                continue
+            last = _index(places, output.last_waypoint)
+            if not self._is_passed(output.first_waypoint):
+                first = _index(places, output.first_waypoint)
+            else:
+                first, output = self._start_index(places), replace(output, begin_lead=0.0)
+            if first < last:
+                left.append(replace(output, first_waypoint=first, last_waypoint=last))
+        return tuple(left)
 
     def _is_passed(self, waypoint: int) -> bool:
         return waypoint + 1.0 <= self.begin + _NO_FRACTION

@@ -17,11 +17,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import IOCommand
+from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, ProportionalOutput
 from ur_cartesian_driver.motion.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline, Stop, SwitchOutput, Wait
+from ur_cartesian_driver.motion.primitive import (
+    OutputRecord,
+    SpeedLaw,
+    Spline,
+    Stop,
+    SwitchOutput,
+    Wait,
+)
 from ur_cartesian_driver.motion.vectors import subtract, Vector6
 from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
@@ -45,6 +52,7 @@ def place_outputs(
     reference: ReferencePath,
     commands: Sequence[IOCommand],
     *,
+    proportional: Sequence[ProportionalOutput] = (),
     blend_halves: Floats | None = None,
     start_time: float = 0.0,
 ) -> PlannedRows:
@@ -58,21 +66,31 @@ def place_outputs(
     :param start_time: when the first segment begins [s].
     :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at a time.
     """
-    if not commands:
+    if not commands and not proportional:
         return segments
     timed_path = _TimedPath(segments, reference, blend_halves, start_time)
     switches = sorted(
-        (timed_path.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
+        (
+            *(
+                timed_path.switch(command, f'io_commands[{i}]')
+                for i, command in enumerate(commands)
+            ),
+            *(
+                switch
+                for i, output in enumerate(proportional)
+                for switch in timed_path.follow(output, f'proportional_outputs[{i}]')
+            ),
+        ),
         key=lambda found: found.time,
     )
-    outputs: dict[int, tuple[SwitchOutput, ...]] = {}
+    outputs: dict[int, tuple[OutputRecord, ...]] = {}
     notes = dict(segments.notes)
     for found in switches:
         row, line = found.after_index, found.report_index
-        outputs[row] = (*outputs.get(row, ()), found.record)
+        outputs[row] = (*outputs.get(row, ()), *found.records)
         notes[line] = f'{notes.get(line, "")}; {found.text}'
     for row in sorted(outputs):
-        if sum(record.trigger_pose is not None for record in outputs[row]) > MAX_PENDING_OUTPUTS:
+        if _waiting(outputs[row]) > MAX_PENDING_OUTPUTS:
             raise InvalidGoal(
                 'io_commands',
                 f'switches more than {MAX_PENDING_OUTPUTS} outputs between two motions, '
@@ -89,8 +107,13 @@ class _PlacedOutput:
     time: float
     after_index: int
     report_index: int
-    record: SwitchOutput
+    records: tuple[OutputRecord, ...]
     text: str
+
+
+def _waiting(records: Sequence[OutputRecord]) -> int:
+    """Return how many records wait for a trigger pose, laws included."""
+    return sum(isinstance(each, SpeedLaw) or each.trigger_pose is not None for each in records)
 
 
 class _TimedPath:
@@ -165,8 +188,81 @@ class _TimedPath:
             time=time if trigger_time is None else trigger_time,
             after_index=after_index,
             report_index=report_index,
-            record=record,
+            records=(record,),
             text=f'switches {describe_command(command)} {where}',
+        )
+
+    def follow(self, output: ProportionalOutput, field: str) -> list[_PlacedOutput]:
+        """Return where an output begins to follow the speed, and where it ends."""
+        switch = SwitchOutput(
+            output=OutputKind.STANDARD_ANALOG,
+            pin=output.pin,
+            value=output.idle,
+            domain=output.domain,
+        )
+        law = SpeedLaw(
+            gain=output.gain,
+            offset=output.offset,
+            minimum=output.minimum,
+            maximum=output.maximum,
+            filter_time=output.filter_time,
+        )
+        name = f'standard analog output {output.pin}'
+        begin = self._ahead(
+            # A value that is not 0: a stop does not carry it out.
+            replace(switch, value=1.0, follows_speed=True),
+            output.first_waypoint,
+            output.begin_lead,
+            f'{field}.begin_lead',
+            f'{name} follows the speed',
+        )
+        end = self._ahead(
+            switch,
+            output.last_waypoint,
+            output.end_lead,
+            f'{field}.end_lead',
+            f'{name} follows it no more',
+        )
+        if end.time <= begin.time:
+            raise InvalidGoal(
+                f'{field}.end_lead',
+                f'is {output.end_lead:g} s, so the output would end before it begins',
+                'reduce it',
+            )
+        return [replace(begin, records=(law, *begin.records)), end]
+
+    def _ahead(
+        self, record: SwitchOutput, waypoint: int, lead: float, field: str, what: str
+    ) -> _PlacedOutput:
+        """Return a record placed so long before a point [s]."""
+        report_index = self.index.get(waypoint)
+        if report_index is None:
+            raise InvalidGoal(
+                field.rpartition('.')[0],
+                f'names point {waypoint}, but no motion leads there: the robot is already there',
+                'begin at the next point',
+            )
+        if lead <= _SAME_TIME:
+            time = self._at_point(report_index)
+            after_index = report_index
+        else:
+            time = float(self.ends[report_index]) - lead
+            after_index = self._last_returned(time)
+            if after_index < 0:
+                raise InvalidGoal(
+                    field,
+                    f'is {lead:g} s, but no motion has ended so long before point {waypoint}',
+                    'reduce it, or add a point before',
+                )
+        if time is not None:
+            record = self._at(record, time, float(self.returns[after_index]))
+        where = self._where(report_index) if lead <= _SAME_TIME else f'{lead:.3f} s before it'
+        return _PlacedOutput(
+            time=float(self.ends[report_index]) if time is None else time,
+            after_index=after_index,
+            report_index=report_index,
+            records=(record,),
+            text=f'{what}, {where}',
         )
 
     def _last_returned(self, time: float) -> int:

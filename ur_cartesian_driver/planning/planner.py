@@ -219,7 +219,11 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     goal, segments, reference = planner.stops.insert(goal, segments, motion)
     segments = place_outputs(
-        segments, reference, goal.io_commands, blend_halves=segments.blend_entries[:, -1]
+        segments,
+        reference,
+        goal.io_commands,
+        proportional=goal.proportional_outputs,
+        blend_halves=segments.blend_entries[:, -1],
     )
     remarks = [
         *ignored_remarks(goal),
@@ -253,7 +257,9 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
     goal, segments, reference = planner.stops.insert(
         stretch_times(goal, found.stretch), found.segments, found.reference
     )
-    segments = place_outputs(segments, reference, goal.io_commands)
+    segments = place_outputs(
+        segments, reference, goal.io_commands, proportional=goal.proportional_outputs
+    )
     return planner.plan(goal, segments, reference, found.remarks, found.find_slow_stretches)
 
 

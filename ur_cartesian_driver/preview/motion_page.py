@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.primitive import Joints, SpeedLaw
 from ur_cartesian_driver.motion.workspace import Plane
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.io_commands import describe_command
@@ -251,6 +251,8 @@ def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
     ):
         last = int(np.flatnonzero(plan.reference.point == waypoint)[-1])
         for output in outputs:
+            if isinstance(output, SpeedLaw):
+                continue
             at = output.trigger_pose or pose_from_row(plan.reference.poses[last])
             yield describe_command(output), np.array(at.position)
 

@@ -117,6 +117,11 @@ OUTPUT_COLUMNS = {
 }
 
 
+#: What is kept for an analog output that follows the speed: its law as a record has it, whether it
+#: follows, and the filtered speed [m/s].
+FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramSettings:
     """Everything that differs between installations."""
@@ -258,6 +263,12 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
     yield from _enum('INPUT', InputKind)
+    yield from _enum('FOLLOW', point_fields.FollowKind)
+    # Floats, because a matrix of floats is made from them: a row for each analog output.
+    yield f'FOLLOW_ONES = {[1.0] * script_command.ANALOG_OUTPUTS}'
+    yield f'FOLLOW_ROW = {[0.0] * len(FOLLOW_COLUMNS)}'
+    for column, name in enumerate(FOLLOW_COLUMNS):
+        yield f'FOLLOW_{name} = {column}'
     # Column of a field in the row of a pending output.
     for field, name in OUTPUT_COLUMNS.items():
         yield f'OUTPUT_{name} = {field.value}'

@@ -145,7 +145,7 @@ class GoalMachine:
         commands = self.feeder.prepare()
         T_flange_tcp = self.job.T_flange_tcp
         if self.job.safe_outputs:
-            self._guard = OutputGuard(self.job.safe_outputs, packet)
+            self._guard = OutputGuard(self.job.safe_outputs, packet, self.job.following_outputs)
             commands.append(self._guard.arm())
         if T_flange_tcp is not None:
             self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, T_flange_tcp)

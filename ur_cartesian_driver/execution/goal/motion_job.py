@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, sto
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import AwaitInput, Spline
+from ur_cartesian_driver.motion.primitive import AwaitInput, Spline, SwitchOutput
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
@@ -79,6 +79,8 @@ class MotionJob:
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
     stall_timeout: float = 0.0
+    #: Analog outputs that the robot program writes again after a pause by itself.
+    following_outputs: frozenset[int] = frozenset()
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
@@ -98,6 +100,8 @@ class MotionJob:
     @property
     def own_program_needs(self) -> str:
         """What only our robot program can do of this, as part of a sentence; empty = nothing."""
+        if self.following_outputs:
+            return 'outputs that follow the speed (proportional_outputs)'
         if not self.is_motion.all():
             return 'outputs (io_commands)'
         if self.has_stops:
@@ -161,6 +165,7 @@ def job_from_plan(
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
         safe_outputs=goal.safe_outputs,
+        following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
         stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT)
         if goal.on_path_tolerance is OnPathTolerance.STALL
         else 0.0,
@@ -196,7 +201,7 @@ def job_from_plan(
 def _last_output_delay(rows: PlannedRows) -> float:
     """Return how long after the end of the motion the last output is switched [s]."""
     last = rows.outputs.get(len(rows) - 1, ())
-    return max((output.delay for output in last), default=0.0)
+    return max((each.delay for each in last if isinstance(each, SwitchOutput)), default=0.0)
 
 
 def _blend_lead_times(rows: PlannedRows) -> Floats:

@@ -17,7 +17,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendSafeOutputs,
 )
 from ur_cartesian_driver.motion.events import OutputsSecured
-from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
 from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
@@ -28,13 +28,19 @@ _MOVABLE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 class OutputGuard:
     """Knows whether the robot program has the values, and what a pause has changed."""
 
-    def __init__(self, outputs: tuple[SafeOutput, ...], packet: RobotState) -> None:
+    def __init__(
+        self,
+        outputs: tuple[SafeOutput, ...],
+        packet: RobotState,
+        following: frozenset[int] = frozenset(),
+    ) -> None:
         """
         Prepare.
 
         :param packet: the newest of the robot.
+        :param following: analog outputs that the robot program writes again by itself.
         """
-        self._outputs = outputs
+        self._outputs, self._following = outputs, following
         self._token = packet.safe_outputs_token
         self._is_held = False
         #: A write was ordered for this pause, or for the end; its result is not known.
@@ -110,5 +116,13 @@ class OutputGuard:
         changed = self._changed
         if not changed or self.fault():
             return []
-        self._changed, self._has_restored = (), True
-        return [RestoreOutputs(outputs=changed)]
+        self._changed = ()
+        restored = tuple(
+            output
+            for output in changed
+            if output.output is not OutputKind.STANDARD_ANALOG or output.pin not in self._following
+        )
+        if not restored:
+            return []
+        self._has_restored = True
+        return [RestoreOutputs(outputs=restored)]

@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, Waypoin
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
-from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
+from ur_cartesian_driver.motion.primitive import Joints, OutputRecord, SpeedLaw, SwitchOutput
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
@@ -445,7 +445,10 @@ class _PartPlanner:
         last, records = self._appended.last, records_before + _record_count(plan.segments)
         ending_records = _record_count(ending)
         # The robot program waits after the last motion for its outputs.
-        delay = max((output.delay for output in plan.segments[-1].outputs), default=0.0)
+        delay = max(
+            (each.delay for each in plan.segments[-1].outputs if isinstance(each, SwitchOutput)),
+            default=0.0,
+        )
         return AppendPlan(
             plan=replace(plan, goal=replace(plan.goal, keep_open=not last)),
             records_before=records_before,
@@ -552,7 +555,8 @@ def _blend_half(segment: PlannedSegment) -> float:
     return segment.blend_entry.half if segment.blend_entry else 0.0
 
 
-def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
+def _output_key(output: IOCommand | OutputRecord) -> tuple[object, ...]:
+    assert not isinstance(output, SpeedLaw)  # open goals have none
     return output.output, output.pin, output.value, output.domain
 
 

@@ -39,6 +39,11 @@ no time:
 20       motion type                                                            1
 =======  =====================================================================  =====
 
+The kind of output 5 is an analog output that begins to follow the speed of the tool; it does until
+the output is switched again. The kind 4 is the law for the next one of these, with no trigger pose
+and a word 16 of 1; words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum and the time constant
+of the filter [s].
+
 These are of our own program, too, and motions that go nowhere. WAIT lets the arm rest: word 18 is
 the time from the end of the motion before until the next one may begin. AWAIT_INPUT rests until an
 input has a level, and CHANGE_PAYLOAD sets a payload. The other words are zeros:
@@ -78,7 +83,9 @@ from ur_cartesian_driver.motion.primitive import (
     MoveP,
     OptimoveJ,
     OptimoveL,
+    OutputRecord,
     Primitive,
+    SpeedLaw,
     Spline,
     Stop,
     SwitchOutput,
@@ -138,6 +145,13 @@ class SplineKind(IntEnum):
 
     CUBIC = 1
     QUINTIC = 2
+
+
+class FollowKind(IntEnum):
+    """Word 12 of a SWITCH_OUTPUT that is no plain switch; the others are those of OutputKind."""
+
+    LAW = 4
+    BEGIN = 5
 
 
 class PointField(IntEnum):
@@ -233,7 +247,7 @@ def motion_type(primitive: Instruction) -> MotionType:
 
     :raises LocalProtocolError: it is neither a primitive nor an output.
     """
-    if isinstance(primitive, SwitchOutput):
+    if isinstance(primitive, SwitchOutput | SpeedLaw):
         return MotionType.SWITCH_OUTPUT
     if isinstance(primitive, MoveC):
         return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
@@ -259,6 +273,8 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
         raise dialect.unsupported(f'{kind.name} (motion type {kind})')
     if isinstance(primitive, SwitchOutput):
         return _output_fields(primitive)
+    if isinstance(primitive, SpeedLaw):
+        return _law_fields(primitive)
     if isinstance(primitive, Spline):
         return _spline_fields(primitive)
     if isinstance(primitive, Stop):
@@ -338,7 +354,7 @@ def _output_fields(output: SwitchOutput) -> PointFields:
     return (
         *(_numbers(trigger_pose) if trigger_pose else ZERO6),
         *output.trigger_direction,
-        output.output,
+        FollowKind.BEGIN if output.follows_speed else output.output,
         output.pin,
         output.value,
         output.domain,
@@ -348,6 +364,13 @@ def _output_fields(output: SwitchOutput) -> PointFields:
         0,
         MotionType.SWITCH_OUTPUT,
     )
+
+
+def _law_fields(law: SpeedLaw) -> PointFields:
+    numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
+    # A value that is not 0: nothing is to be switched off.
+    switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
+    return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
 
 def _stop_fields(stop: Stop) -> PointFields:
@@ -413,10 +436,21 @@ def _spline(fields: Sequence[float]) -> Spline:
     )
 
 
-def _output(fields: Sequence[float]) -> SwitchOutput:
+def _output(fields: Sequence[float]) -> OutputRecord:
+    if fields[12] == FollowKind.LAW:
+        return SpeedLaw(
+            gain=fields[0],
+            offset=fields[1],
+            minimum=fields[2],
+            maximum=fields[3],
+            filter_time=fields[4],
+        )
+    follows_speed = fields[12] == FollowKind.BEGIN
     trigger_pose = Pose.from_rotation_vector(vector6(fields[:6])) if fields[16] else None
     return SwitchOutput(
-        output=_enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
+        output=OutputKind.STANDARD_ANALOG
+        if follows_speed
+        else _enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
         pin=int(fields[13]),
         value=fields[14],
         domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
@@ -424,6 +458,7 @@ def _output(fields: Sequence[float]) -> SwitchOutput:
         trigger_direction=vector6(fields[6:12]),
         starts_beyond=bool(fields[17]),
         delay=fields[18],
+        follows_speed=follows_speed,
     )
 
 
