@@ -248,7 +248,13 @@ def test_an_example_is_a_program(ur_sim, monkeypatch, capsys):
     ports: dict[str, Any] = {
         name: getattr(ur_sim.ports, name.removesuffix('_port')) for name in ROBOT_PORTS
     } | dict.fromkeys(OUR_PORTS, 0)
-    config = partial(DriverConfig, robot_loop='thread', **ports)
+    # Robot and driver share this interpreter, which can be busy for longer than 0.2 s.
+    busy: dict[str, Any] = {
+        'robot_loop': 'thread',
+        'max_state_age': 0.0,
+        'robot_receive_timeout': 1.0,
+    }
+    config = partial(DriverConfig, **ports, **busy)
     monkeypatch.setattr(on_robot, 'DriverConfig', config)
     monkeypatch.setattr('sys.argv', ['square.py', '--plan'])
     on_robot.run(example('square').square)
