@@ -270,6 +270,7 @@ class GoalRun:
             abort_requested = self._abort_requested.is_set()
         self._begun.set()
         self._context.show(plan)  # while it moves: a long plan takes a while
+        del plan  # and much memory
         if abort_requested:
             motion.cancel()
         elif self.arm_request.preempted_by:

@@ -9,6 +9,7 @@ values that are not known: jerk, and acceleration where the robot does not repor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 
@@ -24,6 +25,9 @@ from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message, vector_message
 
 _NAN6: Vector6 = (nan,) * 6
+
+#: Lines of a report that a result has at most; rclpy and DDS keep results for a minute.
+MAX_REPORT_LINES = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +82,7 @@ def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
     return FollowCartesianTrajectory.Result(
         error_code=int(outcome.code),
         error_string=outcome.text,
-        report=list(outcome.report),
+        report=_report(outcome.report),
         stopped_point=stopped.point if stopped else 0,
         stopped_fraction=stopped.fraction if stopped else nan,
     )
@@ -115,3 +119,12 @@ def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
     """Return a twist (or acceleration) along the axes of the goal's frame, which stands still."""
     q = T_frame_base.quaternion
     return (*rotate(q, twist[:3]), *rotate(q, twist[3:]))
+
+
+def _report(lines: Sequence[str]) -> list[str]:
+    """Return the first and the last lines of a report: nobody reads those of 100,000 segments."""
+    left_out = len(lines) - MAX_REPORT_LINES
+    if left_out <= 0:
+        return list(lines)
+    half = MAX_REPORT_LINES // 2
+    return [*lines[:half], f'({left_out} lines are left out here)', *lines[-half:]]
