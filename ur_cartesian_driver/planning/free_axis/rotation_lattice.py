@@ -42,11 +42,11 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 #: Rotations of a full turn in the coarse search, and its step [rad]. The finer searches try so
-#: many rotations beside the best one, each with half the step before.
+#: many rotations to either side of the best one, each with a third of the step before.
 TURN_COUNT = 72
 COARSE_STEP = tau / TURN_COUNT
-_FINE_STEPS = tuple(0.5**k * COARSE_STEP for k in range(1, 6))
-_FINE_REACH = 2
+_FINE_STEPS = tuple(COARSE_STEP / 3**k for k in (1, 2, 3))
+_FINE_REACH = 3
 #: Full turns before and behind the first one in which a rotation may lie.
 _COPIES = (-1, 0, 1)
 #: How far the rotation may change from layer to layer [rad]: below half a turn, whose direction is
@@ -141,7 +141,12 @@ class NoRotation(Exception):
 
 @dataclass(slots=True)
 class _Tables:
-    """The arm on each sample: (n, branches, rotations, ...)."""
+    """
+    The arm on each sample: joints (n, 6, branches, rotations), costs (n, branches, rotations).
+
+    The joints come first, as in all arrays of the search: numpy adds rows many times faster than
+    it adds up what lies side by side.
+    """
 
     #: First rotation of each sample (n,) [rad], their step, and whether they go all the way round.
     first: Floats
@@ -154,7 +159,7 @@ class _Tables:
     def look_up(self, sample: int, rotations: Floats) -> Ints:
         """Return the numbers of the nearest rotations."""
         index: Ints = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
-        count = self.q.shape[2]
+        count = self.q.shape[3]
         return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
 
 
@@ -177,6 +182,14 @@ class RotationLattice:
     #: By sample: what coarse rotations cost more (8, 72).
     _charges: dict[int, Floats] = field(default_factory=dict)
     _coarse: _Tables | None = None
+    _speeds: Floats = field(init=False)
+    _ranges: tuple[Floats, Floats] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Read the limits of the joints."""
+        low, high = np.array(self.arm.model.position_limits).T
+        self._ranges = _column(low), _column(high)
+        self._speeds = _column(self.arm.model.max_joint_speed)
 
     def search(self) -> RotationPath:
         """
@@ -211,7 +224,7 @@ class RotationLattice:
         """Return the joint positions (n, 6) [rad] at each sample, up to full turns."""
         rotations = self.along(path.rotations)
         tables = self._tables(rotations, COARSE_STEP, 1, self.sample_branches(path))
-        return tables.q[:, 0, 0]
+        return tables.q[:, :, 0, 0]
 
     def charge(self, sample: int, branch: int, costs: Floats) -> None:
         """Let the coarse rotations (72,) at a sample, in a branch, cost more."""
@@ -275,9 +288,8 @@ class RotationLattice:
                 )
             numbers = branches[:, None]
         width = q.shape[1]
-        q = q.reshape(n, count, width, 6).swapaxes(1, 2)
-        cost = cost.reshape(n, count, width).swapaxes(1, 2)
-        cost = cost * self.samples.sizes[:, None, None]
+        q = np.ascontiguousarray(q.reshape(n, count, width, 6).transpose(0, 3, 2, 1))
+        cost = cost.reshape(n, count, width).swapaxes(1, 2) * self.samples.sizes[:, None, None]
         for row, charges in self._charges.items():
             which = np.rint((first[row] + step * np.arange(count)) / COARSE_STEP).astype(np.int64)
             cost[row] += charges[numbers[row]][:, which % TURN_COUNT]
@@ -331,12 +343,12 @@ class RotationLattice:
 
         :param around: the way around which the nodes lie; None = all branches are searched.
         """
-        width = tables.q.shape[1]
+        width = tables.q.shape[2]
         branches = np.arange(8)[None] if width == 8 else np.array([[self._start]])
         cost = np.where(np.equal(branches.T, self._start), 0.0, inf)
         if around is not None:
             branches, cost = around.branches[:, None], np.zeros((1, 1))
-        q = np.broadcast_to(np.array(self.q_start), (len(cost), 1, 6))
+        q = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, len(cost), 1))
         rotations = np.zeros(1)
         back: list[tuple[Ints, Floats, Floats]] = []
         for number, (layer, targets) in enumerate(zip(self.layers, nodes, strict=True)):
@@ -367,7 +379,7 @@ class RotationLattice:
         b, k = divmod(int(np.argmin(cost)), cost.shape[1])
         for number in range(n - 1, -1, -1):
             source, rotations, q = back[number]
-            path.rotations[number], path.joints[number] = rotations[k], q[b, k]
+            path.rotations[number], path.joints[number] = rotations[k], q[:, b, k]
             path.branches[number] = branches[number, b]
             width = len(back[number - 1][1]) if number else 1
             b, k = divmod(int(source[b, k]), width)
@@ -383,14 +395,19 @@ class RotationLattice:
         q: Floats,
         step: float,
     ) -> tuple[Floats, Floats, Ints, Floats]:
-        """Return cost (b, k), joints (b, k, 6) and source (b, k) of the nodes of a layer."""
+        """Return cost (b, k), joints (6, b, k) and source (b, k) of the nodes of a layer."""
         reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
         alive = np.flatnonzero(np.isfinite(cost).any(axis=0))
         first, last = int(alive[0]), int(alive[-1]) + 1
         sources = rotations[first:last]
         targets = targets[(targets >= sources[0] - reach) & (targets <= sources[-1] + reach)]
         if not len(targets):
-            return np.full((len(cost), 1), inf), q[:, :1], np.zeros((len(cost), 1), int), targets
+            return (
+                np.full((len(cost), 1), inf),
+                q[:, :, :1],
+                np.zeros((len(cost), 1), int),
+                targets,
+            )
         low = np.searchsorted(sources, targets - reach)
         width = int((np.searchsorted(sources, targets + reach, side='right') - low).max())
         index = np.minimum(low[:, None] + np.arange(width), len(sources) - 1)
@@ -398,31 +415,33 @@ class RotationLattice:
         size = float(self.samples.sizes[layer.begin : layer.end].sum())
         total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
         index = index + first
-        total = cost[:, index] + total
-        here = q[:, index]
-        speed = np.array(self.arm.model.max_joint_speed)
+        total = np.take(cost, index, axis=1) + total
+        here = np.take(q, index, axis=2)  # in one piece of memory, other than by index
         for sample in range(layer.begin, layer.end):
             if sample == layer.end - 1:
                 entry = tables.look_up(sample, targets)[:, None]
             else:
                 part = self.samples.fractions[sample]
                 entry = tables.look_up(sample, sources[index - first] + part * change)
-            turn = tables.q[sample][:, entry] - here
+            turn = np.take(tables.q[sample], entry, axis=2) - here
             turn -= tau * np.rint(turn / tau)
             here = here + turn
             turn = np.abs(turn)
-            total = total + turn.sum(axis=-1) + tables.cost[sample][:, entry]
+            total = total + turn.sum(axis=0) + tables.cost[sample][:, entry]
             total += self._limits(here, float(self.samples.sizes[sample]))
-            total[turn.max(axis=-1) > _MAX_JOINT_STEP] = inf
+            total[turn.max(axis=0) > _MAX_JOINT_STEP] = inf
             if (time := self.samples.times[sample]) < inf:
-                excess = turn - (speed * time + step)
-                total += _TOO_FAST * np.maximum(excess, 0.0).sum(axis=-1)
+                excess = turn - (self._speeds * time + step)
+                total += _TOO_FAST * np.maximum(excess, 0.0).sum(axis=0)
         total = total + self._off_posture(layer, here)
-        best = np.argmin(total, axis=2)[:, :, None]
-        chosen = np.take_along_axis(total, best, axis=2)[:, :, 0]
-        joints = np.take_along_axis(here, best[..., None], axis=2)[:, :, 0]
-        k = np.take_along_axis(np.broadcast_to(index, total.shape), best, axis=2)[:, :, 0]
-        return chosen, joints, k + len(rotations) * np.arange(len(cost))[:, None], targets
+        best = np.argmin(total, axis=2)
+        b, k = np.arange(len(cost))[:, None], np.arange(len(targets))
+        return (
+            total[b, k, best],
+            here[:, b, k, best],
+            index[k, best] + len(rotations) * b,
+            targets,
+        )
 
     def _joint_edges(
         self,
@@ -442,43 +461,47 @@ class RotationLattice:
         flat = cost.ravel()
         sources = np.argsort(flat)[:_JOINT_SOURCES]
         sources = sources[np.isfinite(flat[sources])]
-        there = tables.q[sample][:, tables.look_up(sample, targets)]  # (b, k, 6)
-        start = q.reshape(-1, 6)[sources]
+        there = tables.q[sample][:, :, tables.look_up(sample, targets), None]
+        start = q.reshape(6, -1)[:, None, None, sources]
         if near is None:
-            turn = there[:, :, None] - start
+            turn = there - start
             turn -= tau * np.rint(turn / tau)
             # The copies of a rotation are the turns of the last joint before and behind.
-            turn[..., 5] += np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))[
-                None, :, None
-            ]
+            copies = np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))
+            turn[5] += copies[:, None]
         else:
-            turn = (there + tau * np.rint((near - there) / tau))[:, :, None] - start
+            there = there + tau * np.rint((near[:, None, None, None] - there) / tau)
+            turn = there - start
         end = start + turn
-        total = flat[sources] + np.abs(turn).sum(axis=-1)
+        total = flat[sources] + np.abs(turn).sum(axis=0)
         total = total + tables.cost[sample][:, tables.look_up(sample, targets)][:, :, None]
         total += self._limits(end, 1.0)
         if layer.is_nearest and near is None:
-            distance = np.where(np.isfinite(total), np.linalg.norm(turn, axis=-1), inf)
+            distance = np.where(np.isfinite(total), np.linalg.norm(turn, axis=0), inf)
             nearest = distance.min(axis=(0, 1))
             total = np.where(distance <= nearest + 1e-9, total, inf)
         total += self._off_posture(layer, end)
-        best = np.argmin(total, axis=2)[:, :, None]
-        chosen = np.take_along_axis(total, best, axis=2)[:, :, 0]
-        joints = np.take_along_axis(end, best[..., None], axis=2)[:, :, 0]
-        return chosen, joints, sources[best[:, :, 0]], targets
+        best = np.argmin(total, axis=2)
+        b, k = np.arange(total.shape[0])[:, None], np.arange(len(targets))
+        return total[b, k, best], end[:, b, k, best], sources[best], targets
 
     def _limits(self, q: Floats, size: float) -> Floats:
         """Return the cost (...) of nearness to joint limits on a part of the path."""
-        low, high = np.array(self.arm.model.position_limits).T
-        margin = np.minimum(q - low, high - q).min(axis=-1)
+        low, high = self._ranges
+        margin = np.minimum(q - low, high - q).min(axis=0)
         return np.where(margin < 0.0, inf, _nearness(margin) * size)
 
     @staticmethod
     def _off_posture(layer: Layer, q: Floats) -> Floats | float:
         if layer.posture is None:
             return 0.0
-        off: Floats = np.nan_to_num(np.abs(q - np.array(layer.posture))).sum(axis=-1)
+        off: Floats = np.nan_to_num(np.abs(q - _column(layer.posture))).sum(axis=0)
         return _OFF_POSTURE * off
+
+
+def _column(joints: Sequence[float]) -> Floats:
+    """Return joints (6, 1, 1, 1)."""
+    return np.array(joints)[:, None, None, None]
 
 
 def _nearness(margin: Floats) -> Floats:
