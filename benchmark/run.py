@@ -34,6 +34,7 @@ MODULES = (
     'servo',
     RTDE_RATE,
     'planning',
+    'free_axis',
     'import_files',
     'motion_page',
     'kinematics',

@@ -78,6 +78,8 @@ class Cell:
         state = self.go_home()
         goal = path.goal(frames, ArmSnapshot.of(state))
         made = self.driver.plan(goal)
+        if any(segment.free_axis for segment in goal.segments):  # judged as it was chosen
+            goal = replace(goal, waypoints=made.goal.waypoints, segments=made.goal.segments)
         first_row = max(len(self.rtde.rows) - 1, 0)
         # The driver's clock cannot be kept on a busy computer: see below.
         outcome = execute(path.tolerances(time=-1.0))
@@ -168,8 +170,8 @@ def as_parameter(frame):
     return f'{frame.name} {frame.parent} ' + ' '.join(map(repr, frame.T_parent_frame.row()))
 
 
-def test_there_are_twelve_examples_of_at_most_thirty_lines():
-    assert len(NAMES) >= 12
+def test_there_are_examples_of_at_most_thirty_lines():
+    assert len(NAMES) >= 14
     for name in NAMES:
         assert len((FOLDER / f'{name}.py').read_text().splitlines()) <= 30
 
