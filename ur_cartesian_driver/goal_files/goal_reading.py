@@ -340,7 +340,7 @@ def rows_from_message(packed: Message) -> tuple[WaypointRows, SegmentRows]:
         dwells=_column(packed, 'dwells', n),
         velocities=_column(packed, 'velocities', n),
         accelerations=_column(packed, 'segment_accelerations', n),
-        vias=vias if len(packed.vias) else np.broadcast_to(identity, (n, 7)),
+        vias=np.broadcast_to(identity, (n, 7)) if is_arc.any() and not len(packed.vias) else vias,
         has_via=has_via | is_arc,
         arc_modes=_column(packed, 'arc_modes', n).astype(np.int64),
         free_axes=_column(packed, 'free_axes', n).astype(np.int64),
