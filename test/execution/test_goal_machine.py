@@ -498,6 +498,20 @@ def test_a_motion_whose_newest_state_is_too_old_is_cancelled(late):
     assert 'max_state_age is 0.2 s' in end.outcome.text
 
 
+def test_a_stop_that_a_lost_robot_does_not_confirm_is_a_lost_connection():
+    machine = point_machine(job(), max_plan_deviation=(0.0, 0.0), max_state_age=0.2)
+    machine.start(robot().state)
+    machine.step(robot(0.0, state_age=0.001), 0.0)
+    machine.step(Tick(), 0.3)
+    assert machine.state is GoalState.CANCELLING
+    commands = machine.step(Tick(), 0.3 + STOP_TIMEOUT)
+    assert any(isinstance(c, StopProgram) for c in commands)
+    ended = outcome(commands)
+    assert ended.code is ErrorCode.CONNECTION_LOST
+    assert 'max_state_age is 0.2 s' in ended.text
+    assert 'did not confirm the stop' in ended.text
+
+
 #: Where the outcome is not decided yet.
 RUNNING = [s for s in GoalState if s not in (GoalState.RESTORING, GoalState.ENDED)]
 

@@ -74,6 +74,9 @@ from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.state_age import explain_age
 
+#: Codes of a goal whose stop the robot has not confirmed in time.
+_UNCONFIRMED = (ErrorCode.EXECUTION_FAILED, ErrorCode.CONNECTION_LOST)
+
 
 class MotionStatus(NamedTuple):
     """How far a motion is; NaN = unknown."""
@@ -348,7 +351,10 @@ class GoalMachine:
         if transition.code is not None:
             if before is GoalState.PROGRAM_LOST:  # this is why the program ended
                 text = f'{text}; before that, {self._text}'
-            self._code, self._text = transition.code, text
+            if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.TIMEOUT:
+                self._text = f'{self._text}; {text}'  # which follows from it
+            else:
+                self._code, self._text = transition.code, text
         if self.state is before:
             return []
         commands = [] if self._awaits_disarming() else self.feeder.enter(self.state, self._packet)
@@ -447,7 +453,7 @@ class GoalMachine:
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
         if self._is_decided:  # no motion is left that could resume
             return self._finish()
-        unconfirmed = signal is GoalSignal.TIMEOUT and self._code is ErrorCode.EXECUTION_FAILED
+        unconfirmed = signal is GoalSignal.TIMEOUT and self._code in _UNCONFIRMED
         if signal in STOP_PROGRAM_AFTER or unconfirmed:
             # A paused program reads no socket: unless it is stopped, the old motion would resume
             # when somebody unlocks the arm and plays the program.
