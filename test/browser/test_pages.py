@@ -136,7 +136,9 @@ def driver(ur_sim):
         script_sender_port=0,
         trajectory_port=0,
         script_command_port=0,
-        robot_receive_timeout=1.0,  # the browser takes the processors
+        # The browser takes the processors, for longer than 0.2 s at a time.
+        robot_receive_timeout=5.0,
+        max_state_age=0.0,
     )
     with Driver(config) as opened:
         opened.wait_ready(30.0)
