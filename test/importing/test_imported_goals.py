@@ -3,6 +3,7 @@
 """Files of each format become goals that can be planned; two are carried out by the simulator."""
 
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,14 +12,24 @@ from synthetic_recording import only_file, packet, record
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.goal_files import goal_from_fields, read_goal_file
-from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions
+from ur_cartesian_driver.importing import (
+    BrokenFile,
+    import_file,
+    ImportOptions,
+    ToolOrientation,
+)
+from ur_cartesian_driver.importing.csv_file import collect_csv
+from ur_cartesian_driver.importing.imported_path import PathCollector
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 ARM = Arm(robot_model('ur5e'))
+#: What other programs have written.
+FOREIGN = Path(__file__).parent / 'files'
 #: Where the part lies, in front of the arm.
 PART = Pose((-0.45, -0.1, 0.3))
 
@@ -83,8 +94,31 @@ def test_a_recording_becomes_a_path(tmp_path, robot):
 
 def test_a_broken_recording_is_refused(tmp_path):
     (tmp_path / 'a.npz').write_bytes(b'none')
-    with pytest.raises(ValueError, match=r'a\.npz'):
+    with pytest.raises(BrokenFile, match='no file of NumPy arrays'):
         import_file(tmp_path / 'a.npz')
+    np.savez(tmp_path / 'b.npz', positions=np.zeros((3, 3)))
+    with pytest.raises(BrokenFile, match='it has no array'):
+        import_file(tmp_path / 'b.npz')
+
+
+@pytest.mark.parametrize(
+    ('column', 'row', 'value', 'why'),
+    [
+        ('actual_pose', 5, np.nan, 'a number is missing'),
+        ('actual_pose', 6, 0.0, 'its quaternion is none'),
+        ('time', 7, -1.0, 'it is earlier than the packet before'),
+    ],
+)
+def test_a_broken_packet_is_named(tmp_path, column, row, value, why):
+    record(tmp_path, [packet(i) for i in range(20)])
+    file = only_file(tmp_path)
+    with np.load(file) as arrays:
+        changed = dict(arrays)
+    changed[column][row] = value
+    np.savez(file, **changed)
+    with pytest.raises(BrokenFile, match=f'^packet {row + 1}: {why}') as caught:
+        import_file(file)
+    assert caught.value.line == row + 1
 
 
 def test_an_unknown_format_is_refused(tmp_path):
@@ -125,3 +159,45 @@ def test_a_length_without_a_unit_is_refused(length, capsys):
     with pytest.raises(SystemExit):
         main(['import', 'a.csv', '--blend', length])
     assert '--blend' in capsys.readouterr().err
+
+
+def corners(points):
+    """The smallest box around points, x and y [mm]."""
+    return (1e3 * np.concatenate((points[:, :2].min(axis=0), points[:, :2].max(axis=0)))).round(2)
+
+
+@pytest.mark.parametrize(
+    ('name', 'count', 'box'),
+    [
+        ('openscad.dxf', 54, (0, 0, 60, 40)),
+        ('potrace.dxf', 30, (6, 7, 59, 41)),
+        ('prusaslicer.gcode', 104, (94, 94, 106, 106)),
+        ('ur_rtde.csv', 3, (-491.9, -133.3, -461.9, -83.3)),
+        ('urx.script', 13, (-500, -150, -400, -50)),
+    ],
+)
+def test_files_of_other_programs(name, count, box):
+    if name.endswith('.dxf'):
+        pytest.importorskip('ezdxf')
+    simplify = 1e-4 if name.endswith('.csv') else 0.0
+    options = ImportOptions(unit='mm', orientation=ToolOrientation.DOWN, simplify=simplify)
+    found = import_file(FOREIGN / name, options)
+    assert len(found.goal.waypoints) == count
+    assert corners(np.array(found.goal.waypoints.poses)) == pytest.approx(box, abs=1.0)
+
+
+def test_a_recording_of_ur_rtde_is_exact():
+    goal = import_file(FOREIGN / 'ur_rtde.csv').goal
+    assert goal.waypoints[-1].pose.position == pytest.approx((-0.4619, -0.0833, 0.4879), abs=1e-6)
+    assert goal.waypoints[-1].pose.angle_to(ARM.forward(HOME)) < 1e-5
+    spaced = (FOREIGN / 'ur_rtde.csv').read_text().replace(',', ' ')  # as the client of UR has it
+    into = PathCollector()
+    collect_csv(spaced, ImportOptions(), into)
+    assert len(into) == 113
+
+
+def test_a_program_of_urx_keeps_speed_and_blends():
+    segments = import_file(FOREIGN / 'urx.script').goal.segments
+    assert (segments.types == SegmentType.PROCESS).all()
+    assert segments.velocities.tolist() == [0.05] * 13
+    assert segments.blend_radii.tolist() == [0.004] * 12 + [0.0]

@@ -76,6 +76,11 @@ def test_statements_without_a_function_around(tmp_path):
         ('def a():\n  x = 1\n  fly(x)\nend\n', 3, 'fly'),
         ('def a():\n  movel(p[9, 0, 0, 0, 0, 0])\nend\n', 2, 'cannot reach'),
         ('def a():\n  x = 1\nend\n', 0, 'no point'),
+        ('movej([0, 1.2.3, 1, 0, 0, 0])\n', 1, 'two decimal points'),
+        ('x = 1\nmovel(p[400, 0, 200, 0, 0, 0])\n', 2, '0.4 is 400 mm'),
+        ('movej([0, -90, 90, 0, 0, 0])\n', 1, 'radians'),
+        ('x = 1\nwhile x:\n  x = 2\n', 4, "'while' of line 2 has no 'end'"),
+        ('def a():\n  if True:\n    x = 2\nend\n', 5, "'if' of line 2 has no 'end'"),
     ],
 )
 def test_a_broken_file_is_one_sentence_with_its_line(tmp_path, text, line, part):

@@ -14,6 +14,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.importing.csv_file import collect_csv
 from ur_cartesian_driver.importing.dxf_file import collect_dxf
 from ur_cartesian_driver.importing.gcode_file import collect_gcode
@@ -63,6 +64,7 @@ _SUFFIXES = {
 }
 
 
+@uncollected()
 def import_file(
     file: str | os.PathLike[str], options: ImportOptions | None = None, form: str = ''
 ) -> ImportedGoal:

@@ -5,7 +5,8 @@ A table with named columns: CSV of scanners, spreadsheets and our own scripts.
 
 The first line that is not empty and does not begin with # names the columns, with their units:
 ``x [mm]``, ``x(mm)`` or ``x_mm``. Columns are separated by commas, semicolons or tabs; with
-semicolons and tabs numbers may have a decimal comma.
+semicolons and tabs numbers may have a decimal comma. Recordings of RTDE, as ur_rtde and the client
+of Universal Robots write them, have the names of RTDE's fields, the latter spaces between them.
 """
 
 from __future__ import annotations
@@ -60,6 +61,9 @@ _SYNONYMS = {
     'quat z': 'qz',
     'quat w': 'qw',
 }
+#: The first of these fields of RTDE is the pose; each column has one number of it.
+_RTDE_POSES = ('actual_TCP_pose', 'target_TCP_pose')
+_RTDE_NUMBERS = ('x [m]', 'y [m]', 'z [m]', 'rx [rad]', 'ry [rad]', 'rz [rad]')
 _QUATERNION, _NORMAL = ('qx', 'qy', 'qz', 'qw'), ('nx', 'ny', 'nz')
 _ROTATION_VECTOR, _ANGLES_OF_ROLL = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
 _GROUPS = (('x', 'y', 'z'), _QUATERNION, _NORMAL, _ROTATION_VECTOR, _ANGLES_OF_ROLL)
@@ -87,7 +91,9 @@ def collect_csv(text: str, options: ImportOptions, into: PathCollector) -> None:
     if first is None:
         raise BrokenFile(0, 'the file is empty; the first line has to name the columns')
     delimiter = max(';\t,', key=lines[first].count)
-    titles = next(csv.reader([lines[first]], delimiter=delimiter))
+    if delimiter not in lines[first]:
+        delimiter = ' '
+    titles = _without_rtde(next(csv.reader([lines[first]], delimiter=delimiter)))
     columns = _columns(titles, first + 1, options, into)
     decimal_comma = delimiter != ','
     make = _orientation({column.name for column in columns})
@@ -129,6 +135,15 @@ def collect_csv(text: str, options: ImportOptions, into: PathCollector) -> None:
             blend=values.get('blend'),
             time=values.get('t'),
         )
+
+
+def _without_rtde(titles: list[str]) -> list[str]:
+    """Return titles with the pose of RTDE named as other poses are."""
+    for pose in _RTDE_POSES:
+        names = {f'{pose}_{i}': name for i, name in enumerate(_RTDE_NUMBERS)}
+        if names.keys() <= set(titles):
+            return [names.get(title, title) for title in titles]
+    return titles
 
 
 def _columns(

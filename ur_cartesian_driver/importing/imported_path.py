@@ -35,9 +35,13 @@ UNKNOWN3: Vector3 = (nan, nan, nan)
 class BrokenFile(ValueError):
     """A file cannot be read; the sentence has the number of the line."""
 
-    def __init__(self, line: int, text: str) -> None:
-        """Put the line before a sentence without a full stop; 0 = no line to blame."""
-        super().__init__(f'line {line}: {text}.' if line else f'{text}.')
+    def __init__(self, line: int, text: str, unit: str = 'line') -> None:
+        """
+        Put the line before a sentence without a full stop; 0 = no line to blame.
+
+        :param unit: what is counted where a file has no lines.
+        """
+        super().__init__(f'{unit} {line}: {text}.' if line else f'{text}.')
         self.line = line
 
 

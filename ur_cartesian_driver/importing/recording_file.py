@@ -9,7 +9,7 @@ from os import PathLike
 import numpy as np
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
-from ur_cartesian_driver.importing.imported_path import PathCollector
+from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Posture, SegmentType
 
@@ -27,9 +27,13 @@ def collect_recording(file: str | PathLike[str], into: PathCollector) -> None:
 
     The arm first goes to the beginning by a joint motion, in the posture of the recording.
 
-    :raises ValueError: it is no recording, or a damaged one.
+    :raises BrokenFile: it is no recording, or a damaged one.
     """
-    recording = Recording.load(str(file))
+    try:
+        recording = Recording.load(str(file))
+    except ValueError as error:
+        raise BrokenFile(0, str(error).removeprefix(f'{file} ').rstrip('.')) from None
+    _check_packets(recording)
     bits = recording.digital_output
     changes = {
         int(i) + 1: int(bits[i] ^ bits[i + 1])
@@ -57,3 +61,20 @@ def collect_recording(file: str | PathLike[str], into: PathCollector) -> None:
             if changes.get(row, 0) >> bit & 1:
                 value = float(int(bits[row]) >> bit & 1)
                 into.switch(IOCommand(waypoint=0, offset=0.0, output=kind, pin=pin, value=value))
+
+
+def _check_packets(recording: Recording) -> None:
+    """Refuse the first packet that no robot has sent."""
+    poses, times = recording.actual_pose, recording.time
+    if poses.shape != (len(times), 7):
+        raise BrokenFile(0, f'the poses are an array of {poses.shape}, not of seven columns')
+    for wrong, why in (
+        (~np.isfinite(np.column_stack((poses, times))).all(axis=1), 'a number is missing'),
+        (
+            np.abs(np.linalg.norm(poses[:, 3:], axis=1) - 1.0) > 1e-3,
+            'its quaternion is none',
+        ),
+        (np.diff(times, prepend=-np.inf) < 0.0, 'it is earlier than the packet before'),
+    ):
+        if wrong.any():
+            raise BrokenFile(int(np.argmax(wrong)) + 1, why, 'packet')

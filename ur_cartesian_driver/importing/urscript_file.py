@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import inspect
+from math import pi
 from typing import Any
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
@@ -38,6 +39,7 @@ from ur_cartesian_driver.urscript import (
     CompileError,
     core_builtins,
     parse,
+    parse_line,
     RuntimeException,
     ScriptInterpreter,
     ScriptProgram,
@@ -49,6 +51,8 @@ MAX_CYCLES, MAX_MOVES = 100_000, 100_000
 #: Of a program that never waits: what it may compute between two moves. A row of statements counts
 #: as a whole, and that of a sliced part is long.
 MAX_NODES = 3_000_000
+#: Longer or larger numbers are millimetres or degrees [m], [rad].
+FAR, MAX_ANGLE = 10.0, 4.0 * pi
 #: What only computes or reads; everything else is said to be left out.
 _SILENT = ('get_', 'is_', 'read_', 'pose_', 'interpolate_', 'point_', 'wrench_', 'rpy', 'rotvec')
 _SILENT_NAMES = {'inv', 'sync', 'time', 'tool_contact', 'end_freedrive_mode', 'stopj', 'stopl'}
@@ -60,7 +64,7 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
 
     :raises BrokenFile: it is no program, fails, or does not end.
     """
-    program, added_lines = _parsed(text)
+    program = _parsed(text)
     config = SimulatorConfig(model=options.arm.model.name)
     controller = Controller(config, controller_builtins)
     controller.motion.T_flange_tcp = options.T_flange_tcp
@@ -69,15 +73,15 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
     try:
         interpreter = ScriptInterpreter(program, builtins, instruction_budget=MAX_NODES)
     except CompileError as error:
-        raise _broken(error, added_lines) from None
-    moves.line = lambda: interpreter.location[0] - added_lines
+        raise _broken(error) from None
+    moves.line = lambda: interpreter.location[0]
     for _ in range(MAX_CYCLES):
         interpreter.step()
         # The clock, for programs that wait; nothing moves.
         controller.cycles += 1
         if interpreter.error is not None:
             failure = interpreter.error
-            raise BrokenFile(max(0, failure.line - added_lines), failure.text.rstrip('.'))
+            raise BrokenFile(failure.line, failure.text.rstrip('.'))
         if not interpreter.running:
             return
         if len(into) > MAX_MOVES:
@@ -88,26 +92,25 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
     )
 
 
-def _parsed(text: str) -> tuple[ScriptProgram, int]:
-    """Return a program, and how many lines were put before it."""
+def _parsed(text: str) -> ScriptProgram:
+    """Return a program, or statements without one around them, as offline programming writes."""
     lines = text.splitlines()
     begins = next((line.strip() for line in lines if line.strip() and line.strip()[0] != '#'), '')
-    if begins.startswith(('def ', 'sec ')):
-        try:
-            return parse(text), 0
-        except CompileError as error:
-            # Functions, and calls of them below, as offline programming writes it.
-            if 'text after the end' not in error.reason:
-                raise _broken(error, 0) from None
     try:
-        return parse('def imported():\n' + text.rstrip() + '\nend\n'), 1
+        if begins.startswith(('def ', 'sec ')):
+            try:
+                return parse(text)
+            except CompileError as error:
+                if 'text after the end' not in error.reason:
+                    raise
+        return parse_line(text)
     except CompileError as error:
-        raise _broken(error, 1) from None
+        raise _broken(error) from None
 
 
-def _broken(error: CompileError, added_lines: int) -> BrokenFile:
+def _broken(error: CompileError) -> BrokenFile:
     reason = error.reason or error.text.rstrip(':').replace('_', ' ')
-    return BrokenFile(max(1, error.line - added_lines), f'this is no URScript: {reason}')
+    return BrokenFile(max(1, error.line), f'this is no URScript: {reason}')
 
 
 class _Moves:
@@ -226,6 +229,11 @@ class _Moves:
         target = joints_of(self._controller, q, name)
         speed = number(v, 'v')
         time = not_negative(t, 't')
+        farthest = max(target, key=abs)
+        if abs(farthest) > MAX_ANGLE:
+            raise RuntimeException(
+                f'{name} leads a joint to {farthest:g} rad; angles are in radians, d2r() converts'
+            )
         if time > 0.0:
             speed = max(abs(b - c) for b, c in zip(target, motion.q, strict=True)) / time
             self._omit(name, f't = {time:g} s is taken as the mean speed')
@@ -275,6 +283,11 @@ class _Moves:
     def _stand_at(self, name: str, target: Pose) -> None:
         """Put the arm to a pose, so that the program reads it and the next one is near it."""
         motion = self._controller.motion
+        farthest = max(target.position, key=abs)
+        if abs(farthest) > FAR:
+            raise RuntimeException(
+                f'{name} leads {farthest:g} m away; lengths are in metres, 0.4 is 400 mm'
+            )
         q = nearest(self._controller.arm, target @ motion.T_flange_tcp.inverse(), motion.q)
         if q is None:
             raise RuntimeException(f'{name} leads to a pose that the arm cannot reach')

@@ -11,7 +11,7 @@ interpreter provides them. `core_builtins` contains those that need no robot.
 
 from ur_cartesian_driver.urscript.compiling.scopes import Builtin
 from ur_cartesian_driver.urscript.core_builtins import core_builtins
-from ur_cartesian_driver.urscript.parsing.parser import parse
+from ur_cartesian_driver.urscript.parsing.parser import parse, parse_line
 from ur_cartesian_driver.urscript.parsing.syntax_tree import ScriptProgram
 from ur_cartesian_driver.urscript.running.line_compiler import CompiledLine
 from ur_cartesian_driver.urscript.running.script_interpreter import ScriptInterpreter
@@ -41,5 +41,6 @@ __all__ = [
     'Value',
     'core_builtins',
     'parse',
+    'parse_line',
     'to_text',
 ]

@@ -61,9 +61,7 @@ class ExpressionCompiler:
             case tree.LogicalExpression():
                 return self._logical(node)
             case tree.ListLiteral() | tree.PoseLiteral():
-                make = values.make_list if isinstance(node, tree.ListLiteral) else values.make_pose
-                items = [self.expression(item) for item in node.items]
-                return self._positioned(node, items, lambda frame, found: make(found))
+                return self._literal(node)
             case tree.IndexExpression():
                 return self._index(node)
             case tree.FieldExpression():
@@ -79,6 +77,18 @@ class ExpressionCompiler:
             case tree.RunExpression():
                 return self._run(node)
         raise AssertionError(node)
+
+    def _literal(self, node: tree.ListLiteral | tree.PoseLiteral) -> CompiledNode:
+        is_list = isinstance(node, tree.ListLiteral)
+        make = values.make_list if is_list else values.make_pose
+        numbers = [_number(item) for item in node.items]
+        if None in numbers:
+            items = [self.expression(item) for item in node.items]
+            return self._positioned(node, items, lambda frame, found: make(found))
+        value = make(numbers)  # which cannot fail
+        signs = sum(isinstance(item, tree.UnaryExpression) for item in node.items)
+        run = (lambda frame: value[:]) if is_list else (lambda frame: value)
+        return CompiledNode(run, False, 1 + len(numbers) + signs)
 
     def copied_expression(self, node: tree.Expression) -> CompiledNode:
         """Compile an expression whose value will be stored or passed on."""
@@ -393,3 +403,15 @@ def _from_builtin(
     name = node.function if isinstance(node, tree.CallExpression) else name
     text = f'{name}: {error}' if str(error) else f'{name}: {type(error).__name__}'
     return RuntimeException(text, node.line, node.column)
+
+
+def _number(node: tree.Expression) -> int | float | None:
+    """Return the value of a number in the text, with its sign; None if it is none."""
+    if isinstance(node, tree.UnaryExpression) and node.operator == '-':
+        number = (
+            _number(node.operand) if isinstance(node.operand, tree.ConstantExpression) else None
+        )
+        return None if number is None else -number
+    if isinstance(node, tree.ConstantExpression) and values.is_number(node.value):
+        return node.value
+    return None

@@ -29,6 +29,14 @@ Builtin = Callable[..., Any]
 #: Slot 0 of a frame holds the return value.
 FIRST_LOCAL = 1
 
+#: What has statements in it.
+_COMPOUND = (
+    tree.IfStatement,
+    tree.SwitchStatement,
+    tree.WhileStatement,
+    tree.ConditionalBlock,
+)
+
 
 @dataclass(slots=True, kw_only=True)
 class Scope:
@@ -89,17 +97,17 @@ def resolve(
     return root
 
 
-def _own_nodes(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
-    """Yield all nodes and their descendants, without entering function definitions."""
+def _own_statements(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
+    """Yield all statements and those in them, without entering function definitions."""
     for node in nodes:
         yield node
-        if not isinstance(node, tree.FunctionDefinition):
-            yield from _own_nodes(tree.children(node))
+        if isinstance(node, _COMPOUND):
+            yield from _own_statements(tree.children(node))
 
 
 def _declare(scope: Scope) -> None:
     """Collect functions and globals of a scope and of all within it."""
-    for node in _own_nodes(scope.body):
+    for node in _own_statements(scope.body):
         if isinstance(node, tree.FunctionDefinition):
             inner = Scope(parent=scope, owner=node, globals=scope.globals)
             scope.functions[node.name] = inner
@@ -120,7 +128,7 @@ def _assign_locals(scope: Scope) -> None:
     if scope.definition is None:
         return
     names = [parameter.name for parameter in scope.definition.parameters]
-    for node in _own_nodes(scope.body):
+    for node in _own_statements(scope.body):
         if isinstance(node, tree.AssignStatement) and isinstance(node.target, tree.NameExpression):
             name = node.target.identifier
             if node.qualifier == 'local' or (not node.qualifier and name not in scope.globals):
@@ -178,6 +186,8 @@ class _NameChecker:
         self._builtins = builtins
         #: Of those that are called, by name.
         self._signatures: dict[str, inspect.Signature | None] = {}
+        #: Calls that fit: function, number of arguments, names of named ones.
+        self._fitting: set[tuple[str, int, tuple[str, ...]]] = set()
 
     def block(self, scope: Scope, nodes: Iterable[tree.SyntaxNode]) -> None:
         """Check nodes and everything below them."""
@@ -217,8 +227,11 @@ class _NameChecker:
                 scope.suspends = True
             if call.function not in self._signatures:
                 self._signatures[call.function] = _signature(self._builtins[call.function])
-            if signature := self._signatures[call.function]:
+            names = tuple(a.name for a in call.arguments if a.name is not None)
+            form = call.function, len(call.arguments), names
+            if form not in self._fitting and (signature := self._signatures[call.function]):
                 _check_arguments(call, signature)
+                self._fitting.add(form)
         else:
             raise name_not_found(call.function, call.line, call.column)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The grammar rules of expressions, one method each, lowest precedence first.
+The grammar rules of expressions; one method reads all operators, by their precedence.
 
 The head of the following module describes the grammar:
 :mod:`~ur_cartesian_driver.urscript.parsing.parser`.
@@ -9,16 +9,24 @@ The head of the following module describes the grammar:
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.parsing.scanner import TokenKind
 from ur_cartesian_driver.urscript.parsing.token_reader import (
+    FIXED,
     MAX_CHAIN,
     source_position,
     SourcePosition,
     TokenReader,
 )
+
+#: Of operators between two operands; `not` binds less than a comparison.
+_PRECEDENCE = {
+    'or': 1, 'xor': 1, 'and': 2, '==': 4, '!=': 4, '<': 4, '<=': 4, '>': 4, '>=': 4,
+    '+': 5, '-': 5, '*': 6, '/': 6, '%': 6,
+}  # fmt: skip
+_NOT = 3
+#: What may follow a value and belongs to it.
+_POSTFIXES = frozenset({'.', '(', '['})
 
 CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}
 
@@ -26,48 +34,39 @@ CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None':
 class ExpressionParser(TokenReader):
     """Reads expressions."""
 
-    def _expression(self) -> tree.Expression:
-        """Read conjunction { ( "or" | "xor" ) conjunction }."""
-        return self._chain(self._conjunction, tree.LogicalExpression, 'or', 'xor')
+    def _expression(self, lowest: int = 1) -> tree.Expression:
+        """
+        Read operand { operator operand }, left-associative.
 
-    def _conjunction(self) -> tree.Expression:
-        """Read inversion { "and" inversion }."""
-        return self._chain(self._inversion, tree.LogicalExpression, 'and')
+        :param lowest: operators of lower precedence end it.
+        """
+        at_not = lowest <= _NOT and self._at('not')
+        left = self._inversion() if at_not else self._unary()
+        row, before = 0, 0
+        while True:
+            token = self._token
+            precedence = _PRECEDENCE.get(token.text, 0)
+            if precedence < lowest or token.kind not in FIXED:
+                return left
+            row, before = row + 1 if precedence == before else 1, precedence
+            if row > MAX_CHAIN:
+                raise self.error(f'more than {MAX_CHAIN} operators in a row')
+            self._advance()
+            node = tree.LogicalExpression if precedence < _NOT else tree.BinaryExpression
+            left = node(
+                operator=token.text,
+                left=left,
+                right=self._expression(precedence + 1),
+                line=token.line,
+                column=token.column,
+            )
 
     def _inversion(self) -> tree.Expression:
-        """Read "not" inversion | comparison."""
-        if token := self._match('not'):
-            with self._nested():
-                operand = self._inversion()
-            return tree.UnaryExpression(operator='not', operand=operand, **source_position(token))
-        return self._comparison()
-
-    def _comparison(self) -> tree.Expression:
-        """Read sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }."""
-        operators = ('==', '!=', '<', '<=', '>', '>=')
-        return self._chain(self._sum, tree.BinaryExpression, *operators)
-
-    def _sum(self) -> tree.Expression:
-        """Read product { ( "+" | "-" ) product }."""
-        return self._chain(self._product, tree.BinaryExpression, '+', '-')
-
-    def _product(self) -> tree.Expression:
-        """Read unary { ( "*" | "/" | "%" ) unary }."""
-        return self._chain(self._unary, tree.BinaryExpression, '*', '/', '%')
-
-    def _chain(
-        self,
-        operand: Callable[[], tree.Expression],
-        node: type[tree.BinaryExpression | tree.LogicalExpression],
-        *operators: str,
-    ) -> tree.Expression:
-        """Read operand { operator operand }, left-associative."""
-        left = operand()
-        if not self._at(*operators):  # mostly
-            return left
-        for token in self._operators(*operators):
-            left = node(operator=token.text, left=left, right=operand(), **source_position(token))
-        return left
+        """Read "not" ( inversion | comparison )."""
+        token = self._advance()
+        with self._nested():
+            operand = self._expression(_NOT)
+        return tree.UnaryExpression(operator='not', operand=operand, **source_position(token))
 
     def _unary(self) -> tree.Expression:
         """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
@@ -89,7 +88,7 @@ class ExpressionParser(TokenReader):
         """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
         value = self._primary()
         for _ in range(MAX_CHAIN):
-            if not self._at('.', '(', '['):
+            if self._token.text not in _POSTFIXES:  # mostly
                 return value
             if self._at('.'):
                 value = self._field(value)
@@ -139,7 +138,9 @@ class ExpressionParser(TokenReader):
             name = start.text
             self._advance()
             self._advance()
-        return tree.CallArgument(name=name, value=self._expression(), **source_position(start))
+        return tree.CallArgument(
+            name=name, value=self._expression(), line=start.line, column=start.column
+        )
 
     def _index(self, target: tree.Expression) -> tree.Expression:
         """Read "[" expression [ "," expression ] "]"; six after the name p are a pose."""
@@ -159,11 +160,15 @@ class ExpressionParser(TokenReader):
         """Read NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
         token = self._token
         if token.kind is TokenKind.NUMBER:
-            return tree.ConstantExpression(value=self._advance().number, **source_position(token))
+            self._advance()
+            return tree.ConstantExpression(
+                value=token.number, line=token.line, column=token.column
+            )
         if token.kind is TokenKind.STRING:
             return tree.ConstantExpression(value=self._advance().text, **source_position(token))
         if token.kind is TokenKind.NAME:
-            return tree.NameExpression(identifier=self._advance().text, **source_position(token))
+            self._advance()
+            return tree.NameExpression(identifier=token.text, line=token.line, column=token.column)
         if self._at(*CONSTANTS):
             return tree.ConstantExpression(
                 value=CONSTANTS[self._advance().text], **source_position(token)

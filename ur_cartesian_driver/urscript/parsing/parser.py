@@ -84,6 +84,8 @@ class Parser(ExpressionParser):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._loops = 0
+        #: The first block whose `end` stands in another column, or None.
+        self._misaligned: Token | None = None
 
     # Programs, functions and blocks
 
@@ -101,7 +103,7 @@ class Parser(ExpressionParser):
         name = self._expect_kind(TokenKind.NAME).text
         for symbol in '():':
             self._expect(symbol)
-        body = self._block('end')
+        body = self._block(start, 'end')
         self._expect('end')
         if self._token.kind is not TokenKind.END:
             raise self.error('there is text after the end of the program')
@@ -117,19 +119,31 @@ class Parser(ExpressionParser):
             name='line', kind='def', body=tuple(statements), **source_position(start)
         )
 
-    def _block(self, *closing: str) -> tree.StatementBlock:
-        """Read { statement }, up to one of the keywords that close it."""
+    def _block(self, start: Token, *closing: str) -> tree.StatementBlock:
+        """
+        Read { statement }, up to one of the keywords that close it.
+
+        If the last `end` is missing, the text leaves open which block has none: we name the first
+        one that the indentation shows to be closed by the `end` of another.
+
+        :param start: the token that began it.
+        """
         statements: list[tree.Statement] = []
         with self._nested():
             while not self._at(*closing):
                 if self._token.kind is TokenKind.END:
-                    raise self.error("an 'end' is missing")
+                    start = self._misaligned or start
+                    raise self.error(f"the {start.text!r} of line {start.line} has no 'end'")
                 statements.append(self._statement())
+        end = self._token
+        if end.text == 'end' and end.line > start.line and end.column != start.column:
+            self._misaligned = self._misaligned or start
         return tuple(statements)
 
     def _function(self) -> tree.FunctionDefinition:
         """Read ("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"."""
-        kind: Literal['def', 'thread'] = 'def' if self._advance().text == 'def' else 'thread'
+        start = self._advance()
+        kind: Literal['def', 'thread'] = 'def' if start.text == 'def' else 'thread'
         name = self._expect_kind(TokenKind.NAME)
         self._expect('(')
         parameters = self._list(self._parameter, ')')
@@ -139,7 +153,7 @@ class Parser(ExpressionParser):
             raise self.error('a thread takes no parameters', name)
         self._expect(':')
         loops, self._loops = self._loops, 0
-        body = self._block('end')
+        body = self._block(start, 'end')
         self._loops = loops
         self._expect('end')
         return tree.FunctionDefinition(
@@ -175,21 +189,21 @@ class Parser(ExpressionParser):
         while keyword := self._match('if') if not branches else self._match('elif'):
             condition = self._expression()
             self._expect(':')
-            body = self._block('elif', 'else', 'end')
+            body = self._block(start, 'elif', 'else', 'end')
             branches.append(
                 tree.ConditionalBlock(condition=condition, body=body, **source_position(keyword))
             )
-        otherwise = self._else('else') if self._at('else') else ()
+        otherwise = self._else('else', start) if self._at('else') else ()
         self._expect('end')
         return tree.IfStatement(
             branches=tuple(branches), otherwise=otherwise, **source_position(start)
         )
 
-    def _else(self, keyword: str) -> tree.StatementBlock:
+    def _else(self, keyword: str, start: Token) -> tree.StatementBlock:
         """Read ("else" | "default") ":" block."""
         self._expect(keyword)
         self._expect(':')
-        return self._block('end')
+        return self._block(start, 'end')
 
     def _switch(self) -> tree.SwitchStatement:
         """Read "switch" expression ":" { "case" ... } [ "default" ... ] "end"."""
@@ -201,7 +215,7 @@ class Parser(ExpressionParser):
         while keyword := self._match('case'):
             value = self._expression()
             self._expect(':')
-            body = self._block('case', 'default', 'end')
+            body = self._block(keyword, 'case', 'default', 'end')
             cases.append(
                 tree.ConditionalBlock(condition=value, body=body, **source_position(keyword))
             )
@@ -210,7 +224,7 @@ class Parser(ExpressionParser):
                 self._expect('end')
         otherwise: tree.StatementBlock = ()
         if self._at('default'):
-            otherwise = self._else('default')
+            otherwise = self._else('default', start)
             if self._case_has_end(start) if ends is None else ends:
                 self._expect('end')
         self._expect('end')
@@ -242,7 +256,7 @@ class Parser(ExpressionParser):
         condition = self._expression()
         self._expect(':')
         self._loops += 1
-        body = self._block('end')
+        body = self._block(start, 'end')
         self._loops -= 1
         self._expect('end')
         return tree.WhileStatement(condition=condition, body=body, **source_position(start))

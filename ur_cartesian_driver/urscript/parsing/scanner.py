@@ -9,7 +9,6 @@ the language depends on lines.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from enum import Enum
 import re
 from typing import NamedTuple
@@ -29,13 +28,14 @@ SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$')
 #: Integers of the controller have 32 bits; a longer literal is read as a float.
 INT_LIMIT = 2**31
 
-_BLANK = re.compile(r'(?:[ \t\r\f\v\n]|#[^\n]*)+')
 _WORD = re.compile(r'[A-Za-z_][A-Za-z_0-9]*')
 _TOKEN = re.compile(
-    rf'(?P<word>{_WORD.pattern})'
+    r'(?P<blank>(?:[ \t\r\f\v\n]|#[^\n]*)+)'
+    rf'|(?P<word>{_WORD.pattern})'
     r'|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)'
     r'|(?P<string>"[^"\n]*")'
     rf'|(?P<symbol>{"|".join(map(re.escape, SYMBOLS))})'
+    r'|(?P<other>.)'
 )
 
 
@@ -80,39 +80,36 @@ def scan(text: str) -> list[Token]:
 
     :raises CompileError: at the first character that begins no token.
     """
-    return list(_scan(text))
-
-
-def _scan(text: str) -> Iterator[Token]:
-    position, line, line_start = 0, 1, 0
-    while True:
-        if blank := _BLANK.match(text, position):
-            position = blank.end()
-            if newlines := blank.group().count('\n'):
+    tokens: list[Token] = []
+    line, line_start = 1, 0
+    for found in _TOKEN.finditer(text):
+        group, word, start = found.lastgroup, found.group(), found.start()
+        column = start - line_start + 1
+        if group == 'blank':
+            if newlines := word.count('\n'):
                 line += newlines
-                line_start = text.rindex('\n', blank.start(), position) + 1
-        column = position - line_start + 1
-        if position == len(text):
-            yield Token(TokenKind.END, '', line, column)
-            return
-        kind, word, position = _token(text, position, line, column)
-        yield Token(kind, word, line, column)
+                line_start = start + word.rindex('\n') + 1
+            continue
+        if group == 'symbol':
+            kind = TokenKind.SYMBOL
+        elif group == 'number':
+            kind = TokenKind.NUMBER
+            _check_number(text, found.end(), line, column)
+        elif group == 'word':
+            kind = TokenKind.KEYWORD if word in KEYWORDS else TokenKind.NAME
+        elif group == 'string':
+            kind, word = TokenKind.STRING, word[1:-1]
+        elif word == '"':
+            raise syntax_error(text, line, column, 'a string is not closed on its line')
+        else:
+            raise syntax_error(text, line, column, f'{word!r} has no meaning here')
+        tokens.append(Token(kind, word, line, column))
+    tokens.append(Token(TokenKind.END, '', line, len(text) - line_start + 1))
+    return tokens
 
 
-def _token(text: str, start: int, line: int, column: int) -> tuple[TokenKind, str, int]:
-    """Return kind and text of the token at `start`, and where it ends."""
-    if found := _TOKEN.match(text, start):
-        word, end = found.group(), found.end()
-        match found.lastgroup:
-            case 'word':
-                return TokenKind.KEYWORD if word in KEYWORDS else TokenKind.NAME, word, end
-            case 'number':
-                if _WORD.match(text, end):
-                    raise syntax_error(text, line, column, 'a number ends in letters')
-                return TokenKind.NUMBER, word, end
-            case 'string':
-                return TokenKind.STRING, word[1:-1], end
-        return TokenKind.SYMBOL, word, end
-    if text[start] == '"':
-        raise syntax_error(text, line, column, 'a string is not closed on its line')
-    raise syntax_error(text, line, column, f'{text[start]!r} has no meaning here')
+def _check_number(text: str, end: int, line: int, column: int) -> None:
+    if text.startswith('.', end):
+        raise syntax_error(text, line, column, 'a number has two decimal points')
+    if _WORD.match(text, end):
+        raise syntax_error(text, line, column, 'a number ends in letters')

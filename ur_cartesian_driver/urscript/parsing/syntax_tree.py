@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+import re
 from typing import Literal as OneOf
 
 
@@ -281,8 +282,7 @@ def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
     """Yield the nodes directly below `node`, in the order of the text."""
     kind = type(node)
     if kind not in _FIELDS:
-        own = {field.name for field in fields(SyntaxNode)}
-        _FIELDS[kind] = tuple(f.name for f in fields(node) if f.name not in own)
+        _FIELDS[kind] = tuple(f.name for f in fields(node) if not _IS_PLAIN(str(f.type)))
     for name in _FIELDS[kind]:
         value = getattr(node, name)
         if isinstance(value, SyntaxNode):
@@ -291,5 +291,7 @@ def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
             yield from value
 
 
-#: What a kind of node has beside its place; asked for by each walk through a tree.
+#: Where a kind of node has other nodes; asked for by each walk through a tree.
 _FIELDS: dict[type[SyntaxNode], tuple[str, ...]] = {}
+#: Types of fields that hold no nodes.
+_IS_PLAIN = re.compile(r'(?:int|float|str|bool|None|OneOf\[.*\]|[ |])+').fullmatch

@@ -17,7 +17,7 @@ MAX_NESTING = 50
 MAX_CHAIN = 100
 
 #: Tokens that only stand for themselves.
-_FIXED = (TokenKind.KEYWORD, TokenKind.SYMBOL)
+FIXED = (TokenKind.KEYWORD, TokenKind.SYMBOL)
 
 T = TypeVar('T')
 
@@ -41,11 +41,8 @@ class TokenReader:
         self._text = text
         self._tokens = scan(text)
         self._next = 0
+        self._token = self._tokens[0]
         self._nesting = 0
-
-    @property
-    def _token(self) -> Token:
-        return self._tokens[self._next]
 
     @property
     def _previous(self) -> Token:
@@ -55,12 +52,13 @@ class TokenReader:
         token = self._token
         if token.kind is not TokenKind.END:
             self._next += 1
+            self._token = self._tokens[self._next]
         return token
 
     def _at(self, *texts: str) -> bool:
         """Tell whether the next token is one of these keywords or symbols."""
-        token = self._tokens[self._next]
-        return token.text in texts and token.kind in _FIXED  # a string may have the same text
+        token = self._token
+        return token.text in texts and token.kind in FIXED  # a string may have the same text
 
     def _match(self, *texts: str) -> Token | None:
         return self._advance() if self._at(*texts) else None
@@ -107,13 +105,3 @@ class TokenReader:
                     items.append(item())
         self._expect(close)
         return tuple(items)
-
-    def _operators(self, *texts: str) -> Iterator[Token]:
-        """Yield the operators of one chain; it is limited because the tree is as deep."""
-        for _ in range(MAX_CHAIN):
-            token = self._match(*texts)
-            if token is None:
-                return
-            yield token
-        if self._at(*texts):
-            raise self.error(f'more than {MAX_CHAIN} operators in a row')
