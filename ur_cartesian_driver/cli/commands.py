@@ -87,6 +87,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         has_remote_control=not arguments.no_remote_control,
         rate=arguments.rate,
         faults=arguments.faults,
+        contacts=arguments.contacts,
         imperfections=imperfections(arguments),
         geometry=calibration(arguments, robot_model(arguments.model)),
         programs={_program_name(file): file.read_text() for file in files},

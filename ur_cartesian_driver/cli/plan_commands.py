@@ -80,7 +80,9 @@ def show(arguments: argparse.Namespace) -> int:
     status = 0
     try:
         try:
-            page = motion_page(planning.plan(), planning.arm, planning.planes)
+            found = planning.plan()
+            with timed('drawing'):
+                page = motion_page(found, planning.arm, planning.planes)
         except GoalRefused as refusal:
             print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
             if planning.goal is None:

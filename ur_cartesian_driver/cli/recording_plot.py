@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_format import (
     EXECUTED_DTYPE,
@@ -41,11 +42,13 @@ def plot(arguments: argparse.Namespace) -> int:
     """Draw a recording, or write its table."""
     file = newest_recording(Path(arguments.file))
     if arguments.csv:
-        write_table(Recording.load(file), Path(arguments.csv))
+        with timed('writing the table'):
+            write_table(Recording.load(file), Path(arguments.csv))
         print(f'table: {arguments.csv}')
     if arguments.output or not arguments.csv:
         picture = Path(arguments.output or file.with_suffix('.png'))
-        draw(Recording.load(file, MAX_ROWS), picture)
+        with timed('drawing'):
+            draw(Recording.load(file, MAX_ROWS), picture)
         print(f'picture: {picture}')
     return 0
 

@@ -1,0 +1,130 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the arguments of commands say: one function for each kind, for ``type=`` of argparse."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from ur_cartesian_driver.cli import sweep_command
+from ur_cartesian_driver.importing.import_options import (
+    CodeOutput,
+    parse_code_output,
+    parse_length,
+)
+from ur_cartesian_driver.planning.request.validate import MAX_JOINT_VALUE
+from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
+from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
+from ur_cartesian_driver.sim.faults.fault_values import Fault
+
+#: Of options that are times [s].
+MAX_SECONDS = 86400.0
+#: Of offsets of a goal [m], [rad].
+MAX_OFFSET = 50.0
+
+T = TypeVar('T')
+
+
+def fault(text: str) -> Fault:
+    """Return a fault of the simulator, and when it happens."""
+    return _parsed(parse_fault, text)
+
+
+def length(text: str) -> float:
+    """Return a length with its unit [m]."""
+    return _parsed(parse_length, text)
+
+
+def code_output(text: str) -> tuple[str, CodeOutput]:
+    """Return a code of a G-code file, and the output that it sets."""
+    return _parsed(parse_code_output, text)
+
+
+def joints(text: str) -> tuple[float, ...]:
+    """Return six joint positions [rad]."""
+    return _six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
+
+
+def tcp(text: str) -> tuple[float, ...]:
+    """Return a pose of six numbers [m], [rad]."""
+    return _six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
+
+
+def offsets(text: str) -> tuple[float, ...]:
+    """Return equally spaced numbers from the first to the last, like ``-0.1,0.1,5``."""
+    try:
+        first, last, number = text.split(',')
+        numbers = np.linspace(float(first), float(last), count(number)).round(9).tolist()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is not FROM,TO,COUNT') from None
+    if not numbers or not all(abs(offset) <= MAX_OFFSET for offset in numbers):  # NaN neither
+        raise argparse.ArgumentTypeError(f'{text!r} is not within {MAX_OFFSET:g}, or has no count')
+    return tuple(numbers)
+
+
+def count(text: str) -> int:
+    """Return a number of things, such as variants of a sweep."""
+    number = int(text)
+    if not 0 <= number <= sweep_command.MAX_VARIANTS:
+        raise argparse.ArgumentTypeError(
+            f'{text} is not within 0 and {sweep_command.MAX_VARIANTS}'
+        )
+    return number
+
+
+def factor(text: str) -> float:
+    """Return a number above 0."""
+    number = float(text)
+    if not 0.0 < number <= 1e6:  # NaN neither
+        raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    return number
+
+
+def port(text: str) -> int:
+    """Return the number of a port; 0 = any."""
+    number = int(text)
+    if not 0 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f'{number} is no port; give 0 to 65535')
+    return number
+
+
+def seconds(text: str) -> float:
+    """Return a time [s]."""
+    try:
+        number = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{error}; give seconds') from None
+    if not 0.0 <= number <= MAX_SECONDS:  # NaN neither
+        raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
+    return number
+
+
+def _parsed(parse: Callable[[str], T], text: str) -> T:
+    """Let argparse print the reason that a parser gives."""
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
+    """
+    Return six numbers separated by commas.
+
+    :param bounds: of the first three, and of the last three.
+    """
+    try:
+        numbers = tuple(float(part) for part in text.split(','))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{error}; give six numbers, with commas') from None
+    if len(numbers) != 6:
+        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
+    for i, number in enumerate(numbers):
+        bound = bounds[i // 3]
+        if not abs(number) <= bound:  # NaN neither
+            raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
+    return numbers
