@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Draw the pictures of doc/execution.md from recordings of the goals that the page shows.
+Draw the pictures of the pages on goals from recordings of the goals that they show.
 
 Simulated controller and robot loop run in virtual time, so the pictures are the same each time but
 for the date in their titles, which is left out::
@@ -11,9 +11,11 @@ for the date in their titles, which is left out::
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from functools import partial
+from math import nan
 from pathlib import Path
 import sys
 import tempfile
@@ -22,6 +24,8 @@ from typing import Any
 CHECKOUT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(CHECKOUT / 'test' / 'support'))
 
+#: Of the controller in these cells, and between two samples [s].
+CYCLE = 0.008
 #: Number of colours: enough for lines, and the file is a quarter as large.
 COLOURS = 64
 
@@ -35,13 +39,14 @@ class Picture:
 
 
 def a_goal(
-    name: str, *faults: str, execution: str = ''
+    name: str, *faults: str, execution: str = '', input_after: float = nan
 ) -> Callable[[Any], Coroutine[None, None, Any]]:
     """
     Return the execution of an example.
 
     :param faults: as on the command line of ``ur-cartesian sim``.
     :param execution: in the place of that of the file.
+    :param input_after: how long after the start digital input 3 comes [s].
     """
 
     async def happens(cell: Any) -> Any:
@@ -65,6 +70,9 @@ def a_goal(
         motion = cell.owner.start(
             plan(goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions())
         )
+        if input_after > 0.0:
+            await cell.sleep(input_after)
+            cell.robot.controller.io.digital_in.standard[3] = True
         await cell.until(lambda: motion.outcome is not None, 120.0)
         return motion.outcome
 
@@ -103,6 +111,55 @@ async def a_late_producer(cell: Any) -> Any:
     return await motion.ended()
 
 
+async def a_press(cell: Any) -> list[tuple[float, ...]]:
+    """Grind a part that is lower than the path and has a step; return time, heights, force."""
+    from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
+    from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+
+    controller, rows = cell.robot.controller, []
+    x, y, z = cell.memory.read().actual_tcp_pose.position
+    controller.contact.bodies = (
+        ContactBody('plane', (x, y, z - 0.032), (0.0, 0.0, 1.0), friction=0.1),
+        ContactBody('box', (x + 0.1, y + 0.1, z - 0.041), (0.12, 0.2, 0.02), friction=0.1),
+    )
+    running = asyncio.ensure_future(a_goal('grind')(cell))
+    while not running.done():
+        heights = controller.motion.T_base_tcp, controller.actual.T_base_tcp
+        rows.append(
+            (
+                cell.loop.time(),
+                *(1e3 * (pose.position[2] - z) for pose in heights),
+                COMPUTED['actual_TCP_force'](controller)[2],
+            )
+        )
+        await cell.sleep(CYCLE)
+    assert running.result().succeeded, running.result()
+    return rows
+
+
+def draw_press() -> Path:
+    """Draw how the tool gives way, and its force; return the file of the picture."""
+    from matplotlib import pyplot
+    import numpy as np
+    from robot_cell import run_cell
+
+    drawing = CHECKOUT / 'doc' / 'execution_press.png'
+    time, path, tool, force = np.array(run_cell(a_press)).T
+    figure, (heights, forces) = pyplot.subplots(2, 1, sharex=True, figsize=(9.0, 4.2))
+    heights.plot(time - time[0], path, color='#9aa5b1', label='path of the program')
+    heights.plot(time - time[0], tool, color='#c8372d', label='tool')
+    heights.set(xlim=(1.0, 4.6), ylim=(-36.0, -24.0), ylabel='height [mm]')
+    heights.legend(loc='upper center')
+    heights.set_title('20 N on a part with a step, lower than the path (presses)')
+    forces.plot(time - time[0], force, color='#1f77b4')
+    forces.set_ylabel('force on the tool [N]')
+    forces.set_xlabel('time [s]')
+    figure.tight_layout()
+    figure.savefig(drawing, dpi=100)
+    compress(drawing)
+    return drawing
+
+
 PICTURES = {
     'primitives': Picture(
         title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
@@ -121,6 +178,22 @@ PICTURES = {
     'outputs': Picture(
         title='A bead of glue: a valve that opens and closes on the way (io_commands)',
         happens=a_goal('glue'),
+    ),
+    'waits': Picture(
+        title='A seam that begins 0.3 s after its arc burns (input_waits, dwell)',
+        happens=a_goal('arc_start', input_after=1.6),
+    ),
+    'amounts': Picture(
+        title='A bead: the pump follows the speed of the tool (proportional_outputs)',
+        happens=a_goal('bead'),
+    ),
+    'steady': Picture(
+        title='A seam at 0.05 m/s around a corner (min_speed_fraction)',
+        happens=a_goal('steady'),
+    ),
+    'stall': Picture(
+        title='An arm that is pushed 20 mm aside for 2 s: the motion waits (STALL)',
+        happens=a_goal('stall', 'offset pose z 0.02 at 0.05 m for 2 s'),
     ),
     'open': Picture(
         title='Points that come while the arm goes (keep_open); once they come too late',
@@ -141,8 +214,6 @@ def record(picture: Picture, directory: Path) -> Path:
 
 def draw(name: str) -> Path:
     """Record and draw; return the file of the picture."""
-    from PIL import Image
-
     from ur_cartesian_driver.cli import recording_plot as plot
     from ur_cartesian_driver.driver.recordings.recording import Recording
 
@@ -150,12 +221,19 @@ def draw(name: str) -> Path:
     with tempfile.TemporaryDirectory() as directory:
         recording = Recording.load(record(PICTURES[name], Path(directory)))
     plot.draw(recording, drawing, title=PICTURES[name].title)
-    with Image.open(drawing) as image:
-        image.convert('RGB').quantize(COLOURS).save(drawing, optimize=True)
+    compress(drawing)
     return drawing
 
 
+def compress(drawing: Path) -> None:
+    """Write a picture again with a few colours."""
+    from PIL import Image
+
+    with Image.open(drawing) as image:
+        image.convert('RGB').quantize(COLOURS).save(drawing, optimize=True)
+
+
 if __name__ == '__main__':
-    for wanted in sys.argv[1:] or PICTURES:
-        path = draw(wanted)
+    for wanted in sys.argv[1:] or (*PICTURES, 'press'):
+        path = draw_press() if wanted == 'press' else draw(wanted)
         sys.stdout.write(f'{path}: {path.stat().st_size / 1000:.0f} kB\n')
