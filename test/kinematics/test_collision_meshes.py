@@ -5,6 +5,7 @@
 from math import pi
 
 from collision_shapes import capsules, T_base_meshes
+from meshes import need_meshes
 import numpy as np
 import pytest
 
@@ -26,9 +27,7 @@ from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 
 @pytest.fixture(scope='module')
 def pinocchio():
-    for name in MODELS_WITH_MESHES:
-        if missing := missing_meshes(name):
-            pytest.skip(missing)
+    need_meshes(*MODELS_WITH_MESHES)
     return pytest.importorskip('pinocchio')
 
 

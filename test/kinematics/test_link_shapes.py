@@ -5,6 +5,7 @@
 from math import pi
 import sys
 
+from meshes import need_meshes
 import numpy as np
 import pytest
 
@@ -56,11 +57,9 @@ def test_frames_of_a_calibrated_arm_are_near_the_nominal_ones(name, calibrated_a
 @pytest.mark.parametrize('name', ['ur3', 'ur5', 'ur10', 'ur3e', 'ur5e'])
 def test_meshes_stand_where_the_robot_descriptions_have_them(name):
     """Pinocchio's model of the package's URDF, from ``base``, against ours: links and meshes."""
+    need_meshes(name)
     pinocchio = pytest.importorskip('pinocchio')
-    try:
-        shapes = link_meshes(name, 'visual')
-    except FileNotFoundError as error:
-        pytest.skip(str(error))
+    shapes = link_meshes(name, 'visual')
     folder = shapes[0].mesh.parents[1]
     if shapes[0].mesh.suffix == '.obj':
         (urdf,) = folder.glob('*.urdf')
