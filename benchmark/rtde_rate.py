@@ -88,8 +88,7 @@ def _packages(wire: socket.socket) -> Iterator[tuple[float, float]]:
         arrival = time.monotonic()
         for event in client.feed(data):
             if isinstance(event, DataReceived):
-                # The recipe's first name is `timestamp`, which is one number.
-                yield float(event.values[0]), arrival  # type: ignore[arg-type]
+                yield float(event.values[0]), arrival  # type: ignore[arg-type]  # `timestamp`
         if request := client.data_to_send():
             wire.sendall(request)
 

@@ -30,6 +30,7 @@ from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.faults.fault_values import AfterTime
+from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
@@ -96,10 +97,11 @@ def sent(cell, words):
 
 
 def ended(sim, send, cancel_after):
-    """Return the outcome of a goal with the faults of a ``sim`` command."""
+    """Return the outcome of a goal with the faults and contacts of a ``sim`` command."""
 
     async def scenario(cell):
         cell.robot.inject(*sim.faults)
+        cell.robot.controller.contact.bodies = tuple(map(ContactBody.parse, sim.contacts))
         motion = cell.owner.start(sent(cell, send))
         if cancel_after:
             await cell.until(lambda: len(motion.progress) > cancel_after)

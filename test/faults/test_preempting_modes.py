@@ -13,10 +13,10 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
-#: An arm that is held off its path is not where the next goal could begin, and one that rests at a
-#: point does not move: two kinds are left out.
+#: An arm that is held off its path is not where the next goal could begin, one that rests at a
+#: point does not move, and one that presses stops as PRIMITIVES do: three kinds are left out.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
-del KINDS['Waiting for the arm'], KINDS['At a point']
+del KINDS['Waiting for the arm'], KINDS['At a point'], KINDS['Press']
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',

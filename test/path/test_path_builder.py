@@ -13,7 +13,14 @@ import pytest
 
 from ur_cartesian_driver.goal_files import GoalFileError
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SafeOutput, SegmentType
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    ContactEnd,
+    OutputKind,
+    Press,
+    SafeOutput,
+    SegmentType,
+)
 from ur_cartesian_driver.motion.pose import rotate
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.path import (
@@ -330,7 +337,7 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (lambda: Path().joint(HERE).reversed(), 'reversed() has no start to go back to'),
         (
             lambda: START.by(dx=0.1).set(TORCH, True).reversed(),
-            'reversed() has outputs, inputs or payloads, which have no reverse',
+            'reversed() has outputs, inputs, payloads or presses, which have no reverse',
         ),
         (lambda: START.repeated(0), 'repeated() is asked for 0 times'),
         (lambda: START.by(dx=0.1).weave(0.01, 0.1), 'weave() needs a speed and a wavelength'),
@@ -432,6 +439,38 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
 def test_a_dwell_that_cannot_be_is_refused(make, text):
     with pytest.raises(InvalidGoal, match=re.escape(text)):
         make()
+
+
+def test_a_press_begins_and_ends_where_the_arm_stops():
+    path = (
+        Path(HERE).at(blend=0.01)
+        .by(dz=-0.1)
+        .press({'z': 20.0, 'rx': 0.0}, speed_limits={'z': 0.02, 'rx': 0.1}, max_yield=0.01)
+        .by(dy=0.1).by(dx=0.1).end_press().by(dz=0.1)
+    )  # fmt: skip
+    goal = path.goal()
+    assert goal.presses == (
+        Press(
+            first_waypoint=0,
+            last_waypoint=2,
+            axes=('z', 'rx'),
+            forces=(20.0, 0.0),
+            speed_limits=(0.02, 0.1),
+            max_yield=0.01,
+        ),
+    )
+    assert [segment.blend_radius for segment in goal.segments] == [0.0, 0.01, 0.0, 0.0]
+    assert Path.from_goal(goal).goal() == goal
+    assert Path.from_yaml(path.to_yaml()).goal() == goal
+    begun = Path(HERE).by(dz=-0.1).press({}, contact=ContactEnd.ENDS)
+    with pytest.raises(InvalidGoal, match=r'press\(\) at point 0 has no end; call end_press'):
+        begun.goal()
+    with pytest.raises(InvalidGoal, match=r'end_press\(\) at point 0 has no begin'):
+        begun.end_press()
+    with pytest.raises(InvalidGoal, match='has speed_limits for y; name the axes of forces'):
+        Path(HERE).by(dz=-0.1).press({'z': 1.0}, speed_limits={'y': 0.1})
+    with pytest.raises(InvalidGoal, match='axes is empty, and contact is NONE'):
+        Path(HERE).by(dz=-0.1).press({})
 
 
 def test_what_happens_at_points_is_that_of_a_goal():

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    Press,
     ProportionalOutput,
     Segment,
     SegmentType,
@@ -175,6 +176,15 @@ def test_an_amount_follows_the_speed_from_the_place_on():
         (each.first_waypoint, each.last_waypoint, each.begin_lead)
         for each in left.proportional_outputs
     ] == [(1, 3, 0.0), (2, 3, 0.1)]
+
+
+def test_the_tool_presses_from_the_place_on():
+    presses = tuple(
+        Press(first_waypoint=first, last_waypoint=last, axes=('z',), forces=(20.0,))
+        for first, last in ((0, 1), (1, 3))
+    )
+    left = resume(goal(presses=presses), at(2, 0.5)).goal
+    assert left.presses == (replace(presses[1], first_waypoint=1, last_waypoint=3),)
 
 
 def test_a_free_axis_is_free_at_the_place_too():

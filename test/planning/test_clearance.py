@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import pi
 import re
 
+from meshes import need_meshes
 import numpy as np
 import pytest
 
@@ -40,11 +41,6 @@ def check(q, start=HOME, model='ur5e', tcp=IDENTITY, **options):
     return Clearance(Arm(MODELS[model]), tcp, PlanningOptions(**options)).check(q, start)
 
 
-def needs_meshes(model='ur5'):
-    if missing := missing_meshes(model):
-        pytest.skip(missing)
-
-
 @pytest.fixture
 def no_meshes(monkeypatch):
     """Neither meshes nor pinocchio are installed."""
@@ -69,7 +65,7 @@ def test_parameter_and_model_decide_whether_to_refuse(model, choice, installed, 
     if not installed:
         request.getfixturevalue('no_meshes')
     elif model != 'ur10e':
-        needs_meshes(model)
+        need_meshes(model)
     clear = check(way(HOME, FOLDED), model=model, self_collision=choice)
     refuses = choice == 'refuse' or (choice == 'auto' and model != 'ur10e')
     assert (clear.violation is not None) == refuses
@@ -103,7 +99,7 @@ def test_what_is_missing_for_the_verdict_is_said(no_meshes):
 
 
 def test_capsules_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
-    needs_meshes('ur5e')
+    need_meshes('ur5e')
 
     def broken(*_):
         raise ImportError('numpy.core.multiarray failed to import')
@@ -114,7 +110,7 @@ def test_capsules_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
 
 
 def test_nothing_is_said_where_nothing_is_missing():
-    needs_meshes('ur5e')
+    need_meshes('ur5e')
     assert self_collision_remark('ur5e', PlanningOptions()) == ''
 
 
@@ -131,7 +127,7 @@ def test_the_first_row_too_near_is_named_and_the_smallest_distance():
 
 def test_meshes_let_pass_what_only_capsules_refuse():
     """Of all configurations that capsules refuse meshes refuse those that are really too near."""
-    needs_meshes()
+    need_meshes('ur5')
     arm = Arm(MODELS['ur5'])
     bodies, meshes = CollisionBodies(arm), CollisionMeshes(arm)
     q = np.random.default_rng(7).uniform(-pi, pi, (60, 6))
@@ -263,14 +259,14 @@ MODES = [('ur5e', {'self_collision': 'refuse'}), ('ur5', {})]
 @pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
 def test_what_starts_too_near_may_leave(model, options):
     if model == 'ur5':
-        needs_meshes()
+        need_meshes('ur5')
     assert check(way(FOLDED, HOME), start=FOLDED, model=model, **options).violation is None
 
 
 @pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
 def test_what_starts_too_near_may_not_go_nearer(model, options):
     if model == 'ur5':
-        needs_meshes()
+        need_meshes('ur5')
     deeper = (0.0, -H, 3.1, -1.8, -H, 0.0)
     found = check(way(FOLDED, deeper), start=FOLDED, model=model, **options).violation
     assert found.row < 5
@@ -280,7 +276,7 @@ def test_what_starts_too_near_may_not_go_nearer(model, options):
 @pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
 def test_what_has_left_may_not_come_back(model, options):
     if model == 'ur5':
-        needs_meshes()
+        need_meshes('ur5')
     out = way(FOLDED, HOME, 400)
     clear = check(np.concatenate([out, out[::-1]]), start=FOLDED, model=model, **options)
     first = check(out[::-1], start=HOME, model=model, **options).violation
@@ -366,7 +362,7 @@ FREE = PlanningOptions(max_approach_distance=0.0, max_tool_speed=0.0)
 
 
 def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
-    needs_meshes()
+    need_meshes('ur5')
     cell = make_cell(model='ur5')
     with pytest.raises(CollisionPredicted) as refusal:
         plan(folding(cell), cell.state, cell.arm, FREE)
@@ -413,7 +409,7 @@ def test_a_goal_that_crosses_a_plane_is_a_collision(cell):
 
 
 def test_a_goal_may_lead_out_of_a_collision(make_cell):
-    needs_meshes()
+    need_meshes('ur5')
     cell = make_cell(FOLDED, model='ur5')
     goal = Goal(
         waypoints=(Waypoint(pose=cell.tool(HOME), posture=posture(HOME)),),

@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    Press,
     ProportionalOutput,
     SafeOutput,
     Segment,
@@ -54,6 +55,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
 GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
 BEAD = ProportionalOutput(first_waypoint=0, last_waypoint=2, pin=1, gain=2.0)
 BURNING = InputWait(waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=2.0)
+GRIND = Press(first_waypoint=0, last_waypoint=1, axes=('z',), forces=(20.0,))
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
@@ -67,6 +69,10 @@ PATIENT = replace(
 
 def with_fields(goal, **fields):
     return replace(goal, **fields)
+
+
+def pressing(**fields):
+    return replace(PLAIN, presses=(replace(GRIND, **fields),))
 
 
 def with_point(goal, index, **fields):
@@ -603,6 +609,84 @@ REFUSALS = [
         with_fields(PLAIN, proportional_outputs=(BEAD,), keep_open=True),
         NotAvailable,
         'proportional_outputs is not empty, but the goal has keep_open; send all points at once',
+    ),
+    (
+        with_fields(SPLINE, presses=(GRIND,)),
+        NotAvailable,
+        'presses is not empty, but SPLINE follows joint positions, which do not give way; set',
+    ),
+    (
+        pressing(last_waypoint=0),
+        InvalidGoal,
+        'presses[0].last_point is 0, not behind first_point = 0',
+    ),
+    (
+        pressing(last_waypoint=3),
+        InvalidGoal,
+        'presses[0].last_point is 3, but the points are 0 to 2; name one of these',
+    ),
+    (
+        pressing(axes=('z', 'down'), forces=(1.0, 1.0)),
+        InvalidGoal,
+        "presses[0].axes[1] is 'down'; the axes are x, y, z, rx, ry, rz, each at most once",
+    ),
+    (
+        pressing(axes=(), forces=()),
+        InvalidGoal,
+        'presses[0].axes is empty, and contact is NONE, so that it does nothing; name axes',
+    ),
+    (
+        pressing(forces=(1.0, 2.0)),
+        InvalidGoal,
+        'presses[0].forces has 2 entries for 1 axes',
+    ),
+    (
+        pressing(forces=(201.0,)),
+        InvalidGoal,
+        'presses[0].forces[0] is 201 N, outside -200 to 200',
+    ),
+    (
+        pressing(axes=('rz',), forces=(nan,)),
+        InvalidGoal,
+        'presses[0].forces[0] is nan Nm, outside -30 to 30',
+    ),
+    (
+        pressing(speed_limits=(0.1, 0.1)),
+        InvalidGoal,
+        'presses[0].speed_limits has 2 entries for 1 axes; give one for each, or none',
+    ),
+    (
+        pressing(speed_limits=(0.3,)),
+        InvalidGoal,
+        'presses[0].speed_limits[0] is 0.3 m/s; it must be more than 0, and at most 0.25',
+    ),
+    (
+        pressing(max_deviation=0.2),
+        InvalidGoal,
+        'presses[0].max_deviation is 0.2, outside 0 to 0.1',
+    ),
+    (
+        with_fields(PLAIN, presses=(replace(GRIND, last_waypoint=2), replace(GRIND))),
+        InvalidGoal,
+        'presses[1].first_point is 0, where another press has begun and not ended; let one end',
+    ),
+    (
+        with_fields(with_segment(PLAIN, 0, blend_radius=0.02), presses=(GRIND,)),
+        InvalidGoal,
+        'presses[0].first_point needs a stop at points[0], but with a blend of 20 mm the arm',
+    ),
+    (
+        with_fields(
+            with_segment(PLAIN, 2, type=TYPE.CIRCULAR, via=Pose((0.25, 0.05, 0.0))),
+            presses=(GRIND,),
+        ),
+        InvalidGoal,
+        'segments[2].type is CIRCULAR, but it begins where presses[0] has brought the tool',
+    ),
+    (
+        with_fields(PLAIN, presses=(GRIND,), keep_open=True),
+        NotAvailable,
+        'presses[0].first_point is set, but a goal with keep_open does nothing at points but',
     ),
     (
         with_fields(PLAIN, payload_changes=(PayloadChange(waypoint=1, mass=101.0),)),

@@ -145,7 +145,7 @@ def test_a_fraction_after_an_int_is_found(widened):
 def test_handles_of_threads_are_killed_and_not_compared():
     """What a controller makes of a handle beside a number is written nowhere."""
     handles = re.findall(r'(\w+) = run ', text())
-    assert len(handles) == 5
+    assert len(handles) == 6
     for handle in handles:
         assert re.search(rf'kill {handle}\b', text())
         assert not re.search(rf'\b{handle} *[!=]=|[!=]= *{handle}\b', text())

@@ -14,18 +14,21 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
+    BeginPress,
     ChangePayload,
+    EndPress,
     MoveC,
     MoveJ,
     MoveL,
     MoveP,
     OptimoveJ,
     OptimoveL,
+    PressLaw,
     SpeedLaw,
     Spline,
     SwitchOutput,
@@ -427,6 +430,17 @@ PRIMITIVES = st.one_of(
     st.builds(
         ChangePayload, mass=POSITIVE, center_of_gravity=st.tuples(FRACTION, FRACTION, FRACTION)
     ),
+    st.builds(
+        PressLaw,
+        wrench=vector(100.0),
+        limits=vector(1.0),
+        damping=FRACTION,
+        gain_scaling=FRACTION,
+        zero_sensor=st.booleans(),
+        contact=st.sampled_from(ContactEnd),
+    ),
+    st.builds(BeginPress, T_base_task=POSES, compliant=vector(1.0), follows_tool=st.booleans()),
+    st.just(EndPress()),
 )
 
 
@@ -456,6 +470,8 @@ RESULTS = [
     (TrajectoryResult.CANCELED, '00000001'),
     (TrajectoryResult.FAILURE, '00000002'),
     (TrajectoryResult.INPUT_MISSING, '00000003'),
+    (TrajectoryResult.CONTACT, '00000004'),
+    (TrajectoryResult.NO_CONTACT, '00000005'),
 ]
 
 
@@ -476,7 +492,7 @@ def test_results_are_read_when_joined_or_in_pieces():
     assert decoder.feed(b'') == []
 
 
-@pytest.mark.parametrize('text', ['00000004', 'ffffffff', '7fffffff'])
+@pytest.mark.parametrize('text', ['00000006', 'ffffffff', '7fffffff'])
 def test_an_unknown_result_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         TrajectoryResultDecoder().feed(bytes.fromhex(text))

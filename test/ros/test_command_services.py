@@ -19,6 +19,7 @@ from ur_cartesian_driver.srv import (
     Popup,
     RawRequest,
     Recover,
+    RunScript,
     SetIO,
     SetPayload,
     SetSpeedSliderFraction,
@@ -62,6 +63,7 @@ class ServiceClient:
                 Popup,
                 RawRequest,
                 Recover,
+                RunScript,
                 SetIO,
                 SetPayload,
                 SetSpeedSliderFraction,
@@ -199,6 +201,7 @@ def test_services_of_a_driver_without_a_robot_answer(no_thread_left, sim, make_c
         'zero_ftsensor': None,
         'resend_robot_program': None,
         'recover': Recover.Request(),
+        'run_script': RunScript.Request(script='sec a():\nend'),
     }.items():
         answer = call(name, request)
         assert not answer.success

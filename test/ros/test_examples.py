@@ -61,6 +61,8 @@ def test_there_are_examples():
         'spots',
         'arc_start',
         'bead',
+        'grind',
+        'touch',
     }
 
 

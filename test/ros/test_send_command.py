@@ -80,7 +80,9 @@ def senders(no_thread_left, sim, make_cell, tmp_path):
     thread = threading.Thread(target=serve)
     thread.start()
     made = Senders(cell, tmp_path)
+    hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # senders inherit that of nohup
     yield made
+    signal.signal(signal.SIGHUP, hangup)
     made.close()
     ended.set()
     thread.join()
@@ -92,7 +94,7 @@ def test_a_signal_ends_the_sender_after_its_goal(senders, number):
     process.send_signal(number)
     output, errors = process.communicate(timeout=10.0)
     assert not senders.moving
-    assert process.returncode == 128 + number
+    assert process.returncode == 128 + number, output + errors
     assert output.splitlines()[-1].startswith('CANCELED, CANCELLED (-16): ')
     assert not errors
 

@@ -29,6 +29,8 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    Press,
+    PressFrame,
     ProportionalOutput,
     SafeOutput,
     Segment,
@@ -43,6 +45,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.registers import OutputInteger
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
+from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
 #: Side of the square, and radius of the blends at its corners [m].
@@ -63,14 +66,14 @@ ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(max_tool_speed=1.0)
 
 
-def planned(state, offsets, velocity, acceleration, **goal):
+def planned(state, offsets, velocity, acceleration, blend=BLEND, **goal):
     """Return a plan through points at offsets from the tool, with blends between them."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned)) for dx, dy, dz in offsets)
-    blends = [BLEND] * (len(points) - 1) + [0.0]
+    blends = [blend] * (len(points) - 1) + [0.0]
     segments = tuple(
-        Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
-        for blend in blends
+        Segment(velocity=velocity, acceleration=acceleration, blend_radius=radius)
+        for radius in blends
     )
     return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM, OPTIONS)
 
@@ -529,6 +532,50 @@ class RestGoal(BlendGoal):
 
 
 @lru_cache
+def press_plan(start):
+    """Return the plan of three sides of a square, the second one with 20 N on a table."""
+    return square_plan(
+        start.state,
+        blend=0.0,
+        presses=(
+            Press(
+                first_waypoint=0,
+                last_waypoint=1,
+                frame=PressFrame.BASE,
+                axes=('z',),
+                forces=(-20.0,),
+            ),
+        ),
+    )
+
+
+class PressGoal(BlendGoal):
+    """Three sides of a square, with a table 2 mm below, on which the tool presses."""
+
+    def __init__(self, cell):
+        self._contact = cell.robot.controller.contact
+        super().__init__(cell)
+        x, y, z = self.start
+        self._contact.bodies = (ContactBody('plane', (x, y, z - 0.002), (0.0, 0.0, 1.0)),)
+
+    def plan_from(self, start):
+        return press_plan(start)
+
+    def is_in(self, phase):
+        assert phase == 'pressing'
+        return self.points_begun() == 4 and self._contact.wrench[2] > 10.0
+
+    def is_over(self):
+        # A paused program that nobody may stop keeps it; the safety system holds the arm.
+        paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
+        return paused or self._contact.force_mode is None
+
+    def check_result(self, row, phase):
+        assert self._contact.force_mode is None, (row.fault, phase)
+        self._contact.bodies = ()
+
+
+@lru_cache
 def half_circle_to_append(start):
     """Return the plan of the first three points of a half circle, and the last one to append."""
     whole = half_circle_goal(start.state, ExecutionMode.SPLINE)
@@ -613,5 +660,6 @@ GOALS = {
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,
+    'Press': PressGoal,
     'Freedrive': FreedriveGoal,
 }

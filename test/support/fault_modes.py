@@ -380,6 +380,27 @@ AT_A_POINT = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+PRESS = _mode(
+    'Press',
+    'PRIMITIVES that press on a table with the force mode of the controller. Whatever ends the '
+    'goal ends force mode; in local control a paused program keeps it until it is played.',
+    {'pressing': 'the tool presses, and moves along the table'},
+    2.0,
+    {},
+    faults=(
+        'protective stop',
+        'emergency stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the network cable is cut',
+        'RTDE is cut',
+        "the program's sockets are cut",
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
 APPEND = _mode(
     'Appendable goals',
     'A goal that is appended to while it runs (`keep_open`); the last points are appended '
@@ -432,4 +453,4 @@ FREEDRIVE = replace(
     settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, FREEDRIVE)
+MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, PRESS, FREEDRIVE)

@@ -257,7 +257,7 @@ class RobotCell:
 
     @property
     def q(self):
-        return self.robot.controller.motion.q
+        return self.robot.controller.target.q
 
     def is_ready(self):
         return self.status.state is ConnectionState.READY

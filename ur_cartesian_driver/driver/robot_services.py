@@ -16,6 +16,8 @@ from ur_cartesian_driver.robot.services.service_calls import (
     DashboardLineCall,
     HandBackCall,
     RecoverCall,
+    RunScriptCall,
+    SCRIPT_TIMEOUT,
     ServiceAnswer,
     ServiceCall,
     SetOutputCall,
@@ -61,6 +63,16 @@ class RobotServices(ABC):
     def hand_back_control(self) -> ServiceAnswer:
         """Let the program of the pendant go on behind its External Control node."""
         return self.call(HandBackCall()).result()
+
+    def run_script(self, script: str, timeout: float = SCRIPT_TIMEOUT) -> ServiceAnswer:
+        """
+        Run a script on the robot, outside all checks of the driver; see ``allow_scripts``.
+
+        :param script: a secondary program (``sec``), or in headless mode a primary one (``def``),
+            after which the driver's own program is sent again.
+        :param timeout: how long a primary program may take [s].
+        """
+        return self.call(RunScriptCall(script=script, timeout=timeout)).result()
 
     def set_digital_output(self, kind: OutputKind, pin: int, high: bool) -> ServiceAnswer:
         """Set a digital output."""

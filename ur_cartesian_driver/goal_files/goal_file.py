@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
 #: A goal nests less; the fast loader crashes where a text nests a thousand times as much.
@@ -21,6 +22,7 @@ class GoalFileError(ValueError):
     """A text is not a goal; the sentence names the key."""
 
 
+@uncollected()
 def read_goal_file(source: str | os.PathLike[str]) -> Message:
     """
     Return the goal that a YAML text describes, as an object with the fields of the action's goal.
@@ -44,6 +46,7 @@ def read_goal_file(source: str | os.PathLike[str]) -> Message:
         raise GoalFileError(f'{name}{str(error).rstrip(".")}.') from None
 
 
+@uncollected()
 def goal_text(fields: Mapping[str, Any]) -> str:
     """Return the fields of a goal as YAML; numbers keep every bit."""
     text: str = yaml.dump(
@@ -68,7 +71,7 @@ def _loader(text: str) -> Any:
     return fast
 
 
-class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
+class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]  # chosen at run time
     """Ten times as fast where PyYAML was built with libyaml; writes equal parts out in full."""
 
     def ignore_aliases(self, data: object) -> bool:

@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    ContactEnd,
     FreeAxis,
     InputKind,
     InputWait,
@@ -29,6 +30,8 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     PayloadChange,
     Posture,
+    Press,
+    PressFrame,
     ProportionalOutput,
     SafeOutput,
     Segment,
@@ -66,6 +69,16 @@ PROPORTIONAL_NUMBERS = (
     'maximum',
     'filter_time',
     'idle',
+)
+#: The same of a ``Press``.
+PRESS_SETTINGS = (
+    'max_deviation',
+    'max_deviation_angle',
+    'max_yield',
+    'max_yield_angle',
+    'damping',
+    'gain_scaling',
+    'zero_sensor',
 )
 _SEGMENT_FIELDS = (
     'types',
@@ -123,6 +136,7 @@ def goal_from_fields(message: Message) -> GoalTable:
             _proportional_output(output, f'proportional_outputs[{i}]')
             for i, output in enumerate(message.proportional_outputs)
         ),
+        presses=tuple(_press(press, f'presses[{i}]') for i, press in enumerate(message.presses)),
     )
 
 
@@ -247,6 +261,19 @@ def _proportional_output(output: Message, field: str) -> ProportionalOutput:
         last_waypoint=output.last_point,
         domain=_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
         **{name: getattr(output, name) for name in PROPORTIONAL_NUMBERS},
+    )
+
+
+def _press(press: Message, field: str) -> Press:
+    return Press(
+        first_waypoint=press.first_point,
+        last_waypoint=press.last_point,
+        frame=_member(PressFrame, press.frame, f'{field}.frame'),
+        axes=tuple(press.axes),
+        forces=tuple(press.forces),
+        speed_limits=tuple(press.speed_limits),
+        contact=_member(ContactEnd, press.contact, f'{field}.contact'),
+        **{name: getattr(press, name) for name in PRESS_SETTINGS},
     )
 
 

@@ -119,6 +119,24 @@ GOAL: Mapping[str, Any] = {
             'idle': 0.0,
         }
     ],
+    'presses': [
+        {
+            'first_point': UINT32,
+            'last_point': UINT32,
+            'frame': UINT8,
+            'axes': [''],
+            'forces': [0.0],
+            'speed_limits': [0.0],
+            'max_deviation': 0.0,
+            'max_deviation_angle': 0.0,
+            'max_yield': 0.0,
+            'max_yield_angle': 0.0,
+            'damping': 0.005,
+            'gain_scaling': 1.0,
+            'zero_sensor': False,
+            'contact': UINT8,
+        }
+    ],
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,

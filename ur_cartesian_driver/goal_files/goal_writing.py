@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
-from ur_cartesian_driver.goal_files.goal_reading import PROPORTIONAL_NUMBERS
+from ur_cartesian_driver.goal_files.goal_reading import PRESS_SETTINGS, PROPORTIONAL_NUMBERS
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Posture, SafeOutput, Tolerance
 from ur_cartesian_driver.motion.goal_table import goal_table, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -68,6 +68,23 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
                     'maximum': output.maximum,
                 }
                 for output in table.proportional_outputs
+            ],
+            'presses': [
+                {
+                    'first_point': press.first_waypoint,
+                    'last_point': press.last_waypoint,
+                    **_given(
+                        {
+                            'frame': int(press.frame),
+                            'axes': list(press.axes),
+                            'forces': list(press.forces),
+                            'speed_limits': list(press.speed_limits),
+                            'contact': int(press.contact),
+                        }
+                    ),
+                    **{name: getattr(press, name) for name in PRESS_SETTINGS},
+                }
+                for press in table.presses
             ],
             'payload_changes': [
                 {

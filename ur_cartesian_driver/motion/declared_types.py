@@ -54,7 +54,7 @@ def with_declared_types(value: T, kind: type[T], name: str) -> T:
     :returns: the same object if nothing had to be converted.
     :raises WrongType: a value is of another type. Numbers of an ``IntEnum`` may be unknown.
     """
-    converted: T = _convert_part(_converter(kind), value, name)  # type: ignore[arg-type]
+    converted: T = _convert_part(_converter(kind), value, name)  # type: ignore[arg-type]  # mypy has no TypeForm
     return converted
 
 
@@ -64,7 +64,7 @@ def declare_types(instance: object) -> None:
 
     :raises WrongType: a value is of another type.
     """
-    for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]
+    for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
         value = getattr(instance, name)
         converted = _convert_part(convert, value, name)
         if converted is not value:
@@ -129,7 +129,7 @@ def _dataclass(kind: type) -> Convert:
                 changed[name] = new
         if type(value) is not kind:  # a class that another process may not have
             return kind(**{name: getattr(value, name) for name in names} | changed)
-        return replace(value, **changed) if changed else value  # type: ignore[type-var]
+        return replace(value, **changed) if changed else value  # type: ignore[type-var]  # a dataclass
 
     return convert
 

@@ -23,8 +23,11 @@ class TrajectoryResult(IntEnum):
     SUCCESS = 0
     CANCELED = 1
     FAILURE = 2
-    #: Of our own program only.
+    #: Of our own program only, and those that follow.
     INPUT_MISSING = 3
+    #: The tool has touched, where that ends the trajectory, or has not.
+    CONTACT = 4
+    NO_CONTACT = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

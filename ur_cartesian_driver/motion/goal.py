@@ -82,6 +82,33 @@ class InputKind(IntEnum):
         return self >= InputKind.STANDARD_ANALOG
 
 
+class PressFrame(IntEnum):
+    """Along the axes of which frame a :class:`Press` gives way."""
+
+    #: That of the TCP, as the path turns it.
+    TOOL = 0
+    #: That of the goal.
+    GOAL = 1
+    #: That of the robot's controller.
+    BASE = 2
+
+
+class ContactEnd(IntEnum):
+    """What the first contact of the tool means to a :class:`Press`."""
+
+    NONE = 0
+    #: The goal ends there, and has succeeded.
+    ENDS = 1
+    #: The same; if it does not come, the goal fails.
+    REQUIRED = 2
+
+
+#: The axes of a frame, and the turns about them.
+PRESS_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+
+#: How far the tool may give way where a press does not say it [m], [rad].
+DEFAULT_YIELDS = (0.02, 0.2)
+
 #: How much later than planned the end may come where the goal does not say it [s], also how long
 #: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -208,6 +235,32 @@ class ProportionalOutput:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Press:
+    """The controller's force mode between two waypoints, at both of which the arm stops."""
+
+    first_waypoint: int
+    last_waypoint: int
+    frame: PressFrame = PressFrame.TOOL
+    #: The compliant axes of the frame, of :data:`PRESS_AXES`.
+    axes: tuple[str, ...] = ()
+    #: What the tool applies along each of them [N, Nm].
+    forces: tuple[float, ...] = ()
+    #: How fast it gives way along each of them [m/s, rad/s]; empty = the default.
+    speed_limits: tuple[float, ...] = ()
+    #: How far it may be off the path along the others [m], [rad]; 0 = the default.
+    max_deviation: float = 0.0
+    max_deviation_angle: float = 0.0
+    #: How far it may give way along compliant ones [m], [rad]; 0 = the default.
+    max_yield: float = 0.0
+    max_yield_angle: float = 0.0
+    damping: float = 0.005
+    gain_scaling: float = 1.0
+    #: Whether the force sensor is zeroed before.
+    zero_sensor: bool = False
+    contact: ContactEnd = ContactEnd.NONE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafeOutput:
     """The value that an output takes when the motion does not go on as planned."""
 
@@ -267,3 +320,4 @@ class Goal:
     input_waits: tuple[InputWait, ...] = ()
     payload_changes: tuple[PayloadChange, ...] = ()
     proportional_outputs: tuple[ProportionalOutput, ...] = ()
+    presses: tuple[Press, ...] = ()

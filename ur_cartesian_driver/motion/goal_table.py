@@ -12,7 +12,7 @@ all checks of the arrays take. So inside they are rows; each is still a sequence
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, Field, field, fields, replace
 from itertools import chain
 from operator import attrgetter, eq
 from typing import Any, ClassVar, overload, TypeVar
@@ -61,6 +61,7 @@ class Rows(Sequence[T]):
     """
 
     __slots__: ClassVar[tuple[str, ...]] = ()
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind of rows is a dataclass
 
     def __post_init__(self) -> None:
         for name, column in self._columns():
@@ -72,10 +73,14 @@ class Rows(Sequence[T]):
     def _columns(self) -> list[tuple[str, Any]]:
         return [(name, getattr(self, name)) for name in type(self).__slots__]
 
+    def _numbers(self, *names: str) -> Iterator[tuple[Any, ...]]:
+        """Return the rows of some columns as plain numbers."""
+        return zip(*(getattr(self, name).tolist() for name in names), strict=True)
+
     def take(self: R, rows: slice) -> R:
         """Return some of the rows."""
         first, last, _ = rows.indices(len(self))
-        return replace(  # type: ignore[type-var]
+        return replace(
             self,
             **{
                 name: {row - first: column[row] for row in column if first <= row < last}
@@ -85,11 +90,10 @@ class Rows(Sequence[T]):
             },
         )
 
-    def with_first(self: R, first: Any) -> R:
-        """Return the rows with another object in the first one."""
-        other, rest = type(self).of([first]), self.take(slice(1, len(self)))  # type: ignore[attr-defined]
-        columns = zip(other._columns(), rest._columns(), strict=True)
-        return replace(  # type: ignore[type-var]
+    def with_first(self: R, first: R) -> R:
+        """Return the rows with another first one."""
+        columns = zip(first._columns(), self.take(slice(1, len(self)))._columns(), strict=True)
+        return replace(
             self,
             **{
                 name: {**a, **{row + 1: value for row, value in b.items()}}
@@ -178,16 +182,9 @@ class WaypointRows(Rows[Waypoint]):
         return len(self.times)
 
     def __iter__(self) -> Iterator[Waypoint]:
-        postures = self.postures
-        for i, (time, pose, twist, acceleration, jerk) in enumerate(
-            zip(
-                self.times.tolist(),
-                self.poses.tolist(),
-                _vectors(self.twists),
-                _vectors(self.accelerations),
-                _vectors(self.jerks),
-                strict=True,
-            )
+        rates = map(_vectors, (self.twists, self.accelerations, self.jerks))
+        for i, ((time, pose), twist, acceleration, jerk) in enumerate(
+            zip(self._numbers('times', 'poses'), *rates, strict=True)
         ):
             yield Waypoint(
                 time=time,
@@ -195,7 +192,7 @@ class WaypointRows(Rows[Waypoint]):
                 twist=twist,
                 acceleration=acceleration,
                 jerk=jerk,
-                posture=postures.get(i, NO_POSTURE),
+                posture=self.postures.get(i, NO_POSTURE),
             )
 
 
@@ -235,41 +232,28 @@ class SegmentRows(Rows[Segment]):
         plain = _plain_objects(segments, Segment, name, _are_plain_segments)
         vias = [segment.via for segment in plain]
         has_via = np.array([via is not None for via in vias], dtype=np.bool_)
+        columns: dict[str, Any] = {
+            column: np.array([getattr(segment, name) for segment in plain], dtype=kind)
+            for column, (name, kind) in _NUMBERS_OF_SEGMENTS.items()
+        }
         return cls(
-            types=np.array([segment.type for segment in plain], dtype=np.int64),
-            blend_radii=np.array([segment.blend_radius for segment in plain], dtype=np.float64),
-            dwells=np.array([segment.dwell for segment in plain], dtype=np.float64),
-            velocities=np.array([segment.velocity for segment in plain], dtype=np.float64),
-            accelerations=np.array([segment.acceleration for segment in plain], dtype=np.float64),
+            **columns,
             vias=_pose_array([via or IDENTITY for via in vias])
             if has_via.any()
             else zeros(len(plain), 7),
             has_via=has_via,
-            arc_modes=np.array([segment.arc_mode for segment in plain], dtype=np.int64),
-            free_axes=np.array([segment.free_axis for segment in plain], dtype=np.int64),
-            free_minima=np.array([segment.free_min for segment in plain], dtype=np.float64),
-            free_maxima=np.array([segment.free_max for segment in plain], dtype=np.float64),
             via_postures=_postures([segment.via_posture for segment in plain]),
         )
 
     @classmethod
     def plain(cls, n: int) -> SegmentRows:
         """Return the segments of a goal that has none."""
-        zero = zeros(n, 1)[:, 0]
-        number = np.broadcast_to(np.zeros((), dtype=np.int64), (n,))
-        return cls(
-            types=number,
-            blend_radii=zero,
-            dwells=zero,
-            velocities=zero,
-            accelerations=zero,
-            vias=zeros(n, 7),
-            has_via=np.broadcast_to(np.zeros((), dtype=np.bool_), (n,)),
-            arc_modes=number,
-            free_axes=number,
-            free_minima=zero,
-            free_maxima=zero,
-        )
+        columns: dict[str, Any] = {
+            column: np.broadcast_to(np.zeros((), dtype=kind), (n,))
+            for column, (_, kind) in _NUMBERS_OF_SEGMENTS.items()
+        }
+        has_via = np.broadcast_to(np.zeros((), dtype=np.bool_), (n,))
+        return cls(**columns, vias=zeros(n, 7), has_via=has_via)
 
     def via(self, row: int) -> Pose | None:
         """Return the pose on one arc, None where there is none."""
@@ -279,35 +263,13 @@ class SegmentRows(Rows[Segment]):
         return len(self.types)
 
     def __iter__(self) -> Iterator[Segment]:
-        postures = self.via_postures
-        for i, (kind, radius, dwell, velocity, acceleration, via, mode, *free) in enumerate(
-            zip(
-                self.types.tolist(),
-                self.blend_radii.tolist(),
-                self.dwells.tolist(),
-                self.velocities.tolist(),
-                self.accelerations.tolist(),
-                map(self.via, range(len(self))),
-                self.arc_modes.tolist(),
-                self.free_axes.tolist(),
-                self.free_minima.tolist(),
-                self.free_maxima.tolist(),
-                strict=True,
-            )
-        ):
-            yield Segment(
-                type=_TYPES.get(kind, kind),
-                blend_radius=radius,
-                dwell=dwell,
-                velocity=velocity,
-                acceleration=acceleration,
-                via=via,
-                via_posture=postures.get(i, NO_POSTURE),
-                arc_mode=_MODES.get(mode, mode),
-                free_axis=_AXES.get(free[0], free[0]),
-                free_min=free[1],
-                free_max=free[2],
-            )
+        names = [name for name, _ in _NUMBERS_OF_SEGMENTS.values()]
+        for i, numbers in enumerate(self._numbers(*_NUMBERS_OF_SEGMENTS)):
+            values = dict(zip(names, numbers, strict=True))
+            for name, members in _MEMBERS.items():
+                values[name] = members.get(values[name], values[name])
+            posture = self.via_postures.get(i, NO_POSTURE)
+            yield Segment(via=self.via(i), via_posture=posture, **values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -319,7 +281,7 @@ class GoalTable(Goal):
     """
 
     waypoints: WaypointRows
-    segments: SegmentRows = field(default=())  # type: ignore[assignment]
+    segments: SegmentRows = field(default=())  # type: ignore[assignment]  # converted below
 
     def __post_init__(self) -> None:
         """Convert points and segments."""
@@ -345,9 +307,23 @@ def goal_table(goal: Goal) -> GoalTable:
     return GoalTable(**{each.name: getattr(goal, each.name) for each in fields(goal)})
 
 
-_TYPES: dict[int, Any] = {int(kind): kind for kind in SegmentType}
-_MODES: dict[int, Any] = {int(mode): mode for mode in ArcMode}
-_AXES: dict[int, Any] = {int(axis): axis for axis in FreeAxis}
+#: The columns of segments with a number each: the field, and its type.
+_NUMBERS_OF_SEGMENTS: dict[str, tuple[str, type]] = {
+    'types': ('type', np.int64),
+    'blend_radii': ('blend_radius', np.float64),
+    'dwells': ('dwell', np.float64),
+    'velocities': ('velocity', np.float64),
+    'accelerations': ('acceleration', np.float64),
+    'arc_modes': ('arc_mode', np.int64),
+    'free_axes': ('free_axis', np.int64),
+    'free_minima': ('free_min', np.float64),
+    'free_maxima': ('free_max', np.float64),
+}
+#: The fields that are enumerations, and their members by number.
+_MEMBERS: dict[str, dict[int, Any]] = {
+    name: {int(member): member for member in kind}
+    for name, kind in (('type', SegmentType), ('arc_mode', ArcMode), ('free_axis', FreeAxis))
+}
 
 
 def _plain_objects(
@@ -360,7 +336,7 @@ def _plain_objects(
                 return objects
         except (AttributeError, TypeError):
             pass
-    return with_declared_types(objects, tuple[kind, ...], name)  # type: ignore[valid-type, arg-type]
+    return with_declared_types(objects, tuple[kind, ...], name)  # type: ignore[valid-type, arg-type]  # a type made here
 
 
 def _are_plain_points(points: Sequence[Waypoint]) -> bool:

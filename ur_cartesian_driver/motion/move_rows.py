@@ -59,31 +59,21 @@ class MoveRows(Rows[Primitive]):
         return len(self.kinds)
 
     def __iter__(self) -> Iterator[Primitive]:
-        others = self.others
-        for i, (
-            kind,
-            target,
-            q_near,
-            has_q_near,
-            velocity,
-            acceleration,
-            time,
-            radius,
-        ) in enumerate(
-            zip(
-                self.kinds.tolist(),
-                self.targets.tolist(),
-                self.q_near.tolist(),
-                self.has_q_near.tolist(),
-                self.velocities.tolist(),
-                self.accelerations.tolist(),
-                self.durations.tolist(),
-                self.blend_radii.tolist(),
-                strict=True,
-            )
+        numbers = self._numbers(
+            'kinds',
+            'targets',
+            'q_near',
+            'has_q_near',
+            'velocities',
+            'accelerations',
+            'blend_radii',
+        )
+        times = self.durations.tolist()
+        for i, (kind, target, q_near, has_q_near, velocity, acceleration, radius) in enumerate(
+            numbers
         ):
-            if i in others:
-                yield others[i]
+            if i in self.others:
+                yield self.others[i]
                 continue
             move = MOVES[kind]
             yield move(
@@ -92,7 +82,7 @@ class MoveRows(Rows[Primitive]):
                 velocity=velocity,
                 acceleration=acceleration,
                 blend_radius=radius,
-                **({'duration': time} if move in (MoveJ, MoveL) else {}),
+                **({'duration': times[i]} if move in (MoveJ, MoveL) else {}),
             )
 
 
@@ -113,13 +103,8 @@ class SplineRows(Rows[Primitive]):
         return len(self.durations)
 
     def __iter__(self) -> Iterator[Primitive]:
-        for target, velocity, acceleration, duration, quintic in zip(
-            self.targets.tolist(),
-            self.velocities.tolist(),
-            self.accelerations.tolist(),
-            self.durations.tolist(),
-            self.quintic.tolist(),
-            strict=True,
+        for target, velocity, acceleration, duration, quintic in self._numbers(
+            'targets', 'velocities', 'accelerations', 'durations', 'quintic'
         ):
             yield Spline(
                 target=vector6(target),

@@ -198,18 +198,11 @@ class PlannedRows(Rows[PlannedSegment]):
         return len(self.waypoints)
 
     def __iter__(self) -> Iterator[PlannedSegment]:
-        for i, (waypoint, length, angle, duration, entry, joints, primitive, line) in enumerate(
-            zip(
-                self.waypoints.tolist(),
-                self.lengths.tolist(),
-                self.angles.tolist(),
-                self.durations.tolist(),
-                self.blend_entries.tolist(),
-                self.joints.tolist(),
-                self.primitives,
-                self.report_lines,
-                strict=True,
-            )
+        numbers = self._numbers(
+            'waypoints', 'lengths', 'angles', 'durations', 'blend_entries', 'joints'
+        )
+        for i, ((waypoint, length, angle, duration, entry, joints), primitive, line) in enumerate(
+            zip(numbers, self.primitives, self.report_lines, strict=True)
         ):
             yield PlannedSegment(
                 primitive=primitive,

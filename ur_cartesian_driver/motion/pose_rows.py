@@ -9,13 +9,10 @@ so many poses that an object for each would take longer than the inverse kinemat
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import overload
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose import Pose
 
 Floats = NDArray[np.float64]
 
@@ -94,34 +91,6 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
     x, y, z, w = turned.T
     rows[:, 3:] = turned * (1.0 / np.sqrt(x * x + y * y + z * z + w * w))[:, None]
     return rows
-
-
-class PoseRows(Sequence[Pose]):
-    """Poses in the rows of an array (n, 7), made when somebody looks at them."""
-
-    def __init__(self, rows: Floats) -> None:
-        """Keep the rows."""
-        self.rows = rows
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self.rows)
-
-    @overload
-    def __getitem__(self, index: int) -> Pose: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> PoseRows: ...
-
-    def __getitem__(self, index: int | slice) -> Pose | PoseRows:
-        """Return a pose, or some of them."""
-        if isinstance(index, slice):
-            return PoseRows(self.rows[index])
-        return pose_from_row(self.rows[index].tolist())
-
-    def __iter__(self) -> Iterator[Pose]:
-        """Make the poses one by one."""
-        return map(pose_from_row, self.rows.tolist())
 
 
 def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
@@ -203,8 +203,45 @@ class ChangePayload:
     center_of_gravity: Vector3
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressLaw:
+    """
+    How the controller's force mode presses when it begins next.
+
+    :param wrench: that the tool applies along compliant axes [N, Nm].
+    :param limits: speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
+    :param zero_sensor: whether the force sensor is zeroed now.
+    """
+
+    wrench: Vector6
+    limits: Vector6
+    damping: float
+    gain_scaling: float
+    zero_sensor: bool = False
+    contact: ContactEnd = ContactEnd.NONE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeginPress:
+    """
+    Force mode begins, or only the watch for contact where no axis is compliant.
+
+    :param T_base_task: the frame of the axes.
+    :param follows_tool: the frame is that of the TCP, in each cycle.
+    """
+
+    T_base_task: Pose
+    compliant: Vector6
+    follows_tool: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class EndPress:
+    """Force mode ends; the trajectory too where a contact was required and did not come."""
+
+
 #: What the robot program does while the arm stands; it counts each as a motion.
-Stop: TypeAlias = Wait | AwaitInput | ChangePayload
+Stop: TypeAlias = Wait | AwaitInput | ChangePayload | PressLaw | BeginPress | EndPress
 Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Stop
 #: One record of a trajectory on the wire.
 Instruction: TypeAlias = Primitive | OutputRecord

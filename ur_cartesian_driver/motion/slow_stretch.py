@@ -54,9 +54,11 @@ class SlowStretch:
     reason: str
     #: The point to which the advice belongs.
     point: int
-    #: Whether ``min_speed_fraction`` counts it: not the ramps, and no blend, whose speed is not
-    #: published.
-    counts: bool = True
+
+    @property
+    def counts(self) -> bool:
+        """Whether ``min_speed_fraction`` counts it: no ramp, and no blend (not published)."""
+        return self.cause not in (SlowCause.RAMP, SlowCause.IN_BLEND)
 
     @property
     def place(self) -> str:

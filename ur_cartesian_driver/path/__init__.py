@@ -13,7 +13,7 @@ Compose a path of the tool in a few lines, without ROS and for ROS.
 
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.goal import ContactEnd, PressFrame, Tolerance
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.motion.pose import Pose
@@ -40,7 +40,8 @@ from ur_cartesian_driver.path.outputs import (
     tool_digital,
     tool_digital_input,
 )
-from ur_cartesian_driver.path.path_builder import FREE, Path
+from ur_cartesian_driver.path.path_builder import Path
+from ur_cartesian_driver.path.path_motions import FREE
 from ur_cartesian_driver.path.resumption import resume, ResumedGoal
 from ur_cartesian_driver.path.units import deg, mm
 
@@ -48,6 +49,7 @@ __all__ = [
     'DOWN',
     'FREE',
     'AnalogDomain',
+    'ContactEnd',
     'ExecutionMode',
     'Frames',
     'Input',
@@ -55,6 +57,7 @@ __all__ = [
     'Path',
     'PathPlace',
     'Pose',
+    'PressFrame',
     'ResumedGoal',
     'StaticFrame',
     'Tolerance',

@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.goal import (
     InputWait,
     IOCommand,
     PayloadChange,
+    Press,
     ProportionalOutput,
     Segment,
     SegmentType,
@@ -26,6 +27,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, PathSettings, SAME_POSITION
 
+_Stretch = TypeVar('_Stretch', ProportionalOutput, Press)
 _Event = TypeVar('_Event', IOCommand, InputWait, PayloadChange)
 
 #: The blend of a point on a process that has none [m], and how long the tool is in it at least
@@ -90,9 +92,8 @@ def goal_of_points(
             for stop in point.stops
             if isinstance(stop, PayloadChange)
         ),
-        proportional_outputs=tuple(
-            _ended(output, i) for i, point in enumerate(points) for output in point.amounts
-        ),
+        proportional_outputs=_stretches(points, ProportionalOutput),
+        presses=_stretches(points, Press),
         **{each.name: getattr(settings, each.name) for each in fields(settings)},
     )
 
@@ -115,15 +116,14 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
     outputs = _by_point('io_commands', goal.io_commands, len(points))
     waits = _by_point('input_waits', goal.input_waits, len(points))
     payloads = _by_point('payload_changes', goal.payload_changes, len(points))
-    amounts: dict[int, list[ProportionalOutput]] = {}
-    for output in goal.proportional_outputs:
-        first, last = output.first_waypoint, output.last_waypoint
-        if not 0 <= first < last < len(points):
-            raise InvalidGoal(
-                'proportional_outputs', f'names points {first} to {last}', 'name others'
-            )
-        output = replace(output, first_waypoint=0, last_waypoint=last - first)
-        amounts.setdefault(first, []).append(output)
+    stretches: dict[int, list[ProportionalOutput | Press]] = {}
+    for name in ('proportional_outputs', 'presses'):
+        for stretch in getattr(goal, name):
+            first, last = stretch.first_waypoint, stretch.last_waypoint
+            if not 0 <= first < last < len(points):
+                raise InvalidGoal(name, f'names points {first} to {last}', 'name others')
+            stretch = replace(stretch, first_waypoint=0, last_waypoint=last - first)
+            stretches.setdefault(first, []).append(stretch)
     in_spline = any(times) and (
         goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
         or any(any(point.twist) or any(point.acceleration) for point in points[:-1])
@@ -134,7 +134,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
             segment=segments[i] if segments else Segment(),
             duration=times[i] - (times[i - 1] + rests[i - 1] if i and times[i] else 0),
             outputs=tuple(outputs.get(i, ())),
-            amounts=tuple(amounts.get(i, ())),
+            stretches=tuple(stretches.get(i, ())),
             stops=(*waits.get(i, ()), *payloads.get(i, ())),
             in_spline=in_spline,
         )
@@ -154,14 +154,28 @@ def _by_point(field: str, events: Sequence[_Event], count: int) -> dict[int, lis
     return found
 
 
-def _ended(output: ProportionalOutput, index: int) -> ProportionalOutput:
-    if not output.last_waypoint:
+def _stretches(points: Sequence[PathPoint], kind: type[_Stretch]) -> tuple[_Stretch, ...]:
+    """Return those of one kind, with their waypoints."""
+    return tuple(
+        _ended(stretch, i)
+        for i, point in enumerate(points)
+        for stretch in point.stretches
+        if isinstance(stretch, kind)
+    )
+
+
+def _ended(stretch: _Stretch, index: int) -> _Stretch:
+    if stretch.last_waypoint:
+        return replace(stretch, first_waypoint=index, last_waypoint=index + stretch.last_waypoint)
+    if isinstance(stretch, Press):
         raise InvalidGoal(
-            f'follow_speed() at point {index}',
-            f'has no end for analog output {output.pin}',
-            'call end_follow_speed() at a later point',
+            f'press() at point {index}', 'has no end', 'call end_press() at a later point'
         )
-    return replace(output, first_waypoint=index, last_waypoint=index + output.last_waypoint)
+    raise InvalidGoal(
+        f'follow_speed() at point {index}',
+        f'has no end for analog output {stretch.pin}',
+        'call end_follow_speed() at a later point',
+    )
 
 
 def _nanoseconds(time: float) -> int:

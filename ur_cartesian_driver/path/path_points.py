@@ -16,6 +16,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     PayloadChange,
+    Press,
     ProportionalOutput,
     SafeOutput,
     Segment,
@@ -69,7 +70,7 @@ class PathPoint:
     stops: tuple[InputWait | PayloadChange, ...] = ()
     #: Those that begin here: with the first waypoint 0, and the number of points to their end as
     #: the last one; 0 = not ended yet.
-    amounts: tuple[ProportionalOutput, ...] = ()
+    stretches: tuple[ProportionalOutput | Press, ...] = ()
     #: Whether the blend is that of the feed, which the last point of a path does without, and
     #: whether it is chosen when the path is finished.
     feed_blend: bool = False

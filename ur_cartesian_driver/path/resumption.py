@@ -29,6 +29,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     PayloadChange,
     Posture,
+    Press,
     ProportionalOutput,
     Segment,
     SegmentType,
@@ -58,6 +59,7 @@ _RAMP_TIME, _RAMP_POINTS = 0.4, 8
 _CHORDS = 64
 _DIGITS = 9
 _Event = TypeVar('_Event', InputWait, PayloadChange)
+_Stretch = TypeVar('_Stretch', ProportionalOutput, Press)
 _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
@@ -154,7 +156,8 @@ class _Resumption:
             io_commands=self._outputs(places),
             input_waits=self._events(self.goal.input_waits, places),
             payload_changes=self._events(self.goal.payload_changes, places),
-            proportional_outputs=self._amounts(places),
+            proportional_outputs=self._stretches(self.goal.proportional_outputs, places),
+            presses=self._stretches(self.goal.presses, places),
             execution=self.mode,
             age=None,
         )
@@ -359,19 +362,23 @@ class _Resumption:
         ]
         return tuple(again + left)
 
-    def _amounts(self, places: Sequence[float]) -> tuple[ProportionalOutput, ...]:
-        """Return what follows the speed on the rest of the path, from the place on."""
+    def _stretches(
+        self, stretches: Sequence[_Stretch], places: Sequence[float]
+    ) -> tuple[_Stretch, ...]:
+        """Return what holds between two points on the rest of the path, from the place on."""
         left = []
-        for output in self.goal.proportional_outputs:
-            if self._is_passed(output.last_waypoint):
+        for stretch in stretches:
+            if self._is_passed(stretch.last_waypoint):
                 continue
-            last = _index(places, output.last_waypoint)
-            if not self._is_passed(output.first_waypoint):
-                first = _index(places, output.first_waypoint)
+            last = _index(places, stretch.last_waypoint)
+            if not self._is_passed(stretch.first_waypoint):
+                first = _index(places, stretch.first_waypoint)
             else:
-                first, output = self._start_index(places), replace(output, begin_lead=0.0)
+                first = self._start_index(places)
+                if isinstance(stretch, ProportionalOutput):
+                    stretch = replace(stretch, begin_lead=0.0)
             if first < last:
-                left.append(replace(output, first_waypoint=first, last_waypoint=last))
+                left.append(replace(stretch, first_waypoint=first, last_waypoint=last))
         return tuple(left)
 
     def _is_passed(self, waypoint: int) -> bool:

@@ -18,90 +18,58 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache, partial
-from math import inf, nan
+from math import inf
 from pkgutil import resolve_name
 from typing import TypeAlias
 
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import (
-    GoalRefused,
-    InvalidGoal,
-    InvalidPosture,
-    RobotNotReady,
-)
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, NO_POSTURE, rows_where
-from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import PoseRows, transform_rows
-from ur_cartesian_driver.motion.primitive import (
-    Joints,
-    MoveC,
-    MoveJ,
-    MoveL,
-    MoveP,
-    OptimoveJ,
-    OptimoveL,
-    Primitive,
-    Spline,
-    Stop,
-    Target,
-)
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import transform_rows
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.free_axis.free_rotations import as_named, choose_rotations
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import NoRotation
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, SegmentCurve
 from ur_cartesian_driver.planning.min_speed import (
     check_min_speed,
     slower_by,
     unknown_speed_remark,
 )
-from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
-from ur_cartesian_driver.planning.moves.path_margins import BlendSamples, PathSamples
+from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner
 from ur_cartesian_driver.planning.moves.plan_report import (
     blend_remarks,
     segment_lines,
     stop_remarks,
 )
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
-from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.segment_primitives import segment_primitives
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, unknown_speeds
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
-from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
-    describe_miss,
-    full_posture,
-    max_joint_change,
-    named_joints,
-    TcpKinematics,
+from ur_cartesian_driver.planning.preflight.start_checks import (
+    check_approach,
+    check_reported_tcp,
+    check_start,
 )
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.controlled_frame import (
     retarget_to_tcp,
     RetargetedGoal,
     tool_tips,
 )
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
-from ur_cartesian_driver.planning.request.dialect_adaptation import (
-    adapt_to_dialect,
-    explain_poses_only,
-)
-from ur_cartesian_driver.planning.request.goal_fields import (
-    is_timed,
-    point_field,
-    resolve_execution_mode,
-    segment_field,
-    type_table,
-)
+from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
+from ur_cartesian_driver.planning.request.presses import check_press_support
 from ur_cartesian_driver.planning.request.stops import Stops
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
@@ -113,20 +81,6 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
 #: How far a CB3 arm may stand beside its target: 0.2 to 0.4 mrad were recorded of a UR10 [m].
 CB3_STATIC_ERROR = 3e-4
-#: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration shifts
-#: it by some millimetres; another model or another TCP shifts it much more.
-MAX_MISMATCH_POSITION = 0.015
-MAX_MISMATCH_ANGLE = 0.05
-
-_CLASSES = {
-    SegmentType.JOINT: MoveJ,
-    SegmentType.PROCESS: MoveP,
-    SegmentType.OPTIMIZED_JOINT: OptimoveJ,
-    SegmentType.OPTIMIZED_LINEAR: OptimoveL,
-}
-#: The kind of the primitive's row, by type; that of an arc has no meaning.
-_MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
-_HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
 #: A planner in the registry of execution modes.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
@@ -196,34 +150,33 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
 def plan_moves(planner: GoalPlanner) -> Plan:
     """Return the plan of a goal whose points are joined by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
-    geometries = planner.geometries()
+    paths = JointPathPlanner(
+        goal,
+        planner.targets,
+        planner.kinematics,
+        options,
+        planner.remarks,
+        planner.reasons,
+    )
+    geometries = paths.geometries(planner.first_target(), state.actual_tcp_pose, state.actual_q)
+    samples = paths.samples
     lines = clearance_lines(
         arm,
         tool_tips(goal, planner.T_flange_active),
         options,
-        planner.samples.q,
+        samples.q,
         state.actual_q,
-        planner.samples.segment,
-        planner.samples.fraction,
+        samples.segment,
+        samples.fraction,
     )
-    timings = SegmentTimings(
-        geometries, options, arm.model, planner.blend_samples, planner.running
-    )
-    segments = planner.segments(geometries, timings)
-    del planner.samples, planner.blend_samples  # long goals have many, and so has the reference
+    timings = SegmentTimings(geometries, options, arm.model, paths.blend_samples, planner.running)
+    segments = _planned_rows(paths, geometries, timings)
+    del paths, samples  # long goals have many, and so has the reference
     motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
     find_slow_stretches = cache(
         partial(slow_move_stretches, geometries, timings, motion, slower_by(goal))
-    )
-    goal, segments, reference = planner.stops.insert(goal, segments, motion)
-    segments = place_outputs(
-        segments,
-        reference,
-        goal.io_commands,
-        proportional=goal.proportional_outputs,
-        blend_halves=segments.blend_entries[:, -1],
     )
     remarks = [
         *ignored_remarks(goal),
@@ -234,9 +187,26 @@ def plan_moves(planner: GoalPlanner) -> Plan:
         geometries.tightest_margins.remark,
     ]
     if goal.min_speed_fraction:
-        check_min_speed(goal, find_slow_stretches())
         remarks += unknown_speed_remark(goal, *unknown_speeds(geometries))
-    return planner.plan(goal, segments, reference, remarks, find_slow_stretches)
+    return planner.plan(goal, segments, motion, remarks, find_slow_stretches)
+
+
+def _planned_rows(
+    paths: JointPathPlanner, geometries: SegmentGeometries, timings: SegmentTimings
+) -> PlannedRows:
+    """Return the primitive of each segment and what is expected of it."""
+    curves, begin = geometries.path.curves, geometries.begin
+    moves = segment_primitives(paths, geometries, timings)
+    return PlannedRows(
+        waypoints=np.arange(begin, begin + len(geometries), dtype=np.int32),
+        lengths=curves.length,
+        angles=curves.angle,
+        durations=timings.durations,
+        blend_entries=timings.chain.blend_entries,
+        joints=geometries.joints,
+        primitives=moves,
+        report_lines=segment_lines(geometries, timings, moves, paths.reasons),
+    )
 
 
 def plan_spline_goal(planner: GoalPlanner) -> Plan:
@@ -252,20 +222,18 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    if goal.min_speed_fraction:
-        check_min_speed(goal, found.find_slow_stretches())
-    goal, segments, reference = planner.stops.insert(
-        stretch_times(goal, found.stretch), found.segments, found.reference
+    return planner.plan(
+        stretch_times(goal, found.stretch),
+        found.segments,
+        found.reference,
+        found.remarks,
+        found.find_slow_stretches,
     )
-    segments = place_outputs(
-        segments, reference, goal.io_commands, proportional=goal.proportional_outputs
-    )
-    return planner.plan(goal, segments, reference, found.remarks, found.find_slow_stretches)
 
 
 class GoalPlanner:
     """
-    Makes the segments of one goal, and collects the remarks of its report.
+    A goal as the planners of all execution modes get it; collects the remarks of its report.
 
     :param retargeted: the checked goal for the TCP with which it runs.
     :param T_flange_active: the TCP that the robot has now.
@@ -280,6 +248,7 @@ class GoalPlanner:
         options: PlanningOptions,
         running: PlannedSegment | None = None,
     ) -> None:
+        check_press_support(retargeted.goal, arm.model, retargeted.T_tcp_controlled)
         self.stops = Stops(retargeted.goal)
         goal, state = self.stops.moving_goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
@@ -289,7 +258,8 @@ class GoalPlanner:
         self.remarks = list(retargeted.remarks)
         #: By point: why its primitive is not the plain one of its segment type.
         self.reasons: dict[int, list[str]] = {}
-        self.targets = PoseRows(transform_rows(goal.T_base_frame, goal.waypoints.poses))
+        #: The points in base, rows (n, 7).
+        self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)
         if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
@@ -298,11 +268,9 @@ class GoalPlanner:
                 f'dialect {options.dialect.name} count in milliseconds'
             )
         self.remarks += self._static_error_remarks()
-        #: The whole joint path, sampled; set by :meth:`geometries`.
-        self.samples: PathSamples
-        self.blend_samples: BlendSamples
-        self._check_robot()
-        self._check_approach()
+        check_reported_tcp(state, self.kinematics)
+        self._first = pose_from_row(self.targets[0].tolist())
+        check_approach(state, self._first, options)
 
     def _static_error_remarks(self) -> list[str]:
         """Return a warning of a goal tolerance that the arm may not meet."""
@@ -326,42 +294,37 @@ class GoalPlanner:
         :raises InvalidGoal: point 0 is at time 0, but the robot is elsewhere.
         :raises InvalidPosture: point 0 is at time 0, but the arm has another posture.
         """
-        if not self.timed or self.goal.waypoints.times[0] != 0.0:
+        points = self.goal.waypoints
+        if not self.timed or points.times[0] != 0.0:
             return 0
-        self._check_start_pose()
-        self._check_start_posture()
+        check_start(self.state, self._first, points.postures.get(0), self.kinematics, self.options)
         self.remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
         return 1
 
-    def geometries(self) -> SegmentGeometries:
-        """Return the curve of every segment and the configuration in which it arrives."""
-        first = self.first_target()
-        times = np.diff(self.goal.waypoints.times, prepend=0.0)[first:]
-        if not self.timed:
-            times = np.full(len(times), nan)
-        joint_paths = JointPathPlanner(
-            self.goal,
-            self.targets.rows,
-            self.kinematics,
-            self.options,
-            self.remarks,
-            self.reasons,
-        )
-        geometries = joint_paths.geometries(
-            first, self.state.actual_tcp_pose, self.state.actual_q, times
-        )
-        self.samples, self.blend_samples = joint_paths.margins.samples, joint_paths.blend_samples
-        return geometries
-
     def plan(
         self,
-        goal: Goal,
+        goal: GoalTable,
         segments: PlannedRows,
-        reference: ReferencePath,
+        motion: ReferencePath,
         remarks: Iterable[str],
         find_slow_stretches: Callable[[], tuple[SlowStretch, ...]],
     ) -> Plan:
-        """Return the plan; its remarks follow those collected."""
+        """
+        Return the plan of a motion with its stops and outputs; its remarks follow those collected.
+
+        :param goal: as planned, without stops.
+        :raises GoalRefused: the tool is slower than demanded, or an output has no place.
+        """
+        if goal.min_speed_fraction:
+            check_min_speed(goal, find_slow_stretches())
+        goal, segments, reference = self.stops.insert(goal, segments, motion)
+        segments = place_outputs(
+            segments,
+            reference,
+            goal.io_commands,
+            proportional=goal.proportional_outputs,
+            blend_halves=segments.blend_entries[:, -1],
+        )
         return Plan(
             goal=goal,
             segments=segments,
@@ -374,196 +337,3 @@ class GoalPlanner:
             T_tcp_controlled=self._retargeted.T_tcp_controlled,
             execution=self.mode,
         )
-
-    def segments(self, geometries: SegmentGeometries, timings: SegmentTimings) -> PlannedRows:
-        """Return the primitive of each segment and what is expected of it."""
-        kinds, curves = geometries.kinds, geometries.path.curves
-        moves = MoveRows(
-            kinds=_MOVE_OF[kinds],
-            targets=self.targets.rows[geometries.begin :],
-            q_near=geometries.joints,
-            has_q_near=_HAS_Q_NEAR[kinds],
-            velocities=timings.velocities,
-            accelerations=timings.accelerations,
-            durations=timings.wire_times,
-            blend_radii=geometries.path.radius,
-            others={},
-        )
-        others = {
-            row: self._special(geometries, moves, row) for row in self._special_rows(geometries)
-        }
-        moves = replace(moves, others=others)
-        indices = np.arange(geometries.begin, geometries.begin + len(geometries), dtype=np.int32)
-        return PlannedRows(
-            waypoints=indices,
-            lengths=curves.length,
-            angles=curves.angle,
-            durations=timings.durations,
-            blend_entries=timings.chain.blend_entries,
-            joints=geometries.joints,
-            primitives=moves,
-            report_lines=segment_lines(geometries, timings, moves, self.reasons),
-        )
-
-    def _special_rows(self, geometries: SegmentGeometries) -> list[int]:
-        """Return the rows whose primitives are more than numbers."""
-        special = geometries.kinds == SegmentType.CIRCULAR
-        special |= not self.options.dialect.supports_q_near
-        special[list(geometries.waypoints.postures)] = True
-        special[0] |= geometries.waits
-        return rows_where(special)
-
-    # -- checks of the start ---------------------------------------------------------------------
-
-    def _check_robot(self) -> None:
-        """Refuse a robot whose TCP is not where the kinematics puts it."""
-        state = self.state
-        predicted = self.arm.forward(state.actual_q) @ state.T_flange_tcp
-        distance = predicted.distance_to(state.actual_tcp_pose)
-        angle = predicted.angle_to(state.actual_tcp_pose)
-        if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
-            raise RobotNotReady(
-                f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
-                f'where the kinematics of a {self.arm.model.name} puts it; check '
-                'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
-                'field tcp_offset), the TCP has to be the flange.'
-            )
-
-    def _check_approach(self) -> None:
-        """Refuse a first point that is too far away."""
-        distance = self.state.actual_tcp_pose.distance_to(self.targets[0])
-        bound = self.options.max_approach_distance
-        if 0.0 < bound < distance:
-            raise InvalidGoal(
-                point_field(0, 'pose.position'),
-                f'is {distance:.3f} m away from the tool, more '
-                f'than max_approach_distance = {bound:g} m',
-                'move closer first, add points in between, or raise the parameter',
-            )
-
-    def _check_start_pose(self) -> None:
-        """Refuse a first point at time 0 at which the robot is not."""
-        actual, target = self.state.actual_tcp_pose, self.targets[0]
-        distance, angle = actual.distance_to(target), actual.angle_to(target)
-        options = self.options
-        if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
-            raise InvalidGoal(
-                point_field(0, 'time_from_start'),
-                f'is 0, but the tool is {distance:.4f} m and '
-                f'{angle:.4f} rad away from the point (allowed are '
-                f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
-                'rad)',
-                'give the first point a time greater than 0',
-            )
-
-    def _check_start_posture(self) -> None:
-        """Refuse a first point at time 0 with another posture than that of the robot."""
-        posture = self.goal.waypoints.postures.get(0)
-        if posture:
-            named = named_joints(posture, self.options.tf_prefix)
-            q = self.state.actual_q
-            chosen = self.kinematics.solve_posture(
-                self.targets[0], named, q, point_field(0, 'pose')
-            )
-            # The robot is within the tolerance of the start, not exactly there.
-            near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
-            if clause := describe_miss(near, chosen, named):
-                raise InvalidPosture(
-                    f'{point_field(0, "posture")} is not the one in which the robot stands: '
-                    f'{clause}; give the first point a time greater than 0.'
-                )
-
-    # -- primitives ------------------------------------------------------------------------------
-
-    def _special(self, geometries: SegmentGeometries, moves: MoveRows, row: int) -> Primitive:
-        """Return a primitive that is more than its row of numbers."""
-        point, kind = geometries.begin + row, geometries.kinds[row]
-        joints = vector6(geometries.joints[row].tolist())
-        primitive: Primitive
-        if geometries.waits and row == 0:  # no move of the robot does: a spline that rests
-            primitive = Spline(
-                target=self.state.actual_q,
-                velocities=ZERO6,
-                duration=float(moves.durations[row]),
-            )
-        elif kind == SegmentType.CIRCULAR:
-            primitive = self._arc(geometries, moves, row, joints)
-        else:
-            move = moves[row]
-            assert not isinstance(move, MoveC | Spline | Stop)
-            primitive = move
-            if kind in JOINT_SPACE_TYPES or row in geometries.waypoints.postures:
-                primitive = replace(move, q_near=self._q_near(point, joints))
-        primitive, reason = adapt_to_dialect(primitive, point, joints, self.options)
-        if reason:
-            self.reasons.setdefault(point, []).append(reason)
-        return primitive
-
-    def _q_near(self, point: int, joints: Joints) -> Joints:
-        """Return the chosen solution; a full posture itself where it selects the same one."""
-        posture = self.goal.waypoints.postures.get(point, NO_POSTURE)
-        wanted = full_posture(named_joints(posture, self.options.tf_prefix))
-        if wanted is not None:
-            found = self.kinematics.nearest(
-                self.targets[point], wanted, point_field(point, 'pose')
-            )
-            if max_joint_change(found, joints) <= SAME_SOLUTION:
-                return wanted
-        return joints
-
-    def _arc(
-        self, geometries: SegmentGeometries, moves: MoveRows, row: int, joints: Joints
-    ) -> MoveC:
-        """Return the arc, with joint fields where target or via carry a posture."""
-        point, segments = geometries.begin + row, geometries.segments
-        segment_via = segments.via(row)
-        assert segment_via is not None
-        T_base_via = self.goal.T_base_frame @ segment_via
-        via: Target = T_base_via
-        target: Target = self.targets[point]
-        at_point, at_via = row in geometries.waypoints.postures, segments.via_postures.get(row)
-        wanted = [name for name, has in (('the point', at_point), ('the via', at_via)) if has]
-        if wanted and (reason := explain_poses_only(self.options)):
-            self.remarks.append(
-                f'point {point}: sent as poses despite the posture of '
-                f'{" and ".join(wanted)}, because {reason}'
-            )
-        elif wanted:
-            self.reasons.setdefault(point, []).append(
-                f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
-            )
-            target = joints if at_point else target
-            if at_via:
-                arc = geometries.path.curves.others[row]
-                via = self._via_joints(point, arc, at_via, T_base_via)
-        return MoveC(
-            target=target,
-            via=via,
-            velocity=float(moves.velocities[row]),
-            acceleration=float(moves.accelerations[row]),
-            blend_radius=float(moves.blend_radii[row]),
-            mode=ArcMode(int(segments.arc_modes[row])),
-        )
-
-    def _via_joints(self, point: int, arc: SegmentCurve, posture: Posture, via: Pose) -> Joints:
-        """
-        Return the solution of the via's pose that its posture selects.
-
-        :raises InvalidPosture: the arm follows the arc in another configuration.
-        """
-        assert isinstance(arc, ArcCurve)
-        location = segment_field(point, 'via')
-        first, last = np.searchsorted(self.samples.segment, (point, point + 1))
-        row = int(first + np.argmin(np.abs(self.samples.fraction[first:last] - arc.u_via)))
-        passing = vector6(self.samples.q[row].tolist())
-        # The orientation of the via does not shape the arc: continue from the arc to its pose.
-        q = self.kinematics.nearest(via, passing, location)
-        named = named_joints(posture, self.options.tf_prefix)
-        chosen = self.kinematics.solve_posture(via, named, q, location)
-        if clause := describe_miss(q, chosen, named):
-            raise InvalidPosture(
-                f'{segment_field(point, "via_posture")} is not the configuration of the '
-                f'arm on the arc: {clause}; leave it empty, or start the arc in that '
-                'configuration.'
-            )
-        return chosen

@@ -31,7 +31,7 @@ import re
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import InputKind, OutputKind
+from ur_cartesian_driver.motion.goal import ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
@@ -102,6 +102,17 @@ SPLINE_CONSTANTS: dict[str, float] = {
     'MIN_STEP': 1e-06,
     #: Smaller differences [s] or [rad] are rounding errors.
     'ROUNDING': 1e-10,
+}
+
+#: Constants of force mode.
+PRESS_CONSTANTS: dict[str, float] = {
+    #: The arm stands for so long before it begins [s], as the manual advises.
+    'REST_TIME': 0.02,
+    #: Way back to where the tool touched, at an acceleration [m/s^2] and a speed [m/s].
+    'RETURN_ACCELERATION': 0.5,
+    'RETURN_SPEED': 0.02,
+    #: The step of a CB3 controller [s], which has no gain of force mode.
+    'STEP_WITHOUT_GAIN': 0.008,
 }
 
 #: Cycles by which an output is switched early: it takes effect at the end of its cycle.
@@ -263,6 +274,9 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
     yield from _enum('INPUT', InputKind)
+    yield from _enum('CONTACT', ContactEnd)
+    for name, value in PRESS_CONSTANTS.items():
+        yield f'PRESS_{name} = {value}'
     yield from _enum('FOLLOW', point_fields.FollowKind)
     # Floats, because a matrix of floats is made from them: a row for each analog output.
     yield f'FOLLOW_ONES = {[1.0] * script_command.ANALOG_OUTPUTS}'

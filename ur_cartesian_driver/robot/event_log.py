@@ -71,9 +71,18 @@ class EventLog:
         """Take what the robot reports now."""
         self._last_state, self._last_report = robot, self._clock()
 
-    def robot_error(self) -> str:
-        """Return the newest error that the robot reported lately; empty if none."""
-        entries = reversed(self._recent())
+    @property
+    def now(self) -> float:
+        """The time by the clock of the entries [s]."""
+        return self._clock()
+
+    def robot_error(self, since: float = -inf) -> str:
+        """
+        Return the newest error that the robot reported lately; empty if none.
+
+        :param since: older ones do not count [s].
+        """
+        entries = (entry for entry in reversed(self._recent()) if entry.time >= since)
         return next((entry.text for entry in entries if entry.is_robot_error), '')
 
     def keepalive_gap(self) -> float:

@@ -206,6 +206,11 @@ class RobotLink:
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 
+    def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
+        """Send a script of others, as :meth:`send_primary` sends commands."""
+        self.event_log.note('the driver sent a script of others')
+        return self._primary.send(data, is_wanted)
+
     def note_remote_control(self, remote: bool) -> None:
         """Take note of whether clients may control the robot: a change needs new connections."""
         if self._remote_control not in (None, remote):
@@ -265,11 +270,11 @@ class RobotLink:
 
     def upload_program(self) -> None:
         """Upload the robot program; it replaces ours, never a foreign one."""
-        if refusal := self._upload_refusal():
+        if refusal := self.upload_refusal():
             self._warn(f'the robot program is not sent: {refusal}')
         elif not self._primary.send(
             primary.encode_program(wrap_in_program(self.program.text)),
-            lambda: not self._upload_refusal(),
+            lambda: not self.upload_refusal(),
         ):
             self._warn(
                 'the robot program is not sent: there is no connection to the primary '
@@ -278,7 +283,8 @@ class RobotLink:
         else:
             self.event_log.note('the driver sent the robot program')
 
-    def _upload_refusal(self) -> str:
+    def upload_refusal(self) -> str:
+        """Return why no program may be sent now; empty if one may."""
         if self._status.state in (*OUT_OF_REACH, ConnectionState.CONNECTING):
             return self.status.message
         if self._status.state is ConnectionState.EXECUTING:

@@ -63,6 +63,8 @@ class LinkSettings:
     servoj_gain: float = 1000.0
     servoj_lookahead_time: float = 0.06
     servo_buffer_depth: int = 250
+    #: Whether scripts of others are run on the robot.
+    allow_scripts: bool = False
     #: Whether a person may guide the arm by hand (freedrive).
     allow_freedrive: bool = False
 

@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.robot_state import (
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
+from ur_cartesian_driver.sim.motion.contact_motion import ArmState, ContactMotion
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
@@ -58,7 +59,7 @@ PROTECTIVE_STOP_TIME = 0.1
 #: The same for a program that ends on its path: a recorded UR5e of URSim loses 6.25 per second.
 PROGRAM_STOP_TIME = 0.16
 #: How many cycles back programs can ask for joint positions.
-_MAX_HISTORY = 100
+MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
@@ -100,8 +101,10 @@ class Controller:
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         self.motion.turn_ratio = config.turn_ratio
-        #: The measured motion: equal to the targets, unless imperfect or a fault interferes.
-        self.actual = ActualMotion(self.motion, config.imperfections)
+        #: What the tool touches, and how the arm gives way.
+        self.contact = ContactMotion(self.motion, config.contact_bodies)
+        #: The measured motion: equal to the targets, unless it is disturbed.
+        self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
         self.safety = SafetySystem(config.unlock_delay)
@@ -121,10 +124,7 @@ class Controller:
         self.process = ProcessState()
         #: Target of the last move; None after a stream of set-points.
         self.waypoint: Pose | None = None
-        self.force_mode = False
         self.external_ft = False
-        #: What `tool_contact` returns: steps back to the contact, 0 = none.
-        self.contact_steps = 0
         self._unlock_at = inf
         self.pendant = Pendant()
         self.remote_control = config.remote_control and config.has_remote_control
@@ -134,7 +134,7 @@ class Controller:
         self.scale = 1.0
         #: Whether a program has ended in motion, and the arm slows down on its path.
         self._stopping_on_path = False
-        self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
+        self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
             make_builtins(self),
             self.messages,
@@ -192,6 +192,25 @@ class Controller:
         return STATUS_BITS[self.safety.mode]
 
     @property
+    def _is_moving_freely(self) -> bool:
+        """Whether neither a pause nor a stop holds the arm."""
+        return (
+            self.safety.mode in OPERATIONAL
+            and self.power.mode is RobotMode.RUNNING
+            and self.programs.state is RuntimeState.PLAYING
+        )
+
+    @property
+    def target(self) -> MotionGenerator | ArmState:
+        """Where the arm should be, with what force mode adds to the program."""
+        return self.contact.target or self.motion
+
+    @property
+    def tcp_wrench(self) -> Vector6:
+        """The wrench on the TCP as the robot reports it, in base axes [N, Nm]."""
+        return self.io.external_force if self.external_ft else self.contact.measured
+
+    @property
     def takes_scripts(self) -> bool:
         """Whether clients may send programs and commands: with no remote control, always."""
         return self.remote_control or not self.config.has_remote_control
@@ -202,8 +221,8 @@ class Controller:
 
         :raises RuntimeException: farther back than the history goes.
         """
-        if not 0 <= steps < _MAX_HISTORY:
-            raise RuntimeException(f'steps is {steps}; the history holds 0..{_MAX_HISTORY - 1}')
+        if not 0 <= steps < MAX_HISTORY:
+            raise RuntimeException(f'steps is {steps}; the history holds 0..{MAX_HISTORY - 1}')
         return self._joint_history[-1 - steps]
 
     # ---- one cycle ----------------------------------------------------------------------------
@@ -227,6 +246,7 @@ class Controller:
         self.programs.step()
         self._change_scale(was_at_rest)
         self.motion.step(self.scale)
+        self.contact.step(may_move=self._is_moving_freely)
         self.actual.step()
         self._joint_history.append(self.actual.q)
         self._report_motion_events()
@@ -254,7 +274,7 @@ class Controller:
         for warning in self.motion.warnings:
             self.messages.error(warning.code, warning.argument, warning.text)
         self.motion.warnings.clear()
-        fault = self.motion.fault
+        fault = self.motion.fault or self.contact.fault
         if fault is not None and self.safety.mode in OPERATIONAL:
             self.messages.error(fault.code, fault.argument, fault.text)
             self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
@@ -296,7 +316,7 @@ class Controller:
     def end_modes(self) -> None:
         """End the modes and settings that end with a program."""
         self.freedrive = FreedriveState.OFF
-        self.force_mode = False
+        self.contact.force_mode = None
         self.process = ProcessState()
         self.interpreter_mode.end_of_program()
         self.watchdogs.clear()

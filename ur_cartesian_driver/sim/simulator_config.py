@@ -18,6 +18,7 @@ from ur_cartesian_driver.kinematics.robot_models import (
 from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
+from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 
 #: Upright enough to move anywhere, away from every singularity [rad].
@@ -96,6 +97,9 @@ class SimulatorConfig:
     #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
+    #: What the tool can touch, as :class:`ContactBody` or in words: 'plane 0 0 0.1 0 0 1'.
+    contacts: Sequence[ContactBody | str] = ()
+    contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
     #: Seed of random switches between the threads of a program; None = they are switched only
@@ -117,6 +121,7 @@ class SimulatorConfig:
                 raise ValueError(f'{field_name} is {getattr(self, field_name)}; use a number.')
         if not all(map(isfinite, self.q)):
             raise ValueError(f'q is {self.q}; give the joint positions in radians.')
+        object.__setattr__(self, 'contact_bodies', _contact_bodies(self.contacts))
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
         if self.when_late not in ('skip', 'wait'):
@@ -205,3 +210,9 @@ class SimulatorConfig:
         if self.frequency is not None:
             return 1.0 / self.frequency
         return self.robot_model.control_cycle
+
+
+def _contact_bodies(contacts: Sequence[ContactBody | str]) -> tuple[ContactBody, ...]:
+    return tuple(
+        each if isinstance(each, ContactBody) else ContactBody.parse(each) for each in contacts
+    )

@@ -218,7 +218,10 @@ def _from_file(path: Path, max_rows: int) -> Recording:
                 for name in _COLUMNS
             }
     except KeyError as error:
-        raise _NoRecording(f'{path} is no recording: {error.args[0]}') from None
+        missing = str(error.args[0]).split()[0]
+        raise _NoRecording(
+            f'{path} is no recording of the driver: it has no array {missing!r}'
+        ) from None
     events = [
         (float(time), str(kind), str(text))
         for time, kind, text in zip(times, kinds, texts, strict=True)

@@ -243,6 +243,8 @@ class GoalMachine:
                 clause := self._monitor.missing_input()
             ):
                 return GoalSignal.FAILURE, clause
+            case TrajectoryEnded(result=TrajectoryResult.CONTACT):
+                return GoalSignal.CONTACT, self._monitor.contact_clause(self._packet)
             case TrajectoryEnded(result=result):
                 return RESULT_SIGNALS[result]
             case CancelRequested(reason=reason):
@@ -498,7 +500,7 @@ class GoalMachine:
     def _finish(self) -> list[GoalCommand]:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
         if code is ErrorCode.SUCCESSFUL:
-            text = self.feeder.success_text()
+            text = f'{self._text}.' if self._text else self.feeder.success_text()
         elif code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
             text = failure_text(self._text, 'at the last point')
         else:

@@ -17,6 +17,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSigna
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
+from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
 from ur_cartesian_driver.motion.events import PathPlace, Progress
@@ -144,11 +145,11 @@ class GoalMonitor:
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
         if before is not None:  # it may have braked since
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
-        self._tracker.update(
-            state.target_tcp_pose,
-            2.0 * passed * fastest,
-            self.records.running_waypoints(begun, self._behind),
-        )
+        running = self.records.running_waypoints(begun, self._behind)
+        if running is not None and running[1] < running[0] and self._press() is not None:
+            # However far the tool gives way there, the point behind is passed.
+            self._tracker.pass_stop(running[1])
+        self._tracker.update(self._tracked(state.target_tcp_pose), 2.0 * passed * fastest, running)
 
     # ---- how far it is ------------------------------------------------------------------------
 
@@ -230,7 +231,7 @@ class GoalMonitor:
 
     def _desired(self, state: RobotState) -> Pose:
         """Return where the tool should be, near its progress."""
-        return self._tracker.desired(state.actual_tcp_pose, state.target_tcp_twist)
+        return self._tracker.desired(self._tracked(state.actual_tcp_pose), state.target_tcp_twist)
 
     # ---- whether it is what was planned -------------------------------------------------------
 
@@ -269,7 +270,7 @@ class GoalMonitor:
         off = [
             value
             for value, limit in zip(
-                self._tracker.deviation(state.target_tcp_pose),
+                self._tracker.deviation(self._stiff(state.target_tcp_pose)),
                 self._max_plan_deviation,
                 strict=True,
             )
@@ -298,7 +299,41 @@ class GoalMonitor:
 
     def goal_violation(self, state: RobotState) -> str | None:
         """Return how far the arm is outside the goal tolerance, as a clause, or None."""
-        return self._violation(self._goal_check, self._tracker.pose(), state)
+        desired, press = self._tracker.pose(), self._press()
+        if press is not None:
+            state = press.stiff_state(desired, state)
+        return self._violation(self._goal_check, desired, state)
+
+    def contact_clause(self, state: RobotState) -> str:
+        """Return where the tool touched, as the beginning of a sentence."""
+        x, y, z = state.actual_tcp_pose.position
+        place = self._tracker.place()
+        return (
+            f'The tool touched at x {x:.4f}, y {y:.4f}, z {z:.4f} m in base, on the way to point '
+            f'{place.point}, at {place.fraction:.1%} of its segment'
+        )
+
+    def _press(self) -> PressWindow | None:
+        """Return how the tool may give way where the target is, if it may."""
+        if not self.job.presses:
+            return None
+        time = self._tracker.time()
+        return next((press for press in self.job.presses if press.contains(time)), None)
+
+    def _tracked(self, pose: Pose) -> Pose:
+        """Return the pose that tells how far the tool is on its path."""
+        press = self._press()
+        if press is None or self._tracker.time() > press.end:
+            return pose
+        planned = self._tracker.pose()
+        return press.without_yield(
+            planned, pose, press.compliant_share(planned, self._tracker.direction())
+        )
+
+    def _stiff(self, pose: Pose) -> Pose:
+        """Return a pose of the tool without what it has given way."""
+        press = self._press()
+        return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 
     def _plan_deviation(self, state: RobotState) -> Fault | None:
         """Return that the controller's target left the plan, or None."""
@@ -307,7 +342,7 @@ class GoalMonitor:
         for name, unit, value, limit in zip(
             ('max_plan_deviation', 'max_plan_deviation_angle'),
             ('m', 'rad'),
-            self._tracker.deviation(state.target_tcp_pose),
+            self._tracker.deviation(self._stiff(state.target_tcp_pose)),
             self._max_plan_deviation,
             strict=True,
         ):
@@ -341,9 +376,14 @@ class GoalMonitor:
         )
 
     def _path_violation(self, state: RobotState) -> Fault | None:
-        if not (self._path_check and self._has_begun):
+        press = self._press()
+        if not ((self._path_check or press) and self._has_begun):
             return None
-        clause = self._violation(self._path_check, self._desired(state), state)
+        desired, clause = self._desired(state), None
+        if press is not None:
+            clause = press.excess(desired, state, self._tracker.time())
+            state = press.stiff_state(desired, state)
+        clause = clause or self._violation(self._path_check, desired, state)
         if clause is None:
             return None
         return GoalSignal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'

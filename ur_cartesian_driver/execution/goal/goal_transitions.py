@@ -25,6 +25,8 @@ state and signal, the next state and, where it is decided there, the code of the
 * **SETTLING**: the program has reported the last point as reached. The arm has to be at rest
   inside the goal tolerance, within the goal's time tolerance. Where the controller's target is
   elsewhere, the program left something out (DEVIATION).
+* A goal that ends where the tool touches (CONTACT) has succeeded without SETTLING: the program has
+  moved the arm to where that was.
 * **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read the CANCEL; it is no answer, CANCELED still follows.
@@ -86,6 +88,7 @@ class GoalSignal(Enum):
     SUCCESS = auto()
     CANCELED = auto()
     FAILURE = auto()
+    CONTACT = auto()
     CANCEL = auto()
     PREEMPT = auto()
     VIOLATION = auto()
@@ -171,7 +174,7 @@ def _ignore(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transiti
 
 
 #: Results of the robot program.
-_RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE)
+_RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT)
 #: Requests of users; the first of them decides how the goal ends.
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
 _ON_USER_STOP = {
@@ -184,6 +187,7 @@ _WHILE_RUNNING: Mapping[GoalSignal, Transition] = {
     **_ON_STOP,
     GoalSignal.CANCELED: _decide(ErrorCode.EXECUTION_FAILED),
     GoalSignal.FAILURE: _decide(ErrorCode.EXECUTION_FAILED),
+    GoalSignal.CONTACT: _decide(ErrorCode.SUCCESSFUL),
     GoalSignal.CANCEL: Transition(GoalState.CANCELLING, ErrorCode.CANCELLED),
     GoalSignal.PREEMPT: Transition(GoalState.CANCELLING, ErrorCode.PREEMPTED),
     GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
@@ -234,7 +238,8 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
     },
     GoalState.CANCELLING: {
         **_ON_STOP,
-        **_ignore(GoalState.CANCELLING, GoalSignal.SUCCESS, GoalSignal.FAILURE, *_USER_STOPS),
+        **_ignore(GoalState.CANCELLING, GoalSignal.SUCCESS, GoalSignal.FAILURE),
+        **_ignore(GoalState.CANCELLING, GoalSignal.CONTACT, *_USER_STOPS),
         GoalSignal.CANCELED: Transition(GoalState.COMING_TO_REST),
         GoalSignal.UNANSWERED: Transition(GoalState.ENDED),
         GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
@@ -274,6 +279,11 @@ RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = {
     TrajectoryResult.INPUT_MISSING: (
         GoalSignal.FAILURE,
         'an input of input_waits did not come in time',
+    ),
+    TrajectoryResult.CONTACT: (GoalSignal.CONTACT, 'the tool touched'),
+    TrajectoryResult.NO_CONTACT: (
+        GoalSignal.FAILURE,
+        'the tool touched nothing, but its press requires contact',
     ),
 }
 

@@ -4,17 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     DEFAULT_STALL_TIMEOUT,
+    DEFAULT_YIELDS,
     OnPathTolerance,
+    PRESS_AXES,
+    PressFrame,
     SafeOutput,
     Tolerance,
 )
@@ -24,6 +29,7 @@ from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import AwaitInput, Spline, SwitchOutput
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
@@ -75,6 +81,8 @@ class MotionJob:
     has_stops: bool = False
     #: By waypoint: the time-out of its input [s], and that it has not come, as a clause.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
+    #: Where the tool may give way.
+    presses: tuple[PressWindow, ...] = ()
     #: What outputs become when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
@@ -105,7 +113,7 @@ class MotionJob:
         if not self.is_motion.all():
             return 'outputs (io_commands)'
         if self.has_stops:
-            return 'what is done at points (dwell, input_waits, payload_changes)'
+            return 'what is done at points (dwell, input_waits, payload_changes, presses)'
         if self.safe_outputs:
             return 'outputs that have to be safe (safe_outputs)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
@@ -164,6 +172,7 @@ def job_from_plan(
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
+        presses=tuple(_press_windows(plan)),
         safe_outputs=goal.safe_outputs,
         following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
         stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT)
@@ -196,6 +205,29 @@ def job_from_plan(
         if plan.execution.traits.streams_setpoints
         else None,
     )
+
+
+def _press_windows(plan: Plan) -> Iterator[PressWindow]:
+    """Yield when the tool gives way on the reference path."""
+    reference, goal = plan.reference, plan.goal
+    rows = np.searchsorted(reference.point, np.arange(len(goal.waypoints)), side='right') - 1
+    times = [*reference.time[rows].tolist(), inf]
+    for press in goal.presses:
+        yield PressWindow(
+            begin=times[press.first_waypoint],
+            end=times[press.last_waypoint],
+            release=times[press.last_waypoint + 1],
+            compliant=vector6(float(axis in press.axes) for axis in PRESS_AXES),
+            q_base_task={
+                PressFrame.TOOL: None,
+                PressFrame.GOAL: goal.T_base_frame.quaternion,
+                PressFrame.BASE: IDENTITY.quaternion,
+            }[press.frame],
+            max_yields=(
+                press.max_yield or DEFAULT_YIELDS[0],
+                press.max_yield_angle or DEFAULT_YIELDS[1],
+            ),
+        )
 
 
 def _last_output_delay(rows: PlannedRows) -> float:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
 
 #: Weight of a radian in the distance that decides which position is the nearest [m/rad].
 METRES_PER_RADIAN = 0.1
@@ -45,6 +45,8 @@ SAME_TIME = 5e-7
 #: At a place where the plan waits the target is at most so far beside it [m]: the wire rounds to a
 #: micrometre, and a servo creeps.
 SAME_PLACE = 2e-5
+#: From this fraction of an edge on the path goes on along the next one.
+AT_END = 0.999
 #: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0
 #: Up to so many edges are searched one by one.
@@ -257,6 +259,12 @@ class PathTracker:
         )
         return self.path_position
 
+    def pass_stop(self, waypoint: int) -> None:
+        """Move on to a point of the goal that the program has left, if it has no blend."""
+        row = bisect_right(self._points, waypoint) - 1
+        if row > self.path_position.row and not self.path.blend_tolerance[row].any():
+            self.path_position = PathPosition(row, 0.0)
+
     def append(self, path: ReferencePath, since: float) -> None:
         """
         Append a path from a time on [s], and forget what lies far behind.
@@ -294,6 +302,19 @@ class PathTracker:
         row, fraction = self.path_position.row, self.path_position.fraction
         here = self._time[row]
         return here + fraction * (self._time[row + 1] - here) if fraction else here
+
+    def direction(self) -> Vector3:
+        """Return the unit vector along which the path goes on; zeros where it only turns."""
+        row = self.path_position.row + (self.path_position.fraction > AT_END)
+        while row < self.last_row:
+            x, y, z, *turn = self._edge(row).vector
+            length = sqrt(x * x + y * y + z * z)
+            if length > 0.0:
+                return (x / length, y / length, z / length)
+            if any(turn):
+                break
+            row += 1
+        return ZERO3
 
     def waypoint(self) -> int:
         """Return the index of the goal's point that comes next."""

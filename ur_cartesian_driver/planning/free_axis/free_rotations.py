@@ -50,6 +50,7 @@ from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     RotationSamples,
 )
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import named_joints
@@ -277,8 +278,7 @@ class _FreePath:
         self.knots = self._knots(lengths, tilts)
         counts = np.ceil(np.maximum(lengths / _SAMPLE_LENGTH, tilts / _SAMPLE_TILT))
         counts = np.where(self.is_joint, 1, np.clip(counts, 1, _MAX_SAMPLES)).astype(np.intp)
-        row = np.repeat(np.arange(len(counts)), counts)
-        number = np.arange(1, len(row) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
+        row, number = counted(counts)
         u = number / counts[row]
         ends = np.concatenate([self.poses[:, :3], self.references], axis=1)
         begins = np.concatenate([[self.start.row()], ends[:-1]])

@@ -26,7 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.closed_form_rows import branch_rows, BRANCHES, TargetPoses
+from ur_cartesian_driver.kinematics.closed_form_rows import (
+    branch_rows,
+    BRANCHES,
+    BranchSolution,
+    TargetPoses,
+)
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.motion.pose import Pose
@@ -296,15 +301,15 @@ class RotationLattice:
         is_round = count * step > tau - 1e-9
         return _Tables(first=first, step=step, is_round=is_round, q=q, cost=cost)
 
-    def _solve(self, solution: object) -> tuple[Floats, Floats]:
+    def _solve(self, solution: BranchSolution) -> tuple[Floats, Floats]:
         """Return joints (n, 6), and the cost of nearness to singularities for each unit (n,)."""
-        q = solution.q.T  # type: ignore[attr-defined]
+        q = solution.q.T
         distances = singularity_distance_rows(self.arm, q)
         bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
         margin = (distances / _SCALES).min(axis=1)
         cost = _nearness(margin)
         cost += np.where((distances < bounds).any(axis=1), _REFUSED, 0.0)
-        cost[~solution.exists] = inf  # type: ignore[attr-defined]
+        cost[~solution.exists] = inf
         return q, cost
 
     # -- nodes -----------------------------------------------------------------------------------

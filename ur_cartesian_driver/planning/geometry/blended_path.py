@@ -10,7 +10,7 @@ The other curves (arcs, joint lines) stand beside the rows as objects.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,14 @@ _CHORDS = 16
 
 
 class CurveSequence(Protocol):
-    """Consecutive curves, by their numbers, as the checks along a path need them."""
+    """
+    Consecutive curves as the checks along a path need them.
+
+    The curve of segment k has the number 2k, the blend after it 2k + 1.
+    """
+
+    #: Whether the arm rests at the points without a blend.
+    rests_at_points: ClassVar[bool]
 
     def rows(self, number: Integers, t: Floats) -> Floats:
         """
@@ -55,8 +62,8 @@ class CurveSequence(Protocol):
         :param t: (n,) in [0, 1].
         """
 
-    def extents(self, number: Integers) -> tuple[Floats, Floats]:
-        """Return the lengths (n,) [m], and the turns (n,) of tool or leading joint [rad]."""
+    def extent(self, number: int) -> tuple[float, float]:
+        """Return length [m], and turn of tool or leading joint [rad], of a curve."""
 
     def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
         """Return the segments (n,) that places count to, and the fractions (n,) of them."""
@@ -146,8 +153,10 @@ class BlendedPath:
     """
     The curves of consecutive segments with the blends between them; columns (n,).
 
-    As a :class:`CurveSequence` the curve of row k has the number 2k, the blend after it 2k + 1.
+    It is a :class:`CurveSequence`.
     """
+
+    rests_at_points: ClassVar[bool] = True
 
     def __init__(self, curves: CurveRows) -> None:
         """Begin without blends."""
@@ -222,6 +231,11 @@ class BlendedPath:
             ),
         )
         return length, turn
+
+    def extent(self, number: int) -> tuple[float, float]:
+        """See :class:`CurveSequence`."""
+        length, turn = self.extents(np.array([number]))
+        return float(length[0]), float(turn[0])
 
     def rows(self, number: Integers, t: Floats) -> Floats:
         """See :class:`CurveSequence`."""

@@ -45,6 +45,12 @@ def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
+def counted(counts: Integers) -> tuple[Integers, Integers]:
+    """Return for counts (n,) the rows 0, 0, ..., 1, 1, ... and the numbers 1, 2, ..., 1, 2, ..."""
+    rows = np.repeat(np.arange(len(counts)), counts)
+    return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def group_begins(segments: Ints) -> Integers:
     """Return the first row of each segment; ``segments`` (n,) must not decrease."""
     return np.flatnonzero(np.diff(segments, prepend=segments[0] - 1))
@@ -79,11 +85,6 @@ class CurvePieces:
     begin: Floats
     end: Floats
     sample_count: Integers
-    #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
-    index: Ints
-    is_blend: Flags
-    #: Whether the arm rests where it begins.
-    begins_at_rest: Flags
 
     @classmethod
     def of(
@@ -104,18 +105,25 @@ class CurvePieces:
             begin=begin,
             end=end,
             sample_count=count.astype(np.intp),
-            index=(first + number // 2).astype(np.int32),
-            is_blend=is_blend,
-            begins_at_rest=~is_blend & (begin == 0.0),
         )
 
     def __len__(self) -> int:
         return len(self.number)
 
+    @property
+    def index(self) -> Ints:
+        """Index of the waypoint at the end of each curve; of a blend the one that it rounds."""
+        return (self.first + self.number // 2).astype(np.int32)
+
+    @property
+    def is_blend(self) -> Flags:
+        """Whether they are blends."""
+        is_blend: Flags = self.number % 2 == 1
+        return is_blend
+
     def extent(self, k: int) -> tuple[float, float]:
         """Return length [m] and turn [rad] of the whole curve of a piece."""
-        length, turn = self.path.extents(self.number[k : k + 1])
-        return float(length[0]), float(turn[0])
+        return self.path.extent(int(self.number[k]))
 
     def pose(self, k: int, t: float) -> Pose:
         """Return a pose on the curve of a piece."""
@@ -157,8 +165,7 @@ def sample_poses(pieces: CurvePieces) -> PoseSamples:
 def sample_parameters(pieces: CurvePieces) -> tuple[Integers, Floats]:
     """Return the piece (n,) and the parameter (n,) of each sample."""
     n = pieces.sample_count
-    piece = np.repeat(np.arange(len(n)), n)
-    k = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(n) - n, n)
+    piece, k = counted(n)
     part = k / n[piece]
     begin, end = pieces.begin[piece], pieces.end[piece]
     return piece, np.where(part == 1.0, end, begin + (end - begin) * part)

@@ -11,7 +11,7 @@ quintic where accelerations are given too. Both are met exactly at the points.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,9 @@ from ur_cartesian_driver.motion.polynomials import (
     values,
 )
 from ur_cartesian_driver.motion.pose_rows import (
+    angle_rows,
     conjugate_rows,
+    distance_rows,
     Floats,
     multiply_rows,
     normalized_rows,
@@ -148,19 +150,23 @@ class ToolSpline:
 class ToolSplinePath:
     """The pieces of a spline as a :class:`~.blended_path.CurveSequence`, each a segment."""
 
+    rests_at_points: ClassVar[bool] = False
     spline: ToolSpline
-    #: (n,) [m], [rad]
-    lengths: Floats
-    angles: Floats
+    #: (n,) the numbers of samples with which to measure them.
+    sample_count: Ints
 
     def rows(self, number: Ints, t: Floats) -> Floats:
-        """Return poses (n, 7) on many pieces."""
-        return self.spline.poses(number, t * np.diff(self.spline.times)[number])
+        """See :class:`~.blended_path.CurveSequence`."""
+        piece = number // 2
+        return self.spline.poses(piece, t * np.diff(self.spline.times)[piece])
 
-    def extents(self, number: Ints) -> tuple[Floats, Floats]:
-        """Return the lengths and the turns of pieces."""
-        return self.lengths[number], self.angles[number]
+    def extent(self, number: int) -> tuple[float, float]:
+        """See :class:`~.blended_path.CurveSequence`; measured along the chords of its samples."""
+        t = np.linspace(0.0, 1.0, int(self.sample_count[number // 2]) + 1)
+        a, b = (rows := self.rows(np.full(len(t), number), t))[:-1], rows[1:]
+        turn = angle_rows(a[:, 3:], b[:, 3:]).sum()
+        return float(distance_rows(a, b).sum()), float(turn)
 
     def locate(self, number: Ints, t: Floats) -> tuple[Ints, Floats]:
-        """Return each place as it is."""
-        return number, t
+        """See :class:`~.blended_path.CurveSequence`."""
+        return number // 2, t

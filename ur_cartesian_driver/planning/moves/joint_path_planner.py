@@ -12,6 +12,7 @@ the configuration in which the run arrives. So does a line that has to become a 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
@@ -25,15 +26,15 @@ from ur_cartesian_driver.motion.errors import (
     Unreachable,
 )
 from ur_cartesian_driver.motion.goal import Posture, Segment, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
-from ur_cartesian_driver.planning.geometry.samples import CurvePieces
-from ur_cartesian_driver.planning.moves.path_margins import PathMargins
+from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined
+from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds
 from ur_cartesian_driver.planning.moves.segment_drafts import SegmentDrafts
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -52,6 +53,7 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
     first_refusal,
     near_singularity_refusal,
     singularity_distance_rows,
+    tightest_margins,
 )
 from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
 from ur_cartesian_driver.planning.request.goal_fields import (
@@ -91,24 +93,24 @@ class JointPathPlanner:
         reasons: dict[int, list[str]],
     ) -> None:
         """Begin with no segment."""
+        #: All samples of the goal, and those in its blends; set by :meth:`geometries`.
+        self.samples: PathSamples
+        self.blend_samples: BlendSamples
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
         self._max_path_length = max_path_length(kinematics)
         self._replaces = options.on_posture_change == 'movej'
 
-    def geometries(
-        self, begin: int, T_base_tcp: Pose, q: Joints, times: Floats
-    ) -> SegmentGeometries:
+    def geometries(self, begin: int, T_base_tcp: Pose, q: Joints) -> SegmentGeometries:
         """
         Return every segment with its curve, its blends and the configuration at its end.
 
         :param begin: index of the first waypoint with a motion.
         :param T_base_tcp: pose of the tool at the start, ``q`` the joint positions [rad].
-        :param times: of each segment [s]; NaN = by speed.
         :raises GoalRefused: the arm cannot go there.
         """
-        self._q_start = self._q = q
-        self.margins = PathMargins(self.kinematics.arm, q)
+        self.q_start = self._q = q
+        self._parts: list[PathSamples] = []
         self._drafts = SegmentDrafts(
             self.goal, self.targets, begin, T_base_tcp, self.options, self.remarks
         )
@@ -125,7 +127,7 @@ class JointPathPlanner:
             limit = 2 * limit if resume_at == stop else _FIRST_RUN
             k = resume_at
         self._remark_stops()
-        return self._geometries(times)
+        return self._geometries()
 
     # -- runs ------------------------------------------------------------------------------------
 
@@ -164,7 +166,7 @@ class JointPathPlanner:
 
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
         """Add what is solved from where the arm is, and move the arm to its end."""
-        self.margins.add(joint_path, measures)
+        self._parts.append(PathSamples.of(joint_path, measures))
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
 
@@ -286,7 +288,7 @@ class JointPathPlanner:
     def _start_joints(self, k: int) -> Joints:
         """Return the configuration in which a joint move begins: that at the waypoint before."""
         if k == 0:
-            return self._q_start
+            return self.q_start
         solved_until = self._drafts.solved_until[k - 1]
         if solved_until == 1.0 or self._path.curves.is_joint_line[k - 1]:
             return vector6(self._drafts.joints[k - 1].tolist())
@@ -340,9 +342,11 @@ class JointPathPlanner:
 
     # -- segments --------------------------------------------------------------------------------
 
-    def _geometries(self, times: Floats) -> SegmentGeometries:
-        drafts = self._drafts
-        speed_bounds, self.blend_samples = self.margins.speeds()
+    def _geometries(self) -> SegmentGeometries:
+        drafts, arm, times = self._drafts, self.kinematics.arm, self.goal.waypoints.times
+        of = self.samples = PathSamples(*map(joined, zip(*self._parts, strict=True)))
+        self._parts.clear()
+        bounds, self.blend_samples = speed_bounds(arm, of, self.q_start)
         geometries = SegmentGeometries(
             begin=drafts.begin,
             kinds=drafts.kinds,
@@ -350,9 +354,11 @@ class JointPathPlanner:
             segments=drafts.segments,
             path=self._path,
             joints=drafts.joints,
-            times=times,
-            speed_bounds=speed_bounds,
-            tightest_margins=self.margins.tightest_margins(),
+            times=np.diff(times, prepend=0.0)[drafts.begin :]
+            if times.any()
+            else np.full(len(drafts), nan),
+            speed_bounds=bounds,
+            tightest_margins=tightest_margins(arm, of.q, of.measures, of.segment, of.fraction),
         )
         for row in rows_where(self._has_no_motion()):
             if drafts.begin + row > 0:
@@ -381,11 +387,12 @@ class JointPathPlanner:
         self.remarks.append(f'point 0: the robot is already there{wait_clause}')
         self.reasons[0] = [f'the robot is already there{wait_clause}']
         geometries.kinds[0] = _JOINT if geometries.kinds[0] == _JOINT else SegmentType.LINEAR
-        waypoint, segment = geometries.waypoints[0], geometries.segments[0]
+        waypoint = WaypointRows.of([replace(geometries.waypoints[0], twist=ZERO6)])
+        segment = SegmentRows.of([Segment(type=geometries.segments[0].type)])
         return replace(
             geometries,
-            waypoints=geometries.waypoints.with_first(replace(waypoint, twist=ZERO6)),
-            segments=geometries.segments.with_first(Segment(type=segment.type)),
+            waypoints=geometries.waypoints.with_first(waypoint),
+            segments=geometries.segments.with_first(segment),
             waits=waits,
         )
 

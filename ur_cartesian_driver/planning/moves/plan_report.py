@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from math import degrees
 
 from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE, Goal, SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import LateLines
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
@@ -30,42 +29,41 @@ def segment_lines(
 
     :param reasons: by point, for the choice of the primitive.
     """
-    return LateLines(len(geometries), lambda: _lines(geometries, timings, primitives, reasons))
 
+    def make() -> list[str]:
+        lines, path = [], geometries.path
+        columns = zip(
+            geometries.segments.types.tolist(),
+            primitives,
+            path.radius.tolist(),
+            geometries.tightest_margins,
+            strict=True,
+        )
+        for row, (asked, primitive, radius, margin) in enumerate(columns):
+            why = reasons.get(geometries.begin + row)
+            parts = [
+                f'point {geometries.begin + row}: {SegmentType(asked).name} -> {_name(primitive)}'
+                + (f' because {" and ".join(why)}' if why else ''),
+                f'{_extent(path.curves, row)} in {_duration(geometries, timings, row)}',
+            ]
+            if radius:
+                parts.append(f'blend {1e3 * radius:g} mm')
+            parts.append(timings.requests.source(row))
+            lines.append(f'{", ".join(parts)}; margin {margin}')
+        return lines
 
-def _lines(
-    geometries: SegmentGeometries,
-    timings: SegmentTimings,
-    primitives: Sequence[Primitive],
-    reasons: Mapping[int, Sequence[str]],
-) -> list[str]:
-    lines, path = [], geometries.path
-    columns = zip(
-        geometries.segments.types.tolist(),
-        primitives,
-        path.radius.tolist(),
-        geometries.tightest_margins,
-        strict=True,
-    )
-    for row, (asked, primitive, radius, margin) in enumerate(columns):
-        why = reasons.get(geometries.begin + row)
-        parts = [
-            f'point {geometries.begin + row}: {SegmentType(asked).name} -> {_name(primitive)}'
-            + (f' because {" and ".join(why)}' if why else ''),
-            f'{_extent(path.curves, row)} in {_duration(geometries, timings, row)}',
-        ]
-        if radius:
-            parts.append(f'blend {1e3 * radius:g} mm')
-        parts.append(timings.requests.source(row))
-        lines.append(f'{", ".join(parts)}; margin {margin}')
-    return lines
+    return LateLines(len(geometries), make)
 
 
 def stop_remarks(geometries: SegmentGeometries) -> list[str]:
     """Return at which inner points the arm stops."""
     lines: list[str] = []
-    stops = [geometries.begin + row for row in rows_where(geometries.path.radius[:-1] == 0.0)]
-    add_remark(lines, stops, 'the arm stops there, because there is no blend (blend_radius)')
+    add_remark(
+        lines,
+        geometries.begin,
+        geometries.path.radius[:-1] == 0.0,
+        'the arm stops there, because there is no blend (blend_radius)',
+    )
     return lines
 
 

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,10 +11,12 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
+from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
 
 #: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8
+#: Rows at a time, so that intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
 
 
@@ -58,7 +58,7 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Integers, Floats]:
     n = np.maximum(1, np.ceil(curves.samples * span)).astype(np.intp)
     # Joint moves evenly: preview finds the joint positions by counting.
     n = np.where(curves.is_joint_line, np.maximum(n, _MIN_JOINT_SAMPLES), n)
-    row, k = _counted(n - 1)
+    row, k = counted(n - 1)
     between = begin[row] + span[row] * k / n[row]
     knots = np.sort(times.knots / np.maximum(times.length - times.tail, 1e-300)[:, None], axis=1)
     inside = (knots > 0.0) & (knots < 1.0) & ~curves.is_joint_line[:, None]
@@ -72,17 +72,11 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Integers, Floats]:
     blends = np.flatnonzero(path.has_blend_after)
     # One of them at the point.
     n = path.blend_samples[blends] + path.blend_samples[blends] % 2
-    blend, k = _counted(n)
+    blend, k = counted(n)
     number = np.concatenate([2 * own, 2 * rows, 2 * blends[blend] + 1])
     at = np.concatenate([at_knots, path.u_leave, k / n[blend]])
     order = np.argsort(number, kind='stable')  # three sorted runs
     return number[order], at[order]
-
-
-def _counted(counts: Integers) -> tuple[Integers, Integers]:
-    """Return for counts (n,) the rows 0, 0, ..., 1, 1, ... and the numbers 1, 2, ..., 1, 2, ..."""
-    rows = np.repeat(np.arange(len(counts)), counts)
-    return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _times(
@@ -98,7 +92,9 @@ def _times(
     :param number: (n,) that of its segment; rows in a blend have that of the one behind it.
     """
     found, span = times.begins[number], np.maximum(path.u_leave - path.u_join, 1e-300)
-    for rows in _blocks(np.flatnonzero(~on_blend)):
+    between = np.flatnonzero(~on_blend)
+    for k in range(0, len(between), _BLOCK):
+        rows = between[k : k + _BLOCK]
         own = number[rows]
         part = (at[rows] - path.u_join[own]) / span[own]
         found[rows] += times.take(own).time_at(part * (times.length - times.tail)[own])
@@ -106,8 +102,3 @@ def _times(
     begin, end = times.begin_rate[number[rows]], times.end_rate[number[rows]]
     found[rows] += ramp_time(begin, end, at[rows]) - ramp_time(begin, end, 1.0)
     return found
-
-
-def _blocks(rows: Integers) -> Iterator[Integers]:
-    """Cut rows into blocks whose intermediate arrays stay in the CPU cache."""
-    return (rows[k : k + _BLOCK] for k in range(0, len(rows), _BLOCK))

@@ -11,7 +11,7 @@ import numpy as np
 from ur_cartesian_driver.motion.goal_table import Integers, SegmentRows, WaypointRows
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Flags
-from ur_cartesian_driver.planning.moves.path_margins import JointSpeedBounds
+from ur_cartesian_driver.planning.moves.path_samples import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
 

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.blended_path import Integers
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
-from ur_cartesian_driver.planning.moves.path_margins import BlendSamples
+from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
 from ur_cartesian_driver.planning.options import PlanningOptions

@@ -10,6 +10,7 @@ law that is assumed (:mod:`~.move_chain`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -130,77 +131,50 @@ class _SlowMoves:
         fractions: Floats = path.u_join + (path.u_leave - path.u_join) * distances / full
         return fractions
 
-    def _at_points(self) -> list[SlowStretch]:
+    def _at_points(self) -> Iterator[SlowStretch]:
         """Return the stretches around points at which the tool brakes or speeds up."""
-        geometries, path, times = (
-            self._geometries,
+        begin, path, times = (
+            self._geometries.begin,
             self._geometries.path,
             self._timings.chain.times,
         )
         speeds_up, brakes = self._ramps()
-        full = times.length - times.tail
         begins, ends = self._fractions(brakes), self._fractions(speeds_up)
-        blended, ratio = path.has_blend_after, self._ratio
         # The segments that begin and end what lies between joint moves.
         opens, closes = self._runs()
-        heads, tails = speeds_up > 0.0, brakes < full
-        found, n = [], len(heads)
-        for row in rows_where(tails | np.append(heads[1:], False)):
-            point = geometries.begin + row
-            tail, head = bool(tails[row]), row + 1 < n and bool(heads[row + 1])
-            if blended[row]:
-                reason = f'of the blend at point {point}'
-                if tail:
-                    found.append(
-                        self._stretch(
-                            (row, begins[row], row, path.u_leave[row]),
-                            times.leave[row] * ratio[row],
-                            SlowCause.RAMP if closes[row] else SlowCause.BLEND,
-                            f'it brakes because {reason}',
-                            point,
-                            counts=not closes[row],
-                        )
-                    )
-                if head:
-                    found.append(
-                        self._stretch(
-                            (row + 1, path.u_join[row + 1], row + 1, ends[row + 1]),
-                            times.enter[row + 1] * ratio[row + 1],
-                            SlowCause.RAMP if opens[row + 1] else SlowCause.BLEND,
-                            f'it is still slow because {reason}',
-                            point,
-                            counts=not opens[row + 1],
-                        )
-                    )
-                continue
-            is_ramp = bool((not tail or closes[row]) and (not head or opens[row + 1]))
-            reverses = tail and head and self._reverses(row)
-            cause = SlowCause.REVERSAL if reverses else SlowCause.STOP
-            end = (row + 1, ends[row + 1]) if head else (row, 1.0)
-            found.append(
-                self._stretch(
-                    (row, begins[row], *end) if tail else (row + 1, 0.0, *end),
-                    0.0,
-                    SlowCause.RAMP if is_ramp else cause,
-                    f'the path reverses at point {point}'
-                    if reverses
-                    else f'the arm comes to rest at point {point}',
-                    point,
-                    counts=not is_ramp,
-                )
-            )
+        heads, tails = speeds_up > 0.0, brakes < times.length - times.tail
+        entering, leaving = times.enter * self._ratio, times.leave * self._ratio
+        blended = path.has_blend_after
         if heads[0]:
-            found.append(
-                self._stretch(
-                    (0, path.u_join[0], 0, ends[0]),
-                    times.enter[0] * ratio[0],
-                    SlowCause.RAMP,
-                    'the arm starts from rest',
-                    geometries.begin,
-                    counts=False,
-                )
+            where = (0, path.u_join[0], 0, ends[0])
+            reason = 'the arm starts from rest'
+            yield self._stretch(where, entering[0], SlowCause.RAMP, reason, begin)
+        for row in rows_where(tails & blended):
+            yield self._stretch(
+                (row, begins[row], row, path.u_leave[row]),
+                leaving[row],
+                SlowCause.RAMP if closes[row] else SlowCause.BLEND,
+                f'it brakes because of the blend at point {begin + row}',
+                begin + row,
             )
-        return found
+        for row in rows_where(heads & path.has_blend_before):
+            yield self._stretch(
+                (row, path.u_join[row], row, ends[row]),
+                entering[row],
+                SlowCause.RAMP if opens[row] else SlowCause.BLEND,
+                f'it is still slow because of the blend at point {begin + row - 1}',
+                begin + row - 1,
+            )
+        for row in rows_where((tails | np.append(heads[1:], False)) & ~blended):
+            tail, head = bool(tails[row]), row + 1 < len(heads) and bool(heads[row + 1])
+            cause, reason = SlowCause.STOP, f'the arm comes to rest at point {begin + row}'
+            if tail and head and self._reverses(row):
+                cause, reason = SlowCause.REVERSAL, f'the path reverses at point {begin + row}'
+            if (not tail or closes[row]) and (not head or opens[row + 1]):
+                cause = SlowCause.RAMP
+            start = (row, begins[row]) if tail else (row + 1, 0.0)
+            end = (row + 1, ends[row + 1]) if head else (row, 1.0)
+            yield self._stretch((*start, *end), 0.0, cause, reason, begin + row)
 
     def _runs(self) -> tuple[Flags, Flags]:
         """Return which segments (n,) are first and last between joint moves."""
@@ -221,12 +195,11 @@ class _SlowMoves:
 
     # -- whole segments --------------------------------------------------------------------------
 
-    def _cruises(self) -> list[SlowStretch]:
+    def _cruises(self) -> Iterator[SlowStretch]:
         """Return the stretches whose greatest speed is too low."""
         geometries, timings, times = self._geometries, self._timings, self._timings.chain.times
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(speeds_up), self._fractions(brakes)
-        found = []
         for row in rows_where(self._too_slow & (ends > begins)):
             point = geometries.begin + row
             lowest, limit = times.cruise[row], timings.requests.limited.get(row)
@@ -234,7 +207,8 @@ class _SlowMoves:
                 lowest = min(times.enter[row], times.leave[row], lowest)
             if self._is_short[row]:
                 cause = SlowCause.SHORT
-                reason = f'the segment is too short for more than {self._speed(row):.3g} m/s'
+                speed = times.cruise[row] * self._ratio[row]
+                reason = f'the segment is too short for more than {speed:.3g} m/s'
             elif limit is not None:
                 cause = (
                     SlowCause.TOOL_LIMIT if 'max_tool_speed' in limit else SlowCause.JOINT_LIMIT
@@ -244,20 +218,8 @@ class _SlowMoves:
                 cause, reason = SlowCause.TURN, 'the tool turns that far on the segment'
             else:
                 cause, reason = SlowCause.TIMES, 'the times of its neighbours leave it more time'
-            found.append(
-                self._stretch(
-                    (row, begins[row], row, ends[row]),
-                    lowest * self._ratio[row],
-                    cause,
-                    reason,
-                    point,
-                )
-            )
-        return found
-
-    def _speed(self, row: int) -> float:
-        """Return the greatest speed of the tool on a segment [m/s]."""
-        return float(self._timings.chain.times.cruise[row] * self._ratio[row])
+            where = (row, begins[row], row, ends[row])
+            yield self._stretch(where, lowest * self._ratio[row], cause, reason, point)
 
     # -- in blends -------------------------------------------------------------------------------
 
@@ -295,7 +257,6 @@ class _SlowMoves:
                 f'of the blend at point {self._geometries.begin + row} (as assumed: how fast the '
                 'robot passes blends is not published)',
                 self._geometries.begin + row,
-                counts=False,
                 asked=wish,
             )
             for row, low, wish in zip(
@@ -310,8 +271,6 @@ class _SlowMoves:
         cause: SlowCause,
         reason: str,
         point: int,
-        *,
-        counts: bool = True,
         asked: float | None = None,
     ) -> SlowStretch:
         """Return a stretch from the fraction of one row to that of another one."""
@@ -322,12 +281,9 @@ class _SlowMoves:
             first_fraction=float(begin),
             last=base + last,
             last_fraction=float(end),
-            asked=float(np.fmax(self._asked[first], self._asked[last]))
-            if asked is None
-            else asked,
+            asked=asked or float(np.fmax(self._asked[first], self._asked[last])),
             lowest=float(lowest),
             cause=cause,
             reason=reason,
             point=point,
-            counts=counts,
         )

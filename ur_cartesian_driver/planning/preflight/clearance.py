@@ -105,8 +105,8 @@ class Clearance:
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start; pairs that are too close there may separate.
         """
-        violation: Violation | None = None
-        warning: Violation | None = None
+        #: By whether they refuse.
+        found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
         initials = [_InitialViolations(checker, start) for checker in self._checkers]
@@ -118,15 +118,17 @@ class Clearance:
                     margin = float(distances[row, column])
                     description = checker.description(int(column), float(lower[row, column]))
                 refused = initial.refused(lower, distances)
-                found = _first(checker, refused, distances, q[begin:], begin)
-                if checker.refuses:
-                    violation = _earlier(violation, found)
-                else:
-                    warning = _earlier(warning, found)
-            if violation is not None:
+                other = _first(checker, refused, distances, q[begin:], begin)
+                one = found.get(checker.refuses, other)
+                if one is not None and other is not None:
+                    found[checker.refuses] = min(one, other, key=lambda each: each.row)
+            if True in found:
                 break
         return ClearanceResult(
-            violation=violation, warning=warning, margin=margin, description=description
+            violation=found.get(True),
+            warning=found.get(False),
+            margin=margin,
+            description=description,
         )
 
 
@@ -383,9 +385,3 @@ def _first(
     row = int(rows[0])
     column = int(np.argmin(np.where(refused[row], distances[row] - checker.bounds, inf)))
     return checker.violation(begin + row, column, float(distances[row, column]), q[row : row + 1])
-
-
-def _earlier(one: Violation | None, other: Violation | None) -> Violation | None:
-    if one is None or other is None:
-        return one or other
-    return other if other.row < one.row else one

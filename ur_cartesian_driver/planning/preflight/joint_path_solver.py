@@ -117,19 +117,13 @@ def sample_joint_move(
     return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
 
 
-def solve_joint_path(
-    kinematics: TcpKinematics,
-    pieces: CurvePieces,
-    q_start: Joints,
-    samples: PoseSamples | None = None,
-) -> JointPath:
+def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Joints) -> JointPath:
     """
     Return the samples on consecutive Cartesian pieces with their joint positions.
 
     :param q_start: the configuration at the start of the first piece [rad].
-    :param samples: those on the pieces; None = evenly along each of them.
     """
-    samples = sample_poses(pieces) if samples is None else samples
+    samples = sample_poses(pieces)
     found: list[_Samples] = []
 
     def joint_path(refusal: GoalRefused | None = None, segment: int = -1) -> JointPath:

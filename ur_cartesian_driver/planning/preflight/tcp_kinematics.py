@@ -176,6 +176,18 @@ class TcpKinematics:
         ]
         return ' and '.join(flipped)
 
+    def compare_posture(
+        self, T_base_tcp: Pose, posture: Posture, q: Joints, where: str, tf_prefix: str
+    ) -> tuple[Joints, str]:
+        """
+        Return the solution that a posture selects, and a clause on how ``q`` misses it or ''.
+
+        Raises as :meth:`nearest`.
+        """
+        named = named_joints(posture, tf_prefix)
+        chosen = self.solve_posture(T_base_tcp, named, q, where)
+        return chosen, describe_miss(q, chosen, named)
+
     def explain_missed_posture(
         self, T_base_tcp: Pose, posture: Posture, q: Joints, index: int, tf_prefix: str
     ) -> str:
@@ -184,11 +196,8 @@ class TcpKinematics:
 
         :param q: where the path arrives; raises as :meth:`nearest`.
         """
-        named = named_joints(posture, tf_prefix)
-        if not named:
-            return ''
-        chosen = self.solve_posture(T_base_tcp, named, q, point_field(index, 'pose'))
-        clause = describe_miss(q, chosen, named)
+        where = point_field(index, 'pose')
+        chosen, clause = self.compare_posture(T_base_tcp, posture, q, where, tf_prefix)
         flips = self.describe_flips(q, chosen) if clause else ''
         return f'{clause}, which needs {flips}' if flips else clause
 

@@ -193,7 +193,8 @@ def _is_leaving(
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
-    if pieces.begins_at_rest[number]:
+    rests = pieces.path.rests_at_points and not pieces.is_blend[number]
+    if rests and pieces.begin[number] == 0.0:
         on_it = rows[joint_path.piece[rows] == number]
         t, (length, turn) = joint_path.t[on_it], pieces.extent(number)
         excused[: len(on_it)] = is_leaving_rows(measures[on_it], t * length, t * turn, rests=True)

@@ -41,7 +41,14 @@ def adapt_to_dialect(
     if dialect.supports_q_near or isinstance(primitive, MoveC | Spline | Stop):
         pass
     elif isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
-        _check_calibration(primitive, point, options)
+        if not options.calibration_known:
+            raise NotAvailable(
+                segment_field(point, 'type'),
+                f'is a joint motion ({type(primitive).__name__}), which wire dialect '
+                f'{dialect.name} takes as joint positions only, but the calibration of this '
+                'robot is unknown',
+                'use LINEAR',
+            )
         primitive = replace(primitive, target=joints, q_near=None)
         reason = f'wire dialect {dialect.name} has no q_near and takes the joint solution'
     else:
@@ -56,17 +63,6 @@ def adapt_to_dialect(
             else 'use a newer program and wire_dialect',
         )
     return primitive, reason
-
-
-def _check_calibration(primitive: Primitive, point: int, options: PlanningOptions) -> None:
-    if not options.calibration_known:
-        raise NotAvailable(
-            segment_field(point, 'type'),
-            f'is a joint motion ({type(primitive).__name__}), which wire dialect '
-            f'{options.dialect.name} takes as joint positions only, but the calibration of this '
-            'robot is unknown',
-            'use LINEAR',
-        )
 
 
 def explain_poses_only(options: PlanningOptions) -> str:

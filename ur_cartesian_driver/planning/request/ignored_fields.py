@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +21,17 @@ _TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
 def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     """Return a remark for each field without effect; the first point has the number ``first``."""
     remarks: list[str] = []
-    points, segments = goal.waypoints, goal.segments
-
-    def add(rows: NDArray[np.bool_] | np.bool_, what: str) -> None:
-        add_remark(remarks, [first + row for row in rows_where(rows)], what)
-
+    points, segments, motions = goal.waypoints, goal.segments, goal.motions
+    add = partial(add_remark, remarks, first)
     has_twist = points.twists.any(axis=1)
     if timed := is_timed(goal):
         add(has_twist, 'twist is ignored: UR motion commands stop or blend at a point')
     else:
+        takes_twist = (motions.velocities == 0.0) & ~np.isin(
+            motions.types, (SegmentType.JOINT, *OPTIMIZED_TYPES)
+        )
         add(
-            has_twist & ~_take_twist(goal),
+            has_twist & ~takes_twist,
             'twist is ignored: the segment has a velocity, or its type takes no tool speed',
         )
     add(
@@ -52,16 +52,10 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     return remarks
 
 
-def _take_twist(goal: GoalTable) -> NDArray[np.bool_]:
-    """Tell of each segment whether the twist at its end is its speed."""
-    segments = goal.motions
-    takes: NDArray[np.bool_] = (segments.velocities == 0.0) & ~np.isin(
-        segments.types, (SegmentType.JOINT, *OPTIMIZED_TYPES)
-    )
-    return takes
-
-
-def add_remark(remarks: list[str], points: Sequence[int], what: str) -> None:
-    """Add a remark about points, if there are any."""
+def add_remark(
+    remarks: list[str], first: int, rows: NDArray[np.bool_] | np.bool_, what: str
+) -> None:
+    """Add a remark about points, if there are any; that of row 0 has the number ``first``."""
+    points = [first + row for row in rows_where(rows)]
     if points:
         remarks.append(f'{name_points(points)}: {what}')

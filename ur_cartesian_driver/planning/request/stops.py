@@ -1,7 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What happens at points where the arm stops: it rests, waits for an input, gets another payload.
+What happens at points where the arm stops.
+
+It rests, waits for an input, gets another payload, begins or ends to press.
 
 A goal is planned as if it did not rest, with times that count its motion only; the stops are put
 into the plan afterwards. So they change nothing of the motions before and behind them, and are not
@@ -25,6 +27,7 @@ from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
     ChangePayload,
+    EndPress,
     Primitive,
     Spline,
     Stop,
@@ -39,6 +42,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.presses import press_records
 
 #: Longer rests and time-outs are mistakes [s].
 MAX_DWELL = 600.0
@@ -115,6 +119,9 @@ def _places(goal: GoalTable) -> Iterator[tuple[str, int]]:
         yield f'input_waits[{i}].point_index', wait.waypoint
     for i, change in enumerate(goal.payload_changes):
         yield f'payload_changes[{i}].point_index', change.waypoint
+    for i, press in enumerate(goal.presses):
+        yield f'presses[{i}].first_point', press.first_waypoint
+        yield f'presses[{i}].last_point', press.last_waypoint
 
 
 def refuse_dwells_of_open_goals(
@@ -231,6 +238,8 @@ class Stops:
         self._before: Floats = np.cumsum(dwells) - dwells
         #: By point, in the order in which it happens, with a note for the report.
         self._stops: dict[int, list[tuple[Stop, str]]] = {}
+        for press in goal.presses:
+            self._add(press.last_waypoint, (EndPress(), 'ends to press there'))
         for wait in goal.input_waits:
             self._add(wait.waypoint, _await_input(wait))
         for change in goal.payload_changes:
@@ -239,6 +248,9 @@ class Stops:
         for i in np.flatnonzero(dwells).tolist():
             rest = Wait(duration=float(dwells[i]))
             self._add(i, (rest, f'rests there for {rest.duration:g} s'))
+        for press in goal.presses:
+            for record in press_records(press, goal.T_base_frame):
+                self._add(press.first_waypoint, record)
         #: The goal without them: its times count the motion only.
         self.moving_goal = goal
         if self._stops:
@@ -309,7 +321,7 @@ class Stops:
                 primitives=tuple(primitives),
                 report_lines=LateLines(len(primitives), with_stops),
                 notes={
-                    int(row) - 1 - len(each): ''.join(f'; {note}' for _, note in each)
+                    int(row) - 1 - len(each): ''.join(f'; {note}' for _, note in each if note)
                     for row, (_, each) in zip(own_rows, sorted(self._stops.items()), strict=True)
                 },
             ),

@@ -43,10 +43,8 @@ class JointPolynomials:
 
     #: (n + 1,) [s], whole ticks.
     times: Floats
-    #: (n + 1, 6)
-    q: Floats
-    qd: Floats
-    qdd: Floats
+    #: (n + 1, 6) each
+    joints: MotionRows
     #: (n,) the piece of the tool spline that each is a part of.
     piece: NDArray[np.intp]
     quintic: bool
@@ -107,9 +105,7 @@ class _PieceRefinement:
         distance, angle = self.deviation.max(axis=0).tolist()
         return JointPolynomials(
             times=self.times,
-            q=self.joints.x,
-            qd=self.joints.v,
-            qdd=self.joints.a,
+            joints=self.joints,
             piece=self.piece,
             quintic=self.quintic,
             distance=distance,

@@ -13,7 +13,6 @@ import numpy as np
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.motion.goal_table import Integers
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -47,9 +46,7 @@ def slow_spline_stretches(
     """
     piece, u, times = _places(path)
     joints = JointSpline.through(
-        polynomials.times,
-        MotionRows(polynomials.q, polynomials.qd, polynomials.qdd),
-        quintic=polynomials.quintic,
+        polynomials.times, polynomials.joints, quintic=polynomials.quintic
     )
     tool, _ = tool_rates(kinematics.arm, kinematics.T_flange_tcp, *joints.rows(times))
     velocities = tool[:, :3]
@@ -65,12 +62,12 @@ def slow_spline_stretches(
         is_ramp = (first == 0 or stop == len(speeds)) and piece[first] == piece[stop - 1]
         point, rests = path.first + int(piece[slowest]), bool(speeds[slowest] < _REST)
         reason = f'times and twists at both ends of the segment to point {point} leave it so'
-        cause, counts = SlowCause.TIMES, True
+        cause = SlowCause.TIMES
         if stretch * speeds[slowest] >= wanted[slowest]:
             cause = SlowCause.TOOL_LIMIT if 'tool' in limit else SlowCause.JOINT_LIMIT
             reason = f'of {limit}'
         elif is_ramp:
-            cause, counts = SlowCause.RAMP, False
+            cause = SlowCause.RAMP
             reason = 'the arm starts from rest' if first == 0 else 'the arm comes to rest'
         elif velocities[begin] @ velocities[end] < _REVERSAL * speeds[begin] * speeds[end]:
             cause, reason = SlowCause.REVERSAL, f'the path reverses near point {point}'
@@ -88,7 +85,6 @@ def slow_spline_stretches(
                 cause=cause,
                 reason=reason,
                 point=point,
-                counts=counts,
             )
         )
     return tuple(found)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,24 +28,19 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 _ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class LimitedQuantity:
-    """A quantity along a spline, and its limit."""
-
-    what: str
-    #: (m,) its values, the limit, and 1 for speeds, 2 for accelerations.
-    values: Floats
-    limit: float
-    power: int
-    unit: str
-    name: str
+#: A quantity along a spline: what, its values (m,), limit, power (1 for speeds, 2 for
+#: accelerations), unit and name of the limit.
+_Quantity: TypeAlias = tuple[str, Floats, float, int, str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitExcess:
     """The quantity that exceeds its limit most."""
 
-    quantity: LimitedQuantity
+    what: str
+    limit: float
+    unit: str
+    name: str
     #: Times multiplied by this keep the limit.
     factor: float
     #: The segment, the fraction of its time, and the value there.
@@ -52,17 +48,21 @@ class LimitExcess:
     fraction: float
     needed: float
 
+    @property
+    def limit_text(self) -> str:
+        """The limit with its value."""
+        return f'{self.name} = {self.limit:.3f} {self.unit}'
+
     def refusal(self, *, may_slow: bool = True) -> TooFast:
         """
         Return the refusal of the goal.
 
         :param may_slow: whether the driver could give it more time.
         """
-        of = self.quantity
         return TooFast(
             point_field(self.point, 'time_from_start'),
-            f'gives too little time: at {100.0 * self.fraction:.0f} % of it {of.what} needs '
-            f'{self.needed:.3f} {of.unit}, more than {of.name} = {of.limit:.3f} {of.unit}',
+            f'gives too little time: at {100.0 * self.fraction:.0f} % of it {self.what} needs '
+            f'{self.needed:.3f} {self.unit}, more than {self.limit_text}',
             f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt twists and '
             f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
         )
@@ -73,13 +73,16 @@ def worst_excess(
 ) -> LimitExcess | None:
     """Return the quantity that exceeds its limit most, None if none does."""
     worst: LimitExcess | None = None
-    for quantity in _quantities(kinematics, path, options):
-        row = int(np.argmax(quantity.values))
-        peak = float(quantity.values[row])
-        factor = (peak / quantity.limit) ** (1.0 / quantity.power)
+    for what, values, limit, power, unit, name in _quantities(kinematics, path, options):
+        row = int(np.argmax(values))
+        peak = float(values[row])
+        factor = (peak / limit) ** (1.0 / power)
         if factor > max(1.0 + _ROUNDING, worst.factor if worst else 0.0):
             worst = LimitExcess(
-                quantity=quantity,
+                what=what,
+                limit=limit,
+                unit=unit,
+                name=name,
                 factor=factor,
                 point=int(path.points[row]),
                 fraction=float(path.u[row]),
@@ -90,28 +93,23 @@ def worst_excess(
 
 def _quantities(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
-) -> Iterator[LimitedQuantity]:
+) -> Iterator[_Quantity]:
     begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
     twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
     qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
-    v, a = _norms(twists[:, :3]), _norms(accelerations[:, :3])
-    e = _norms(accelerations[:, 3:])
     if options.max_tool_speed > 0.0:
-        yield LimitedQuantity('the tool', v, options.max_tool_speed, 1, 'm/s', 'max_tool_speed')
-    for values, name, unit in (
-        (a, 'max_linear_acceleration', 'm/s^2'),
-        (e, 'max_angular_acceleration', 'rad/s^2'),
+        speed = np.linalg.norm(twists[:, :3], axis=1)
+        yield 'the tool', speed, options.max_tool_speed, 1, 'm/s', 'max_tool_speed'
+    for part, name, unit in (
+        (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),
+        (slice(3, 6), 'max_angular_acceleration', 'rad/s^2'),
     ):
-        yield LimitedQuantity('the tool', values, getattr(options, name), 2, unit, name)
+        values = np.linalg.norm(accelerations[:, part], axis=1)
+        yield 'the tool', values, getattr(options, name), 2, unit, name
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
     for k, (joint, limit) in enumerate(
         zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
         source = f'the joint speed limit{kinematics.arm.model.speed_source(k)}'
-        yield LimitedQuantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', source)
-        yield LimitedQuantity(joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name)
-
-
-def _norms(vectors: Floats) -> Floats:
-    lengths: Floats = np.linalg.norm(vectors, axis=1)
-    return lengths
+        yield joint, np.abs(qd[:, k]), limit, 1, 'rad/s', source
+        yield joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name

@@ -32,7 +32,6 @@ from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_T
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
     MIN_SAMPLES,
-    PoseSamples,
     STEP_ANGLE,
     STEP_LENGTH,
 )
@@ -119,9 +118,17 @@ def solve_spline_path(
     """
     coarse = _coarse_samples(spline)
     _check_sizes(kinematics, spline, coarse, first)
-    samples = _pose_samples(spline, coarse, first)
-    pieces = _pieces(spline, samples, first)
-    joint_path = solve_joint_path(kinematics, pieces, q_start, samples)
+    count = _sample_count(spline, coarse, first)
+    n = len(count)
+    pieces = CurvePieces(
+        path=ToolSplinePath(spline, count),
+        first=first,
+        number=2 * np.arange(n),
+        begin=np.zeros(n),
+        end=np.ones(n),
+        sample_count=count,
+    )
+    joint_path = solve_joint_path(kinematics, pieces, q_start)
     start = spline.poses(np.zeros(1, dtype=np.intp), np.zeros(1))
     poses = np.concatenate([start, joint_path.poses])
     length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
@@ -222,9 +229,10 @@ def _check_sizes(
             )
 
 
-def _pose_samples(
+def _sample_count(
     spline: ToolSpline, coarse: tuple[NDArray[np.intp], Floats], first: int
-) -> PoseSamples:
+) -> NDArray[np.intp]:
+    """Return the number of samples of each piece."""
     n, h = len(spline.positions), np.diff(spline.times)
     twists, accelerations = spline.rates(*coarse)
 
@@ -249,34 +257,8 @@ def _pose_samples(
             f'check needs {count.sum():.3g} samples, more than {MAX_SAMPLES:,}',
             'check twists and accelerations, or split the goal',
         )
-    count = count.astype(np.intp)
-    piece = np.repeat(np.arange(n), count)
-    number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
-    u = number / count[piece]
-    return PoseSamples(piece, u, spline.poses(piece, u * h[piece]))
-
-
-def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> CurvePieces:
-    """Return the pieces, with lengths measured along chords."""
-    n = len(spline.positions)
-    starts = spline.poses(np.arange(n), np.zeros(n))
-    begins = np.searchsorted(samples.piece, np.arange(n))
-    before = np.concatenate([samples.poses[:1], samples.poses[:-1]])
-    before[begins] = starts
-    distances = np.linalg.norm(samples.poses[:, :3] - before[:, :3], axis=1)
-    turns = angle_rows(before[:, 3:], samples.poses[:, 3:])
-    lengths, angles = (np.add.reduceat(column, begins) for column in (distances, turns))
-    return CurvePieces(
-        path=ToolSplinePath(spline, lengths, angles),
-        first=first,
-        number=np.arange(n),
-        begin=np.zeros(n),
-        end=np.ones(n),
-        sample_count=np.bincount(samples.piece),
-        index=np.arange(first, first + n, dtype=np.int32),
-        is_blend=np.zeros(n, dtype=np.bool_),
-        begins_at_rest=np.zeros(n, dtype=np.bool_),
-    )
+    found: NDArray[np.intp] = count.astype(np.intp)
+    return found
 
 
 def _cumulative(steps: Floats) -> Floats:

@@ -155,26 +155,32 @@ def plan_spline(
         kinematics, path, start.rows(), points.quintic, options.spline_tolerance
     )
     segments = _segments(path, polynomials, goal)
+    q, qd, qdd = (vector6(rows[-1].tolist()) for rows in polynomials.joints)
     end = SplineState(
         time=float(polynomials.times[-1]),
-        q=vector6(polynomials.q[-1].tolist()),
-        qd=vector6(polynomials.qd[-1].tolist()),
-        qdd=vector6(polynomials.qdd[-1].tolist()) if polynomials.quintic else ZERO6,
+        q=q,
+        qd=qd,
+        qdd=qdd if polynomials.quintic else ZERO6,
     )
+    poses = path.poses.copy()
+    keep_hemisphere(poses)
+    kind = 'quintic' if polynomials.quintic else 'cubic'
     stretched = (
         f'all times are stretched by {stretch:.4g}, because of {limit}: '
         f'{path.spline.times[-1]:.3f} s in total'
     )
     return SplinePieces(
         segments=segments,
-        reference=_reference(path),
+        reference=ReferencePath(poses=poses, point=path.points, time=path.times, fraction=path.u),
         end=end,
         stretch=stretch,
         remarks=(
             *point_remarks(goal, first),
             *([stretched] if limit else []),
             *_clearance_remarks(path, end, arm, tool_tips or (T_flange_tcp,), start, options),
-            *_remarks(path, polynomials),
+            f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
+            f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
+            path.tightest_margins.remark,
         ),
         find_slow_stretches=cache(
             lambda: slow_spline_stretches(
@@ -252,20 +258,18 @@ def _fit_to_limits(
     in_parts = start.is_moving or goal.keep_open
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
-    path, of = path.stretch_times(found.factor), found.quantity
+    path = path.stretch_times(found.factor)
     longest = int(np.argmax(np.diff(path.spline.times)))
     time = float(np.diff(path.spline.times)[longest])
     if time > options.max_segment_time:
         raise InvalidGoal(
             point_field(path.first + longest, 'time_from_start'),
-            f'would take {time:.0f} s because of {of.name}, more than max_segment_time = '
+            f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
             f'{options.max_segment_time:.0f} s',
             'move the path away from there',
         )
-    limit = (
-        f'{of.name} = {of.limit:.3f} {of.unit} ({of.what}, on the segment to point {found.point})'
-    )
-    return path, found.factor, limit
+    where = f'{found.what}, on the segment to point {found.point}'
+    return path, found.factor, f'{found.limit_text} ({where})'
 
 
 def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:
@@ -295,11 +299,11 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
         angles=angles,
         durations=durations,
         blend_entries=zeros(n, 5),
-        joints=polynomials.q[1:],
+        joints=polynomials.joints.x[1:],
         primitives=SplineRows(
-            targets=polynomials.q[1:],
-            velocities=polynomials.qd[1:],
-            accelerations=polynomials.qdd[1:],
+            targets=polynomials.joints.x[1:],
+            velocities=polynomials.joints.v[1:],
+            accelerations=polynomials.joints.a[1:],
             durations=durations,
             quintic=np.full(n, polynomials.quintic),
         ),
@@ -343,22 +347,6 @@ def _clearance_remarks(
         points = np.concatenate([points, np.full(len(on), points[-1])])
         u = np.concatenate([u, np.ones(len(on))])
     return clearance_lines(arm, tool_tips, options, q, start.q, points, u)
-
-
-def _reference(path: SplinePath) -> ReferencePath:
-    poses = path.poses.copy()
-    keep_hemisphere(poses)
-    return ReferencePath(poses=poses, point=path.points, time=path.times, fraction=path.u)
-
-
-def _remarks(path: SplinePath, polynomials: JointPolynomials) -> tuple[str, str]:
-    """Return the remarks on the precision and on the tightest margin."""
-    kind = 'quintic' if polynomials.quintic else 'cubic'
-    return (
-        f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
-        f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
-        path.tightest_margins.remark,
-    )
 
 
 def stretch_times(goal: GoalTable, factor: float) -> GoalTable:

@@ -11,11 +11,11 @@ point.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, WaypointRows
+from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import (
     conjugate_rows,
@@ -38,12 +38,12 @@ def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     :param goal: its waypoints are those behind the start.
     :param start: the tool at the start in base, one row.
     """
-    given = _given(goal.waypoints)
-    T_frame_base = goal.T_base_frame.inverse()
-    start = _in_frame(start, T_frame_base)
+    given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
+    poses = np.concatenate([start.poses, given.poses])
+    poses[:, 3:] = normalized_rows(poses[:, 3:])
     points = ToolPoints(
         times=np.concatenate([start.times, given.times]),
-        poses=np.concatenate([start.poses, given.poses]),
+        poses=poses,
         twists=np.concatenate([start.twists, given.twists]),
         accelerations=np.concatenate([start.accelerations, given.accelerations]),
         quintic=bool(np.any(given.accelerations)),
@@ -56,10 +56,7 @@ def point_remarks(goal: GoalTable, first: int) -> list[str]:
     points = goal.waypoints
     inner = points if goal.keep_open else points[:-1]
     lines: list[str] = []
-
-    def add(rows: NDArray[np.bool_] | np.bool_, what: str) -> None:
-        add_remark(lines, [first + row for row in rows_where(rows)], what)
-
+    add = partial(add_remark, lines, first)
     add(
         ~inner.twists.any(axis=1),
         'the arm stops there, because the twist is 0 (NaN lets the driver choose)',
@@ -77,35 +74,19 @@ def point_remarks(goal: GoalTable, first: int) -> list[str]:
     return lines
 
 
-def _given(points: WaypointRows) -> ToolPoints:
-    poses = points.poses.copy()
-    poses[:, 3:] = normalized_rows(poses[:, 3:])
-    return ToolPoints(
-        times=points.times,
-        poses=poses,
-        twists=points.twists,
-        accelerations=points.accelerations,
-        quintic=False,
-    )
-
-
 def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
     """Return the same points in the axes of another frame at rest."""
     R = T_new_old.matrix()[:3, :3]
-
-    def turned(vectors: Floats) -> Floats:
-        return np.concatenate([vectors[:, :3] @ R.T, vectors[:, 3:] @ R.T], axis=1)
-
+    twists, accelerations = (
+        np.concatenate([rates[:, :3] @ R.T, rates[:, 3:] @ R.T], axis=1)
+        for rates in (points.twists, points.accelerations)
+    )
     positions = points.poses[:, :3] @ R.T + T_new_old.position
     orientations = normalized_rows(
         multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:])
     )
-    return replace(
-        points,
-        twists=turned(points.twists),
-        accelerations=turned(points.accelerations),
-        poses=np.concatenate([positions, orientations], axis=1),
-    )
+    poses = np.concatenate([positions, orientations], axis=1)
+    return replace(points, twists=twists, accelerations=accelerations, poses=poses)
 
 
 def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:

@@ -46,13 +46,20 @@ of the filter [s].
 
 These are of our own program, too, and motions that go nowhere. WAIT lets the arm rest: word 18 is
 the time from the end of the motion before until the next one may begin. AWAIT_INPUT rests until an
-input has a level, and CHANGE_PAYLOAD sets a payload. The other words are zeros:
+input has a level, and CHANGE_PAYLOAD sets a payload. PRESS_LAW, BEGIN_PRESS and END_PRESS are the
+controller's force mode. The other words are zeros:
 
 =======  =====================================================================  =====
 12, 13   AWAIT_INPUT: kind of input, pin                                        S
 14, 15   AWAIT_INPUT: threshold [A], [V] or 0 to 1; 1 = wait until below it     S
 16       AWAIT_INPUT: 1 = go on after the time-out, 0 = end                     S
 0 - 3    CHANGE_PAYLOAD: mass [kg], centre of gravity x y z in the flange [m]   S
+0 - 5    PRESS_LAW: wrench [N, Nm]; BEGIN_PRESS: task frame in the base         S
+         [m, rad]
+6 - 11   PRESS_LAW: limits [m/s, rad/s; m, rad]; BEGIN_PRESS: 1 = compliant     S
+12, 13   PRESS_LAW: damping, gain scaling                                       S
+14, 15   PRESS_LAW: 1 = zero the force sensor; what contact ends                S
+12       BEGIN_PRESS: 1 = the frame is that of the tool                         S
 18       WAIT: the time; AWAIT_INPUT: longest wait [s]                          T
 20       motion type                                                            1
 =======  =====================================================================  =====
@@ -68,14 +75,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ArcMode, InputKind, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES, SplineRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
+    BeginPress,
     ChangePayload,
+    EndPress,
     Instruction,
     MoveC,
     MoveJ,
@@ -84,6 +93,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveJ,
     OptimoveL,
     OutputRecord,
+    PressLaw,
     Primitive,
     SpeedLaw,
     Spline,
@@ -138,6 +148,12 @@ class MotionType(IntEnum):
     AWAIT_INPUT = 202
     #: sets the payload; our own robot program only
     CHANGE_PAYLOAD = 203
+    #: how force mode presses when it begins next; this and the rest: our own robot program only
+    PRESS_LAW = 204
+    #: force mode begins
+    BEGIN_PRESS = 205
+    #: force mode ends
+    END_PRESS = 206
 
 
 class SplineKind(IntEnum):
@@ -172,6 +188,11 @@ class PointField(IntEnum):
     INPUT_THRESHOLD = 14
     INPUT_BELOW = 15
     INPUT_GOES_ON = 16
+    PRESS_DAMPING = 12
+    PRESS_GAIN_SCALING = 13
+    PRESS_ZEROES_SENSOR = 14
+    PRESS_CONTACT = 15
+    PRESS_FOLLOWS_TOOL = 12
     HAS_TRIGGER_POSE = 16
     STARTS_BEYOND = 17
     DURATION = 18
@@ -232,6 +253,9 @@ _STOPS: dict[type[Stop], MotionType] = {
     Wait: MotionType.WAIT,
     AwaitInput: MotionType.AWAIT_INPUT,
     ChangePayload: MotionType.CHANGE_PAYLOAD,
+    PressLaw: MotionType.PRESS_LAW,
+    BeginPress: MotionType.BEGIN_PRESS,
+    EndPress: MotionType.END_PRESS,
 }
 #: Records whose word 18 is no duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
@@ -381,7 +405,16 @@ def _stop_fields(stop: Stop) -> PointFields:
             return (*ZERO6, *ZERO6, *wanted, stop.timeout, 0, kind)
         case ChangePayload():
             return (stop.mass, *stop.center_of_gravity, *(0.0,) * 14, 0, 0, kind)
-    return (*(0.0,) * 18, stop.duration, 0, kind)
+        case PressLaw():
+            law = (stop.damping, stop.gain_scaling, stop.zero_sensor, stop.contact, 0, 0)
+            return (*stop.wrench, *stop.limits, *law, 0, 0, kind)
+        case BeginPress():
+            frame = stop.T_base_task.rotation_vector()
+            return (*frame, *stop.compliant, stop.follows_tool, *(0.0,) * 5, 0, 0, kind)
+        case EndPress():
+            return (*(0.0,) * 20, kind)
+        case Wait():
+            return (*(0.0,) * 18, stop.duration, 0, kind)
 
 
 def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
@@ -396,7 +429,22 @@ def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
         )
     if kind is MotionType.CHANGE_PAYLOAD:
         return ChangePayload(mass=fields[0], center_of_gravity=(fields[1], fields[2], fields[3]))
-    return Wait(duration=fields[18])
+    if kind is MotionType.PRESS_LAW:
+        return PressLaw(
+            wrench=vector6(fields[:6]),
+            limits=vector6(fields[6:12]),
+            damping=fields[12],
+            gain_scaling=fields[13],
+            zero_sensor=bool(fields[14]),
+            contact=_enum_member(ContactEnd, fields[15], 'end by contact (word 15)'),
+        )
+    if kind is MotionType.BEGIN_PRESS:
+        return BeginPress(
+            T_base_task=Pose.from_rotation_vector(vector6(fields[:6])),
+            compliant=vector6(fields[6:12]),
+            follows_tool=bool(fields[12]),
+        )
+    return EndPress() if kind is MotionType.END_PRESS else Wait(duration=fields[18])
 
 
 def _spline_fields(piece: Spline) -> PointFields:

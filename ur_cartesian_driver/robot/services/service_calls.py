@@ -28,6 +28,8 @@ PINS = {
     OutputKind.STANDARD_ANALOG: 2,
 }
 
+#: How long a script may take, by default and at most [s].
+SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
 #: Longest text for the dashboard: as lines of any alphabet the server takes it.
 MAX_TEXT_LENGTH = 1000
 #: No tool is longer [m], and no arm carries more [kg].
@@ -189,6 +191,29 @@ class HandBackCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RunScriptCall:
+    """
+    Run a script: a secondary program, or in headless mode a primary one.
+
+    :param timeout: how long a primary program may take [s].
+    """
+
+    script: str
+    timeout: float = SCRIPT_TIMEOUT
+
+    def __post_init__(self) -> None:
+        """Check that there is a script, and the time."""
+        _declare_types(self)
+        if not self.script.strip():
+            raise LocalProtocolError('The script is empty; give a def or sec of URScript.')
+        if not 0.0 < self.timeout <= MAX_SCRIPT_TIMEOUT:  # NaN neither
+            raise LocalProtocolError(
+                f'timeout is {self.timeout:g} s, it has to be more than 0 and at most '
+                f'{MAX_SCRIPT_TIMEOUT:g} s.'
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverCall:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
 
@@ -234,5 +259,6 @@ ServiceCall: TypeAlias = (
     | SetSpeedSliderCall
     | SendProgramCall
     | HandBackCall
+    | RunScriptCall
     | RecoverCall
 )

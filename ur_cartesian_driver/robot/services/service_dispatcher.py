@@ -5,7 +5,7 @@ Carries out the service calls of a driver's owner.
 
 A call uses the dashboard, a single command to the robot program, or RTDE inputs. It succeeds when
 the robot reports the effect, and ends within :data:`CALL_TIMEOUT` in any case, a recovery within
-:data:`RECOVERY_TIMEOUT`.
+:data:`RECOVERY_TIMEOUT`, a script within its own time more.
 """
 
 from __future__ import annotations
@@ -28,12 +28,14 @@ from ur_cartesian_driver.robot.services.dashboard_service import (
 )
 from ur_cartesian_driver.robot.services.polling import wait_for_state
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
+from ur_cartesian_driver.robot.services.script_runner import ScriptRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
     failed,
     HandBackCall,
     RecoverCall,
+    RunScriptCall,
     SendProgramCall,
     ServiceAnswer,
     ServiceCall,
@@ -93,6 +95,7 @@ class ServiceDispatcher:
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
+        self._scripts = ScriptRunner(settings, link, self._send_program)
         self._pending_settings = 0
 
     @property
@@ -103,6 +106,8 @@ class ServiceDispatcher:
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
         """Carry out a call; an error is an answer too."""
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
+        if isinstance(call, RunScriptCall):
+            bound += call.timeout
         try:
             async with asyncio.timeout(bound):
                 return self._refusal(call) or await self._execute(call)
@@ -134,6 +139,8 @@ class ServiceDispatcher:
                 return await self._send_program()
             case HandBackCall():
                 return await self._hand_back()
+            case RunScriptCall():
+                return await self._scripts.run(call)
             case RecoverCall(unlock_protective_stop=unlock):
                 return await self._recovery.run(
                     may_unlock=unlock or self._settings.unlock_protective_stops

@@ -26,6 +26,8 @@ from ur_cartesian_driver.robot.services.service_calls import (
     DashboardLineCall,
     HandBackCall,
     RecoverCall,
+    RunScriptCall,
+    SCRIPT_TIMEOUT,
     SendProgramCall,
     ServiceAnswer,
     ServiceCall,
@@ -42,6 +44,7 @@ from ur_cartesian_driver.srv import (
     Popup,
     RawRequest,
     Recover,
+    RunScript,
     SetIO,
     SetSpeedSliderFraction,
     SetTCP,
@@ -105,6 +108,12 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'recover': (
         Recover,
         lambda request: RecoverCall(unlock_protective_stop=request.unlock_protective_stop),
+    ),
+    'run_script': (
+        RunScript,
+        lambda request: RunScriptCall(
+            script=request.script, timeout=request.timeout or SCRIPT_TIMEOUT
+        ),
     ),
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),

@@ -106,7 +106,7 @@ class KinematicsBuiltins(BuiltinGroup):
 
     def get_target_tcp_pose(self) -> ScriptPose:
         """Return the target pose of the TCP."""
-        return script_pose(self._controller.motion.T_base_tcp)
+        return script_pose(self._controller.target.T_base_tcp)
 
     def get_target_waypoint(self) -> ScriptPose:
         """Return the waypoint of the running move; without one, the target pose of the TCP."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,
@@ -19,7 +19,9 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 )
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose_of
+from ur_cartesian_driver.sim.controller import MAX_HISTORY
 from ur_cartesian_driver.sim.motion import MotionGenerator, Move
+from ur_cartesian_driver.sim.motion.contact_motion import ForceMode
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
@@ -191,7 +193,7 @@ class MotionBuiltins(BuiltinGroup):
 
 
 class ModeBuiltins(BuiltinGroup):
-    """Freedrive, force mode and tool contact: states only, no forces."""
+    """Freedrive, a state only; force mode and tool contact."""
 
     def freedrive_mode(self, freeAxes: Value = None, feature: Value = None) -> None:
         """Let the arm be moved by hand."""
@@ -216,34 +218,33 @@ class ModeBuiltins(BuiltinGroup):
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value
     ) -> None:
-        """Enter force mode, which has no effect on an arm that touches nothing."""
-        pose(task_frame, 'task_frame')
-        for value, name in (
-            (selection_vector, 'selection_vector'),
-            (wrench, 'wrench'),
-            (limits, 'limits'),
-        ):
-            six(value, name)
+        """Enter force mode, or change it; all types are taken for 2, a frame that stays."""
+        frame = pose(task_frame, 'task_frame')
+        compliant = tuple(flag != 0.0 for flag in six(selection_vector, 'selection_vector'))
         one_of(type, 'type', (1, 2, 3))
-        self._controller.force_mode = True
+        self._controller.contact.force_mode = ForceMode(
+            q_base_task=frame.quaternion,
+            compliant=compliant,
+            wrench=six(wrench, 'wrench'),
+            limits=six(limits, 'limits'),
+        )
 
     def end_force_mode(self) -> None:
         """Leave force mode."""
-        self._controller.force_mode = False
+        self._controller.contact.force_mode = None
 
     def force_mode_set_damping(self, damping: Value) -> None:
-        """Accept 0..1."""
+        """Accept 0..1; the law here has no damping."""
         within(damping, 'damping', 0, 1)
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
-        """Accept 0..2."""
-        within(scaling, 'scaling', 0, 2)
+        """Scale how fast compliant axes give way, 0..2."""
+        self._controller.contact.gain_scaling = within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
-        """Return 0, as the arm touches nothing, unless a test sets the steps back to a contact."""
-        if direction is not None:
-            six(direction, 'direction')
-        return self._controller.contact_steps
+        """Return how many steps ago the tool was not in contact; 0 = it is in none."""
+        wanted = ZERO6 if direction is None else six(direction, 'direction')
+        return min(self._controller.contact.steps_back(wanted[:3]), MAX_HISTORY - 1)
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isinf, pi
+from math import hypot, isinf, pi
 
 from ur_cartesian_driver.sim.builtins.arguments import (
     index,
@@ -115,24 +115,25 @@ def _list_of(
 class RobotBuiltins(BuiltinGroup):
     """What the robot measures [rad, m, s and their derivatives], and its payload."""
 
-    get_target_joint_positions = _list_of(lambda c: c.motion.q)
+    get_target_joint_positions = _list_of(lambda c: c.target.q)
     get_joint_positions = get_target_joint_positions  # the old name
     get_actual_joint_positions = _list_of(lambda c: c.actual.q)
-    get_target_joint_speeds = _list_of(lambda c: c.motion.qd)
+    get_target_joint_speeds = _list_of(lambda c: c.target.qd)
     get_actual_joint_speeds = _list_of(lambda c: c.actual.qd)
     get_target_joint_accelerations = _list_of(lambda c: c.motion.qdd)
-    get_target_tcp_speed = _list_of(lambda c: c.motion.tcp_twist)
+    get_target_tcp_speed = _list_of(lambda c: c.target.tcp_twist)
     get_actual_tcp_speed = _list_of(lambda c: c.actual.tcp_twist)
-    # The arm touches nothing and has no dynamics.
-    get_tcp_force = get_joint_torques = _list_of(lambda _: (0.0,) * 6)
+    get_tcp_force = _list_of(lambda c: c.tcp_wrench)
+    # The arm has no dynamics.
+    get_joint_torques = _list_of(lambda _: (0.0,) * 6)
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
         """Return the actual positions some cycles ago [rad]."""
         return list(self._controller.joint_history(whole(steps, 'steps')))
 
     def force(self) -> float:
-        """Return zero: nothing is touched."""
-        return 0.0
+        """Return the force on the tool [N]."""
+        return hypot(*self._controller.tcp_wrench[:3])
 
     def get_joint_temp(self, j: Value) -> float:
         """Return room temperature [°C]."""
@@ -144,7 +145,8 @@ class RobotBuiltins(BuiltinGroup):
         return 25.0
 
     def zero_ftsensor(self) -> None:
-        """Do nothing: the sensor reads zero."""
+        """Let the sensor read zero as it is."""
+        self._controller.contact.zero()
 
     def ft_rtde_input_enable(
         self,

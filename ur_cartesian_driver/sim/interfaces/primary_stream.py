@@ -116,11 +116,10 @@ def _mode(controller: Controller) -> RobotModeData:
 
 
 def _joints(controller: Controller) -> JointData:
-    motion = controller.motion
     mode = 253 if controller.power.mode is RobotMode.RUNNING else 239
     return JointData(
         q_actual=controller.actual.q,
-        q_target=motion.q,
+        q_target=controller.target.q,
         qd_actual=controller.actual.qd,
         voltage=(48.0,) * 6,
         temperature=(25.0,) * 6,

@@ -3,9 +3,9 @@
 """
 How each RTDE output is computed in the simulated controller.
 
-Actual values equal the targets, unless the arm is imperfect or a fault makes them differ. Links
-weigh nothing; only the payload does. Outputs that would need more (temperatures, encoders) are
-zero or have the plausible values of :data:`FIXED`.
+Actual values equal the targets, unless the arm gives way, is imperfect, or a fault makes them
+differ. Links weigh nothing; only the payload does. Outputs that would need more (temperatures,
+encoders) are zero or have the plausible values of :data:`FIXED`.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _joint_currents(controller: Controller) -> Vector6:
 
 
 def _tcp(controller: Controller) -> Vector6:
-    return controller.motion.T_base_tcp.rotation_vector()
+    return controller.target.T_base_tcp.rotation_vector()
 
 
 def _scaled_momentum(controller: Controller) -> float:
@@ -131,14 +131,14 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
     {
         'timestamp': lambda c: c.timestamp,
         'control_step': lambda c: c.cycles,
-        'target_q': lambda c: c.motion.q,
+        'target_q': lambda c: c.target.q,
         'actual_q': lambda c: c.actual.q,
-        'target_qd': lambda c: c.motion.qd,
+        'target_qd': lambda c: c.target.qd,
         'actual_qd': lambda c: c.actual.qd,
         'target_qdd': lambda c: c.motion.qdd,
         'target_TCP_pose': _tcp,
         'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
-        'target_TCP_speed': lambda c: c.motion.tcp_twist,
+        'target_TCP_speed': lambda c: c.target.tcp_twist,
         'actual_TCP_speed': lambda c: c.actual.tcp_twist,
         'tcp_offset': lambda c: (
             ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()
@@ -169,9 +169,9 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'payload_cog': lambda c: c.payload.cog,
         'payload_inertia': lambda c: c.payload.inertia,
         'target_gravity': lambda c: c.gravity,
-        'actual_TCP_force': lambda c: c.io.external_force if c.external_ft else ZERO6,
-        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else ZERO6,
-        'tcp_force_scalar': lambda c: hypot(*c.io.external_force[:3]) if c.external_ft else 0.0,
+        'actual_TCP_force': lambda c: c.tcp_wrench,
+        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else c.contact.wrench,
+        'tcp_force_scalar': lambda c: hypot(*c.tcp_wrench[:3]),
         'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
         'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),
         'actual_configurable_digital_input_bits': lambda c: pack_bits(

@@ -4,10 +4,10 @@
 The motion that the robot measures.
 
 The simulated arm follows its targets exactly, so actual values equal the targets, unless the arm
-is to be imperfect or a fault makes them deviate. A deviation of the pose shows in pose and joint
-positions, one of the twist in twist and joint speeds; like a faulty measurement, neither shows in
-the other. A deviation of the acceleration shows in acceleration and accelerometer and, integrated,
-in twist and joint speeds, because many clients check it there.
+gives way, is to be imperfect, or a fault makes them deviate. A deviation of the pose shows in pose
+and joint positions, one of the twist in twist and joint speeds; like a faulty measurement, neither
+shows in the other. A deviation of the acceleration shows in acceleration and accelerometer and,
+integrated, in twist and joint speeds, because many clients check it there.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.pose import (
 )
 from ur_cartesian_driver.motion.vectors import add, add6, scale6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
+from ur_cartesian_driver.sim.motion.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
 # A solution farther than this from the target is another branch [rad].
@@ -33,18 +34,21 @@ _BRANCH_JUMP = 0.5
 class ActualMotion:
     """The measured motion of one arm."""
 
-    def __init__(self, motion: MotionGenerator, imperfections: Imperfections | None) -> None:
+    def __init__(
+        self, motion: MotionGenerator, imperfections: Imperfections | None, contact: ContactMotion
+    ) -> None:
         """
         Follow the targets of this motion.
 
         :param imperfections: None = exactly.
+        :param contact: how the arm gives way.
         """
-        self._motion = motion
+        self._motion, self._contact = motion, contact
         self.imperfect_arm = ImperfectArm(motion, imperfections) if imperfections else None
         #: The motion without deviations.
         self._undisturbed: Motion = self.imperfect_arm or motion
-        self._pose: Vector6 | None = None
-        self._twist: Vector6 | None = None
+        self._pose_fault: Vector6 | None = None
+        self._twist_fault: Vector6 | None = None
         #: Deviation of the measured acceleration of the TCP [m/s^2, rad/s^2].
         self.acceleration_error: Vector6 = ZERO6
         #: The integral of the deviation of the acceleration.
@@ -60,21 +64,31 @@ class ActualMotion:
         self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
     ) -> None:
         """Set the deviations of this cycle, in base axes; None = none."""
-        self._pose = pose
+        self._pose_fault = pose
         self.acceleration_error = acceleration or ZERO6
         if acceleration is None:
-            self._drift, self._twist = ZERO6, twist
+            self._drift, self._twist_fault = ZERO6, twist
         else:
             self._drift = add6(self._drift, scale6(acceleration, self._motion.cycle))
-            self._twist = self._drift if twist is None else add6(self._drift, twist)
+            self._twist_fault = self._drift if twist is None else add6(self._drift, twist)
+
+    @property
+    def _pose(self) -> Vector6 | None:
+        """Deviation of the pose."""
+        return _sum(self._pose_fault, self._contact.deviation)
+
+    @property
+    def _twist(self) -> Vector6 | None:
+        """Deviation of the twist."""
+        return _sum(self._twist_fault, self._contact.twist)
 
     @property
     def T_base_tcp(self) -> Pose:
         """Pose of the TCP."""
-        pose = self._undisturbed.T_base_tcp
-        if self._pose is None:
+        pose, deviation = self._undisturbed.T_base_tcp, self._pose
+        if deviation is None:
             return pose
-        x, y, z, rx, ry, rz = self._pose
+        x, y, z, rx, ry, rz = deviation
         return Pose(
             add(pose.position, (x, y, z)),
             multiply(quaternion_from_rotation_vector((rx, ry, rz)), pose.quaternion),
@@ -83,24 +97,26 @@ class ActualMotion:
     @property
     def q(self) -> Vector6:
         """Joint positions at the deviated pose [rad]."""
-        if self._pose is None:
+        deviation = self._pose
+        if deviation is None:
             return self._undisturbed.q
-        if self._solved is None or self._solved[:2] != (self._undisturbed.q, self._pose):
-            self._solved = (self._undisturbed.q, self._pose, self._solve(self._pose))
+        if self._solved is None or self._solved[:2] != (self._undisturbed.q, deviation):
+            self._solved = (self._undisturbed.q, deviation, self._solve(deviation))
         return self._solved[2]
 
     @property
     def tcp_twist(self) -> Vector6:
         """Twist of the tool centre point in base axes [m/s, rad/s]."""
-        twist = self._undisturbed.tcp_twist
-        return twist if self._twist is None else add6(twist, self._twist)
+        twist, deviation = self._undisturbed.tcp_twist, self._twist
+        return twist if deviation is None else add6(twist, deviation)
 
     @property
     def qd(self) -> Vector6:
         """Joint speeds for the deviated twist [rad/s]."""
-        if self._twist is None:
+        deviation = self._twist
+        if deviation is None:
             return self._undisturbed.qd
-        return add6(self._undisturbed.qd, self._joint_change(self._twist))
+        return add6(self._undisturbed.qd, self._joint_change(deviation))
 
     def _solve(self, deviation: Vector6) -> Vector6:
         motion = self._motion
@@ -115,3 +131,9 @@ class ActualMotion:
         """Return the joint change for a small change of the TCP; the smallest one if singular."""
         jacobian = self._motion.arm.jacobian(self._undisturbed.q, self._motion.T_flange_tcp)
         return vector6(float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
+
+
+def _sum(a: Vector6 | None, b: Vector6 | None) -> Vector6 | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return add6(a, b)

@@ -1,0 +1,70 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a press becomes in the robot program, and what a robot cannot do of it."""
+
+from dataclasses import replace
+
+import pytest
+
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import NotAvailable
+from ur_cartesian_driver.motion.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
+from ur_cartesian_driver.motion.goal_table import goal_table
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.planning.request.presses import check_press_support, press_records
+
+PRESS = Press(first_waypoint=0, last_waypoint=1, axes=('rx', 'z'), forces=(0.5, 20.0))
+POINTS = (Waypoint(pose=Pose((0.1, 0.0, 0.0))), Waypoint(pose=Pose((0.2, 0.0, 0.0))))
+
+
+def test_forces_and_limits_come_to_their_axes():
+    (law, _), (begin, note) = press_records(
+        replace(PRESS, frame=PressFrame.GOAL, speed_limits=(0.3, 0.02), max_deviation=0.001),
+        Pose((0.0, 0.0, 0.5)),
+    )
+    assert law.wrench == (0.0, 0.0, 20.0, 0.5, 0.0, 0.0)
+    assert law.limits == (0.001, 0.001, 0.02, 0.3, 0.05, 0.05)
+    assert begin.compliant == (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+    assert begin.T_base_task == Pose((0.0, 0.0, 0.5))
+    assert not begin.follows_tool
+    assert note == (
+        'presses with 0.5 Nm about x and 20 N along z of the goal frame from there to point 1'
+    )
+
+
+def test_contact_is_named_in_the_report():
+    press = replace(PRESS, axes=(), forces=(), contact=ContactEnd.ENDS)
+    *_, (begin, note) = press_records(press, IDENTITY)
+    assert not any(begin.compliant)
+    assert note == 'goes from there to point 1, or until the tool touches'
+
+
+@pytest.mark.parametrize(
+    ('press', 'model', 'T_tcp_controlled', 'sentence'),
+    [
+        (
+            replace(PRESS, zero_sensor=True),
+            'ur5',
+            IDENTITY,
+            'presses[0].zero_sensor is set, but a ur5 has no force sensor and no gain of force',
+        ),
+        (
+            replace(PRESS, gain_scaling=0.5),
+            'ur10',
+            IDENTITY,
+            'presses[0].gain_scaling is set, but',
+        ),
+        (
+            PRESS,
+            'ur5e',
+            Pose((0.0, 0.0, 0.1)),
+            "presses[0].frame is TOOL, but the controlled frame is not the robot's TCP",
+        ),
+    ],
+)
+def test_what_a_robot_cannot_do_is_refused(press, model, T_tcp_controlled, sentence):
+    goal = goal_table(Goal(waypoints=POINTS, presses=(press,)))
+    with pytest.raises(NotAvailable) as refusal:
+        check_press_support(goal, robot_model(model), T_tcp_controlled)
+    assert str(refusal.value).startswith(sentence)
+    check_press_support(replace(goal, presses=(PRESS,)), robot_model(model), IDENTITY)

@@ -1,0 +1,134 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the checks of a motion leave out while the tool presses.
+
+Along compliant axes the arm gives way to what it touches, so a deviation there says nothing; how
+far it may be is a bound of its own. Whether a controller adds what has given way to its target is
+not published, so target and actual pose are treated alike. After a press the arm goes straight to
+the next point from where it is; until there, the same axes are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    Quaternion,
+    quaternion_from_rotation_vector,
+    rotate,
+    rotation_vector_from_quaternion,
+)
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import add, subtract, Vector3, vector3, Vector6
+
+#: The tracker may be so much before the time of a point at which the arm stands [s].
+SAME_TIME = 0.01
+_AXES = ('x', 'y', 'z')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressWindow:
+    """When on its path the tool gives way, and how."""
+
+    #: Planned times at which it begins and ends to press, and is back on its path [s].
+    begin: float
+    end: float
+    release: float
+    #: 1.0 for each compliant axis.
+    compliant: Vector6
+    #: Axes in the base; None = those of the tool.
+    q_base_task: Quaternion | None
+    #: How far it may give way [m], [rad].
+    max_yields: tuple[float, float]
+
+    def contains(self, time: float) -> bool:
+        """Tell whether the tool may be off its path at a planned time [s]."""
+        return self.begin - SAME_TIME <= time < self.release
+
+    def excess(self, planned: Pose, state: RobotState, time: float) -> str | None:
+        """Return that the tool has given way too far, as a clause, or None."""
+        if time > self.end + SAME_TIME:
+            return None
+        errors = self._errors(planned, state.actual_tcp_pose)
+        for k, (bound, unit) in enumerate(zip(self.max_yields, ('m', 'rad'), strict=True)):
+            for axis, error, free in zip(
+                _AXES, errors[k], self.compliant[3 * k : 3 * k + 3], strict=True
+            ):
+                if free and not abs(error) <= bound:
+                    return (
+                        f'the tool gave way by {abs(error):.4f} {unit} '
+                        f'{"about" if k else "along"} {axis} of its press, '
+                        f'{"max_yield_angle" if k else "max_yield"} is {bound:.4f} {unit}'
+                    )
+        return None
+
+    def without_yield(self, planned: Pose, pose: Pose, share: float = 0.0) -> Pose:
+        """
+        Return a pose as it would be if the tool had not given way.
+
+        :param share: the part of what it has given way that stays.
+        """
+        q_base_task = self._axes(planned)
+        shift, turn = self._errors(planned, pose)
+        position = add(planned.position, rotate(q_base_task, self._kept(shift, 0, share)))
+        if not any(self.compliant[3:]):
+            return Pose(position, pose.quaternion)
+        turned = quaternion_from_rotation_vector(rotate(q_base_task, self._kept(turn, 3, share)))
+        return Pose(position, multiply(turned, planned.quaternion))
+
+    def compliant_share(self, planned: Pose, direction: Vector3) -> float:
+        """
+        Return how much of a deviation along compliant axes is progress, 0 to 1.
+
+        Where the path leads along them it cannot be told from giving way, and all of it counts.
+
+        :param direction: of the path in the base, a unit vector, or zeros where it only turns.
+        """
+        x, y, z = rotate(conjugate(self._axes(planned)), direction)
+        a, b, c = self.compliant[:3]
+        along = a * x * x + b * y * y + c * z * z
+        return along * along
+
+    def stiff_state(self, planned: Pose, state: RobotState) -> RobotState:
+        """Return a packet whose actual motion leaves out that along compliant axes."""
+        q_base_task = self._axes(planned)
+        target, actual = state.target_tcp_acceleration, state.actual_tcp_acceleration
+        return replace(
+            state,
+            actual_tcp_pose=self.without_yield(planned, state.actual_tcp_pose),
+            actual_tcp_twist=self._stiff_rates(
+                q_base_task, state.target_tcp_twist, state.actual_tcp_twist
+            ),
+            actual_tcp_acceleration=None
+            if target is None or actual is None
+            else self._stiff_rates(q_base_task, target, actual),
+        )
+
+    def _axes(self, planned: Pose) -> Quaternion:
+        return planned.quaternion if self.q_base_task is None else self.q_base_task
+
+    def _errors(self, planned: Pose, pose: Pose) -> tuple[Vector3, Vector3]:
+        """Return how far a pose is from the planned one, along and about the axes."""
+        to_task = conjugate(self._axes(planned))
+        turn = multiply(pose.quaternion, conjugate(planned.quaternion))
+        return (
+            rotate(to_task, subtract(pose.position, planned.position)),
+            rotate(to_task, rotation_vector_from_quaternion(turn)),
+        )
+
+    def _kept(self, vector: Vector3, first: int, share: float = 0.0) -> Vector3:
+        x, y, z = vector
+        a, b, c = (1.0 - free * (1.0 - share) for free in self.compliant[first : first + 3])
+        return (a * x, b * y, c * z)
+
+    def _stiff_rates(self, q_base_task: Quaternion, target: Vector6, actual: Vector6) -> Vector6:
+        to_task, halves = conjugate(q_base_task), []
+        for first in (0, 3):
+            wanted, found = (vector3(rates[first : first + 3]) for rates in (target, actual))
+            error = rotate(to_task, subtract(found, wanted))
+            halves.append(add(wanted, rotate(q_base_task, self._kept(error, first))))
+        return (*halves[0], *halves[1])

@@ -1,0 +1,203 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Choose the primitives of segments: one for each row.
+
+Nearly all are their row of numbers. Arcs, moves to a posture, and what an older wire dialect says
+otherwise are objects beside the rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidPosture
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal_table import rows_where
+from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.primitive import (
+    Joints,
+    MoveC,
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+    Primitive,
+    Spline,
+    Stop,
+    Target,
+)
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
+from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES
+from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
+from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
+    full_posture,
+    max_joint_change,
+    named_joints,
+)
+from ur_cartesian_driver.planning.request.dialect_adaptation import (
+    adapt_to_dialect,
+    explain_poses_only,
+)
+from ur_cartesian_driver.planning.request.goal_fields import (
+    point_field,
+    segment_field,
+    type_table,
+)
+
+_CLASSES = {
+    SegmentType.JOINT: MoveJ,
+    SegmentType.PROCESS: MoveP,
+    SegmentType.OPTIMIZED_JOINT: OptimoveJ,
+    SegmentType.OPTIMIZED_LINEAR: OptimoveL,
+}
+#: The kind of the primitive's row, by type; that of an arc has no meaning.
+_MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
+_HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
+
+
+def segment_primitives(
+    paths: JointPathPlanner, geometries: SegmentGeometries, timings: SegmentTimings
+) -> MoveRows:
+    """
+    Return the primitive of each segment.
+
+    :param paths: has planned their joints; its remarks and reasons are added to.
+    :raises NotAvailable: the wire dialect cannot express one.
+    :raises InvalidPosture: the arm passes a via in another configuration.
+    """
+    kinds = geometries.kinds
+    moves = MoveRows(
+        kinds=_MOVE_OF[kinds],
+        targets=paths.targets[geometries.begin :],
+        q_near=geometries.joints,
+        has_q_near=_HAS_Q_NEAR[kinds],
+        velocities=timings.velocities,
+        accelerations=timings.accelerations,
+        durations=timings.wire_times,
+        blend_radii=geometries.path.radius,
+        others={},
+    )
+    return replace(moves, others=_SpecialPrimitives(paths, geometries, moves).by_row())
+
+
+class _SpecialPrimitives:
+    """Makes the primitives that are more than their row of numbers."""
+
+    def __init__(
+        self, paths: JointPathPlanner, geometries: SegmentGeometries, moves: MoveRows
+    ) -> None:
+        self._paths, self._geometries, self._moves = paths, geometries, moves
+        self._options, self._kinematics = paths.options, paths.kinematics
+        self._postures = geometries.waypoints.postures
+
+    def by_row(self) -> Mapping[int, Primitive]:
+        """Return them by row."""
+        geometries = self._geometries
+        special = geometries.kinds == SegmentType.CIRCULAR
+        special |= not self._options.dialect.supports_q_near
+        special[list(self._postures)] = True
+        special[0] |= geometries.waits
+        return {row: self._primitive(row) for row in rows_where(special)}
+
+    def _primitive(self, row: int) -> Primitive:
+        geometries = self._geometries
+        point, kind = geometries.begin + row, geometries.kinds[row]
+        joints = vector6(geometries.joints[row].tolist())
+        primitive: Primitive
+        if geometries.waits and row == 0:  # no move of the robot does: a spline that rests
+            primitive = Spline(
+                target=self._paths.q_start,
+                velocities=ZERO6,
+                duration=float(self._moves.durations[row]),
+            )
+        elif kind == SegmentType.CIRCULAR:
+            primitive = self._arc(row, joints)
+        else:
+            move = self._moves[row]
+            assert not isinstance(move, MoveC | Spline | Stop)
+            primitive = move
+            if kind in JOINT_SPACE_TYPES or row in self._postures:
+                primitive = replace(move, q_near=self._q_near(row, joints))
+        primitive, reason = adapt_to_dialect(primitive, point, joints, self._options)
+        if reason:
+            self._paths.reasons.setdefault(point, []).append(reason)
+        return primitive
+
+    def _q_near(self, row: int, joints: Joints) -> Joints:
+        """Return the chosen solution; a full posture itself where it selects the same one."""
+        posture = self._postures.get(row)
+        wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
+        if wanted:
+            where = point_field(self._geometries.begin + row, 'pose')
+            found = self._kinematics.nearest(self._target(row), wanted, where)
+            if max_joint_change(found, joints) <= SAME_SOLUTION:
+                return wanted
+        return joints
+
+    def _target(self, row: int) -> Pose:
+        return pose_from_row(self._moves.targets[row].tolist())
+
+    def _arc(self, row: int, joints: Joints) -> MoveC:
+        """Return the arc, with joint fields where target or via carry a posture."""
+        point, segments = self._geometries.begin + row, self._geometries.segments
+        segment_via = segments.via(row)
+        assert segment_via is not None
+        T_base_via = self._paths.goal.T_base_frame @ segment_via
+        via: Target = T_base_via
+        target: Target = self._target(row)
+        at_point, at_via = row in self._postures, row in segments.via_postures
+        wanted = [name for name, has in (('the point', at_point), ('the via', at_via)) if has]
+        if wanted and (reason := explain_poses_only(self._options)):
+            self._paths.remarks.append(
+                f'point {point}: sent as poses despite the posture of '
+                f'{" and ".join(wanted)}, because {reason}'
+            )
+        elif wanted:
+            self._paths.reasons.setdefault(point, []).append(
+                f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
+            )
+            target = joints if at_point else target
+            via = self._via_joints(row, T_base_via) if at_via else via
+        moves = self._moves
+        return MoveC(
+            target=target,
+            via=via,
+            velocity=float(moves.velocities[row]),
+            acceleration=float(moves.accelerations[row]),
+            blend_radius=float(moves.blend_radii[row]),
+            mode=ArcMode(int(segments.arc_modes[row])),
+        )
+
+    def _via_joints(self, row: int, via: Pose) -> Joints:
+        """
+        Return the solution of the via's pose that its posture selects.
+
+        :raises InvalidPosture: the arm follows the arc in another configuration.
+        """
+        geometries, samples = self._geometries, self._paths.samples
+        point, arc = geometries.begin + row, geometries.path.curves.others[row]
+        assert isinstance(arc, ArcCurve)
+        location = segment_field(point, 'via')
+        first, last = np.searchsorted(samples.segment, (point, point + 1))
+        nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - arc.u_via)))
+        # The orientation of the via does not shape the arc: continue from the arc to its pose.
+        q = self._kinematics.nearest(via, vector6(samples.q[nearest].tolist()), location)
+        chosen, clause = self._kinematics.compare_posture(
+            via, geometries.segments.via_postures[row], q, location, self._options.tf_prefix
+        )
+        if clause:
+            raise InvalidPosture(
+                f'{segment_field(point, "via_posture")} is not the configuration of the '
+                f'arm on the arc: {clause}; leave it empty, or start the arc in that '
+                'configuration.'
+            )
+        return chosen

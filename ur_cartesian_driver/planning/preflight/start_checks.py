@@ -1,0 +1,81 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of where the robot is when a goal begins."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidPosture, RobotNotReady
+from ur_cartesian_driver.motion.goal import Posture
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.goal_fields import point_field
+
+#: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration shifts
+#: it by some millimetres; another model or another TCP shifts it much more.
+MAX_MISMATCH_POSITION = 0.015
+MAX_MISMATCH_ANGLE = 0.05
+
+
+def check_reported_tcp(state: RobotState, kinematics: TcpKinematics) -> None:
+    """Refuse a robot whose TCP is not where the kinematics puts it."""
+    predicted = kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
+    distance = predicted.distance_to(state.actual_tcp_pose)
+    angle = predicted.angle_to(state.actual_tcp_pose)
+    if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
+        raise RobotNotReady(
+            f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
+            f'where the kinematics of a {kinematics.arm.model.name} puts it; check '
+            'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
+            'field tcp_offset), the TCP has to be the flange.'
+        )
+
+
+def check_approach(state: RobotState, target: Pose, options: PlanningOptions) -> None:
+    """Refuse a first point that is too far away."""
+    distance = state.actual_tcp_pose.distance_to(target)
+    bound = options.max_approach_distance
+    if 0.0 < bound < distance:
+        raise InvalidGoal(
+            point_field(0, 'pose.position'),
+            f'is {distance:.3f} m away from the tool, more '
+            f'than max_approach_distance = {bound:g} m',
+            'move closer first, add points in between, or raise the parameter',
+        )
+
+
+def check_start(
+    state: RobotState,
+    target: Pose,
+    posture: Posture | None,
+    kinematics: TcpKinematics,
+    options: PlanningOptions,
+) -> None:
+    """
+    Refuse a first point at time 0 at which the robot is not.
+
+    :raises InvalidGoal: the robot is elsewhere.
+    :raises InvalidPosture: the arm has another posture.
+    """
+    actual = state.actual_tcp_pose
+    distance, angle = actual.distance_to(target), actual.angle_to(target)
+    if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
+        raise InvalidGoal(
+            point_field(0, 'time_from_start'),
+            f'is 0, but the tool is {distance:.4f} m and '
+            f'{angle:.4f} rad away from the point (allowed are '
+            f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
+            'rad)',
+            'give the first point a time greater than 0',
+        )
+    if posture:
+        where = point_field(0, 'pose')
+        # The robot is within the tolerance of the start, not exactly there.
+        near = kinematics.nearest(target, state.actual_q, where)
+        _, clause = kinematics.compare_posture(target, posture, near, where, options.tf_prefix)
+        if clause:
+            raise InvalidPosture(
+                f'{point_field(0, "posture")} is not the one in which the robot stands: '
+                f'{clause}; give the first point a time greater than 0.'
+            )

@@ -1,0 +1,123 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Scripts of others on the robot: what they do is outside all checks.
+
+The controller never confirms that a script has run. A secondary program counts as run if the robot
+reports no error for a while, a primary one if a program has run and ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    encode_program,
+    PrimaryCommand,
+)
+from ur_cartesian_driver.robot.connection_status import has_ended
+from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.services.polling import wait_for_state
+from ur_cartesian_driver.robot.services.service_calls import (
+    failed,
+    RunScriptCall,
+    ServiceAnswer,
+    succeeded,
+)
+from ur_cartesian_driver.urscript import CompileError, parse
+
+#: How long an error of a secondary program may take to be reported [s].
+REPORT_TIME = 0.3
+#: How long the robot may take to begin a primary program, or to end it when it is stopped [s].
+BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
+#: How long the robot may report that no program runs between ours and the script [s].
+CHANGE_TIME = 0.3
+
+
+class ScriptRunner:
+    """Runs scripts, one at a time."""
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        link: RobotLink,
+        send_program: Callable[[], Awaitable[ServiceAnswer]],
+    ) -> None:
+        """
+        Prepare.
+
+        :param send_program: sends the driver's own program again.
+        """
+        self._settings, self._link, self._send_program = settings, link, send_program
+        self._is_running = False
+
+    async def run(self, call: RunScriptCall) -> ServiceAnswer:
+        """Run a script, and tell what the robot says of it."""
+        if not self._settings.allow_scripts:
+            return failed('The parameter allow_scripts is false: no scripts of others are run.')
+        try:
+            kind = parse(call.script).kind
+        except CompileError as error:
+            reason = error.reason or error.text.rstrip(':').replace('_', ' ')
+            return failed(f'The script was not sent: line {error.line}: {reason}.')
+        if self._link.robot is None:
+            return failed(self._link.status.message)
+        if self._is_running:
+            return failed('Another script runs; wait for its end, then try again.')
+        self._is_running = True
+        try:
+            return await (self._secondary(call) if kind == 'sec' else self._primary(call))
+        finally:
+            self._is_running = False
+
+    async def _secondary(self, call: RunScriptCall) -> ServiceAnswer:
+        begin = self._link.event_log.now
+        if not self._link.send_script(encode_program(call.script), lambda: True):
+            return failed('The script was not sent: the primary interface is not connected.')
+        await asyncio.sleep(REPORT_TIME)
+        if error := self._link.event_log.robot_error(since=begin):
+            return failed(f'The script was sent, and {error}.')
+        return succeeded('The script was sent, and the robot reports no error.')
+
+    async def _primary(self, call: RunScriptCall) -> ServiceAnswer:
+        if not self._settings.headless_mode:
+            return failed(
+                'A primary program (def) would replace the program on the pendant: it needs '
+                'headless_mode. Send a secondary one (sec), or load it on the pendant.'
+            )
+        link, begin = self._link, self._link.event_log.now
+        if refusal := link.upload_refusal():
+            return failed(f'The script was not sent: {refusal}.')
+        if not link.send_script(encode_program(call.script), lambda: not link.upload_refusal()):
+            return failed('The script was not sent: the primary interface is not connected.')
+        has_begun = await wait_for_state(link, self._runs_script, BEGIN_TIMEOUT)
+        in_time = not has_begun or await self._ends_within(call.timeout)
+        if not in_time:
+            link.send_primary(PrimaryCommand.STOP_PROGRAM, lambda: self._runs_script(link.robot))
+            await wait_for_state(link, has_ended, STOP_TIMEOUT)
+        error = link.event_log.robot_error(since=begin)
+        again = await self._send_program() if not link.program.connected else succeeded('')
+        if not in_time:
+            error = f'it took longer than {call.timeout:g} s and was stopped'
+        after = '' if again.ok else f' The robot program does not run again: {again.text}'
+        if error:
+            return failed(f'The script was sent, and {error}.{after}')
+        if after:
+            return failed(f'The script was run.{after}')
+        return succeeded('The script was run, and the robot program runs again.')
+
+    def _runs_script(self, robot: RobotState | None) -> bool:
+        return robot is not None and not (has_ended(robot) or self._link.program.connected)
+
+    async def _ends_within(self, longest: float) -> bool:
+        """Return whether the program ends; none runs for a moment between ours and this one."""
+        end = asyncio.get_running_loop().time() + longest
+        while (left := end - asyncio.get_running_loop().time()) > 0.0:
+            if await wait_for_state(self._link, has_ended, left):
+                await asyncio.sleep(CHANGE_TIME)
+                if not self._runs_script(self._link.robot):
+                    return True
+        return False

@@ -1,0 +1,246 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How an arm gives way: to what its tool touches, and in the force mode of its controller.
+
+Neither law is published; these are ours, and simple. Where an axis is not compliant, the arm is a
+spring between its target and the tool. In force mode the tool moves along each compliant axis at a
+speed in proportion to the force that is missing, up to the limit. The controller adds that to the
+target of the program; the program goes on from there when force mode has ended and the arm stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import NamedTuple
+
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    Quaternion,
+    quaternion_from_rotation_vector,
+    rotate,
+)
+from ur_cartesian_driver.motion.vectors import (
+    add,
+    add6,
+    dot,
+    scale6,
+    subtract6,
+    Vector3,
+    Vector6,
+    vector6,
+    ZERO6,
+)
+from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
+from ur_cartesian_driver.sim.motion.motion_values import MotionFault
+
+#: How stiff an arm is behind its tool [N/m, Nm/rad], and how fast it bends [s]. Assumed.
+ARM_STIFFNESS: Vector6 = (20e3, 20e3, 20e3, 2e3, 2e3, 2e3)
+BENDING_TIME = 0.02
+#: Speed along a compliant axis per missing force [m/s per N, rad/s per Nm]. Assumed.
+COMPLIANCE: Vector6 = (1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1)
+#: More force than this on the tool stops the arm [N]; the force limit of a robot as it comes.
+MAX_FORCE = 150.0
+#: From this force on the controller says that there is contact [N]. Assumed.
+CONTACT_FORCE = 5.0
+_SMALL = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceMode:
+    """The arguments of ``force_mode``."""
+
+    #: Axes of the task frame.
+    q_base_task: Quaternion
+    compliant: tuple[bool, ...]
+    #: What the tool applies along compliant axes [N, Nm].
+    wrench: Vector6
+    #: Speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
+    limits: Vector6
+
+
+class ArmState(NamedTuple):
+    """Where an arm is, and how it moves."""
+
+    q: Vector6
+    qd: Vector6
+    T_base_tcp: Pose
+    tcp_twist: Vector6
+
+
+class ContactMotion:
+    """
+    The deviation of the tool from its target, and the force on it; `step` once per cycle.
+
+    :param bodies: what it can touch.
+    """
+
+    def __init__(self, motion: MotionGenerator, bodies: Sequence[ContactBody]) -> None:
+        """Begin without contact and without force mode."""
+        self._motion, self.bodies = motion, tuple(bodies)
+        #: How much of a bend is done in a cycle.
+        self._share = motion.cycle / (motion.cycle + BENDING_TIME)
+        self.force_mode: ForceMode | None = None
+        #: Scale of the compliance, as a program sets it.
+        self.gain_scaling = 1.0
+        #: What the environment applies to the TCP, in base axes [N, Nm].
+        self.wrench: Vector6 = ZERO6
+        #: Deviation from the target and its rate, in base axes [m, rad]; None = none.
+        self.deviation: Vector6 | None = None
+        self.twist: Vector6 | None = None
+        #: The target with what force mode adds to it: joints [rad], their speeds [rad/s], the TCP
+        #: and its twist; None = that of the program.
+        self.target: ArmState | None = None
+        #: Why the arm has to stop.
+        self.fault: MotionFault | None = None
+        self._zero: Vector6 = ZERO6
+        #: What force mode has added to the path, and how the arm is bent, in base axes.
+        self._yielded: Vector6 = ZERO6
+        self._yield_rate: Vector6 = ZERO6
+        self._bent: Vector6 = ZERO6
+        self._cycles_in_contact = 0
+
+    @property
+    def measured(self) -> Vector6:
+        """The wrench as the sensor shows it, since it was zeroed."""
+        return subtract6(self.wrench, self._zero)
+
+    def zero(self) -> None:
+        """Let the sensor show nothing as it is."""
+        self._zero = self.wrench
+
+    def steps_back(self, direction: Vector3) -> int:
+        """
+        Return how many cycles ago the tool was not in contact; 0 = it is in none.
+
+        :param direction: in which it would move on; zeros = any.
+        """
+        force = self.wrench[:3]
+        if hypot(*force) < CONTACT_FORCE or (any(direction) and dot(direction, force) >= 0.0):
+            return 0
+        return self._cycles_in_contact + 1
+
+    def step(self, *, may_move: bool) -> None:
+        """
+        Do one cycle.
+
+        :param may_move: force mode moves the arm: it is on, and no pause or stop holds it.
+        """
+        self.fault = None
+        mode = self.force_mode
+        if not self.bodies and mode is None and self.deviation is None:
+            return
+        if mode is None and any(self._yielded) and not self._motion.moving:
+            self._take_over()
+        deviation = add6(self._yielded, self._bent)
+        self.wrench = self._contact(deviation)
+        yielded = self._yielded
+        self._cycles_in_contact = self._cycles_in_contact + 1 if any(self.wrench) else 0
+        if mode is None:
+            self._bend(self.wrench)
+        else:
+            self._comply(mode, may_move)
+        moved = add6(self._yielded, self._bent)
+        rate = 1.0 / self._motion.cycle
+        self.twist = scale6(subtract6(moved, deviation), rate)
+        self._yield_rate = scale6(subtract6(self._yielded, yielded), rate)
+        self.target = self._yielding_target(rate) if any(self._yielded) else None
+        at_target = max(map(abs, moved)) < _SMALL and mode is None
+        self.deviation = None if at_target else moved
+        if at_target:
+            self.twist = None
+        if hypot(*self.wrench[:3]) > MAX_FORCE:
+            self.fault = MotionFault(
+                code=157, argument=0, text=f'The force on the tool is above {MAX_FORCE:g} N'
+            )
+
+    def _contact(self, deviation: Vector6) -> Vector6:
+        """Return what the bodies apply to the TCP."""
+        force: Vector3 = (0.0, 0.0, 0.0)
+        if self.bodies:
+            dx, dy, dz, *_ = deviation
+            point = add(self._motion.T_base_tcp.position, (dx, dy, dz))
+            twist = self._motion.tcp_twist
+            velocity = add6(twist, self.twist or ZERO6)[:3]
+            for body in self.bodies:
+                force = add(force, body.force(point, velocity))
+        return (*force, 0.0, 0.0, 0.0)
+
+    def _bend(self, wrench: Vector6, free: Sequence[bool] = (False,) * 6) -> None:
+        """Let the arm bend along all axes of a frame but the free ones; all in that frame."""
+        self._bent = vector6(
+            0.0 if is_free else bent + self._share * (force / stiffness - bent)
+            for is_free, bent, force, stiffness in zip(
+                free, self._bent, wrench, ARM_STIFFNESS, strict=True
+            )
+        )
+
+    def _comply(self, mode: ForceMode, may_move: bool) -> None:
+        to_task, to_base = conjugate(mode.q_base_task), mode.q_base_task
+        yielded, bent = turned(to_task, self._yielded), turned(to_task, self._bent)
+        applied = turned(to_task, self.measured)
+        # What is bent along a compliant axis when force mode begins stays as it is.
+        # Along the others the tool comes back to the path of the program, if the frame turns.
+        kept = 1.0 - self._share
+        yielded = vector6(
+            y + b if free else kept * y
+            for y, b, free in zip(yielded, bent, mode.compliant, strict=True)
+        )
+        if may_move:
+            cycle, gain = self._motion.cycle, self.gain_scaling
+            yielded = vector6(
+                y + cycle * max(-limit, min(limit, gain * rate * (wanted + force))) if free else y
+                for y, free, rate, wanted, force, limit in zip(
+                    yielded,
+                    mode.compliant,
+                    COMPLIANCE,
+                    mode.wrench,
+                    applied,
+                    mode.limits,
+                    strict=True,
+                )
+            )
+        self._bent = bent
+        self._bend(turned(to_task, self.wrench), mode.compliant)
+        for free, off, limit in zip(mode.compliant, self._bent, mode.limits, strict=True):
+            if not free and abs(off) > limit:
+                self.fault = MotionFault(
+                    code=153, argument=0, text='Position deviates from path: force mode limit'
+                )
+        self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
+
+    def _yielding_target(self, rate: float) -> ArmState | None:
+        """Return the target with what the tool has given way; None where the arm cannot be."""
+        motion, before = self._motion, self.target
+        target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
+        pose = Pose(
+            add(target.position, (x, y, z)),
+            multiply(quaternion_from_rotation_vector(turn), target.quaternion),
+        )
+        q_before = motion.q if before is None else before.q
+        q = nearest(motion.arm, pose @ motion.T_flange_tcp.inverse(), q_before)
+        if q is None:
+            return before
+        return ArmState(
+            q=q,
+            qd=scale6(subtract6(q, q_before), rate),
+            T_base_tcp=pose,
+            tcp_twist=add6(motion.tcp_twist, self._yield_rate),
+        )
+
+    def _take_over(self) -> None:
+        """Let the program go on from where force mode has brought the target."""
+        if self.target is not None:
+            self._motion.teleport(self.target.q)
+            self._yielded, self.target = ZERO6, None
+
+
+def turned(q: Quaternion, vector: Vector6) -> Vector6:
+    """Return both halves of a vector turned."""
+    return (*rotate(q, vector[:3]), *rotate(q, vector[3:]))
