@@ -30,6 +30,8 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import DOWN, Frames, mm, Path
+from ur_cartesian_driver.program.render import ProgramSettings
+from ur_cartesian_driver.robot.program import program_sockets
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -117,7 +119,10 @@ class Cell:
 def cell(private_ros_graph):
     every_frame = [frame for name in NAMES for frame in getattr(example(name), 'FRAMES', ())]
     monkeypatch = pytest.MonkeyPatch()
+    # Timeouts of ours that count in simulated time, which passes quickly.
     monkeypatch.setattr(goal_monitor, 'STALL_TIMEOUT', RATE * goal_monitor.STALL_TIMEOUT)
+    patient = partial(ProgramSettings, point_timeout=10.0)
+    monkeypatch.setattr(program_sockets, 'ProgramSettings', patient)
     config = SimulatorConfig(
         rtde_port=0,
         primary_port=0,
@@ -130,7 +135,7 @@ def cell(private_ros_graph):
         'headless_mode': True,
         'robot_loop': 'thread',
         'max_state_age': 0.0,
-        'robot_receive_timeout': 10.0,  # in simulated time, which passes quickly
+        'robot_receive_timeout': 10.0,
         'static_frames': [as_parameter(frame) for frame in every_frame],
     }
     context = Context()
