@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '60'))
+GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '40'))
 MAX_DURATION = inf if GOALS >= 1000 else MAX_RUN_DURATION
 #: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
 MIN_SHARES = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
