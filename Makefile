@@ -15,7 +15,7 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup hooks demo demo-two test lint format bench release-check clean
+.PHONY: help setup hooks demo demo-two test lint format docs bench release-check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -51,6 +51,10 @@ lint: $(stamp)  ## Formatting, ruff, mypy, the rules for imports, spelling
 format: $(stamp)  ## Sort the imports and format all Python
 	$(bin)/ruff check --select I --fix
 	$(bin)/ruff format
+
+docs: $(stamp)  ## Build the documentation site into build/site, and check its links
+	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going doc build/site
+	$(bin)/python scripts/check_site.py build/site
 
 bench: $(stamp)  ## Measure, and print a table
 	$(bin)/python benchmark/run.py

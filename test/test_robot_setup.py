@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The page about real robots has every state and every sentence about a required action.
+The pages about robots and recovery have every state, and every sentence that asks a person to act.
 
-Both directions: the page has all sentences of the tables of connection and recovery, and the
-source contains what the page quotes, as a whole or with values in it.
+Both directions: the pages have all sentences of the tables of connection and recovery, and the
+source contains what the pages quote, as a whole or with values in it.
 """
 
 import ast
@@ -30,9 +30,9 @@ from ur_cartesian_driver.robot.services.recovery_steps import (
 from ur_cartesian_driver.robot.transport import dial, error_reason, TcpConnection, TcpListener
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-PAGE = CHECKOUT / 'doc' / 'robot_setup.md'
+PAGES = [CHECKOUT / 'doc' / name for name in ('robot_setup.md', 'recovery.md')]
 PACKAGE = CHECKOUT / 'ur_cartesian_driver'
-pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+pytestmark = pytest.mark.skipif(not PAGES[0].is_file(), reason='only a checkout has the documents')
 
 #: Where the sentences come from; the simulator says what a robot says itself.
 SOURCES = [
@@ -63,7 +63,7 @@ ROBOTS = [
 
 def table(first_column):
     """Return the rows of all tables of the page whose first column has a title."""
-    text = PAGE.read_text(encoding='utf-8')
+    text = '\n'.join(page.read_text(encoding='utf-8') for page in PAGES)
     found = re.findall(rf'^\| {first_column} \|.*\n\|[ -|]*\n((?:\|.*\n)+)', text, re.MULTILINE)
     assert found
     return [

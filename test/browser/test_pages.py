@@ -20,24 +20,12 @@ from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.path import Path as ArmPath
 
-playwright = pytest.importorskip('playwright.sync_api')
+pytest.importorskip('playwright.sync_api')
 
 EXAMPLES = sorted(Path(__file__).parents[2].glob('config/examples/*.yaml'))
-#: Software renders the page: no GPU in CI.
-ARGUMENTS = ('--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
 #: Right of the text, above the time bar.
 SIZE = {'width': 640, 'height': 360}
 VIEW = {'x': 290, 'y': 0, 'width': 350, 'height': 310}
-
-
-@pytest.fixture(scope='module')
-def browser(request):
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(
-            executable_path=request.config.getoption('browser'), args=ARGUMENTS
-        )
-        yield running
-        running.close()
 
 
 class Tab:

@@ -110,7 +110,7 @@ def test_freecad(tmp_path):
     )
     assert [(c.waypoint, c.value) for c in found.goal.io_commands] == [(0, 1.0), (6, 0.0)]
     assert found.goal.io_commands[0].output is OutputKind.STANDARD_DIGITAL
-    assert 'line 8: G0: X and Y is not known yet' in remarks(found)
+    assert 'line 8: G0: the position in X and Y is not known yet' in remarks(found)
     assert 'line 7: word S: no output is given for it' in remarks(found)
 
 

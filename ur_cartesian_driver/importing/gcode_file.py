@@ -288,7 +288,7 @@ class _Program:
             missing = ' and '.join(
                 n for n, known in zip(_AXES, self._known, strict=True) if not known
             )
-            self._omit(f'G{self._motion}', f'{missing} is not known yet')
+            self._omit(f'G{self._motion}', f'the position in {missing} is not known yet')
             return
         if self._motion in (0, 1):
             if any(name in words for name in 'IJKR'):
