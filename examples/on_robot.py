@@ -4,19 +4,22 @@
 
 import argparse
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 
 
-def run(make: Callable[[Pose], Path], frames: Sequence[StaticFrame] = ()) -> None:
+def run(make: Callable[[Pose], Path], frames: Sequence[StaticFrame] = (), **settings: Any) -> None:
     """Make a path from where the tool of a robot is, print its plan, and carry it out."""
     parser = argparse.ArgumentParser()
     parser.add_argument('--robot-ip', default='127.0.0.1')
     parser.add_argument('--ur-type', default='ur5e')
     parser.add_argument('--plan', action='store_true', help='do not move')
     given = parser.parse_args()
-    config = DriverConfig(robot_ip=given.robot_ip, ur_type=given.ur_type, headless_mode=True)
+    config = DriverConfig(
+        robot_ip=given.robot_ip, ur_type=given.ur_type, headless_mode=True, **settings
+    )
     with Driver(config, frames=Frames(static_frames=frames)) as driver:
         driver.wait_ready(timeout=10.0)
         state = driver.state

@@ -136,6 +136,8 @@ def cell(private_ros_graph):
         'robot_loop': 'thread',
         'max_state_age': 0.0,
         'robot_receive_timeout': 10.0,
+        'allow_scripts': True,
+        'script_prelude': example('pick').PRELUDE,
         'static_frames': [as_parameter(frame) for frame in every_frame],
     }
     context = Context()

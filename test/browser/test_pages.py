@@ -12,6 +12,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from example_goals import PRELUDE_ARGUMENTS
 from matplotlib.image import imread
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def tab(browser):
 @pytest.mark.parametrize('example', EXAMPLES, ids=lambda path: path.stem)
 def test_the_page_of_an_example_plays_without_a_network(example, tab, tmp_path):
     file = tmp_path / 'page.html'
-    assert main(['show', str(example), '-o', str(file)]) == 0
+    assert main(['show', str(example), '-o', str(file), *PRELUDE_ARGUMENTS]) == 0
     assert file.stat().st_size < 4e6
     tab.open(file.as_uri())
     assert 'tightest margin' in tab.page.locator('aside').inner_text()

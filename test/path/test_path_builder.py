@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     Press,
     SafeOutput,
+    ScriptCall,
     SegmentType,
 )
 from ur_cartesian_driver.motion.pose import rotate
@@ -434,6 +435,12 @@ def test_a_dwell_stops_the_arm_and_delays_what_follows():
         (lambda: Path(HERE).dwell(1.0), 'dwell() comes before the first point'),
         (lambda: Path(HERE).by(dy=0.1, blend=0.01).dwell(1.0), 'the arm does not stop'),
         (lambda: Path(HERE).by(dy=0.1).dwell(-1.0), 'time -1, outside 0 to 600 s'),
+        (lambda: Path(HERE).by(dy=0.1).call('f', 1e4), 'arguments[0] is 10000, outside -2147 to'),
+        (lambda: Path(HERE).by(dy=0.1).call('f', timeout=0.0), 'timeout is 0 s; it must be more'),
+        (
+            lambda: Path(HERE).by(dy=0.1).call('f').wait_for(digital_input(3), timeout=2.0),
+            'follows a call(), which comes after it; let the function wait',
+        ),
     ],
 )
 def test_a_dwell_that_cannot_be_is_refused(make, text):
@@ -477,7 +484,8 @@ def test_what_happens_at_points_is_that_of_a_goal():
     pump = analog(1, AnalogDomain.VOLTAGE)
     path = (
         Path(HERE)
-        .by(dz=-0.1).wait_for(digital_input(3), timeout=2.0).payload(1.5, (0.0, 0.0, 0.05))
+        .by(dz=-0.1).wait_for(digital_input(3), timeout=2.0)
+        .call('grip', 1).call('hold', timeout=1.0).payload(1.5, (0.0, 0.0, 0.05))
         .follow_speed(pump, 2.0, filter_time=0.02, lead=0.05)
         .by(dy=0.1).by(dx=0.1).end_follow_speed(pump, lead=0.1)
     )  # fmt: skip
@@ -489,6 +497,10 @@ def test_what_happens_at_points_is_that_of_a_goal():
     )
     assert (wait.waypoint, wait.pin, wait.value, wait.timeout) == (0, 3, 1.0, 2.0)
     assert (payload.waypoint, payload.mass) == (0, 1.5)
+    assert goal.script_calls == (
+        ScriptCall(waypoint=0, function='grip', arguments=(1.0,)),
+        ScriptCall(waypoint=0, function='hold', timeout=1.0),
+    )
     assert (output.first_waypoint, output.last_waypoint, output.pin) == (0, 2, 1)
     assert (output.begin_lead, output.end_lead, output.gain) == (0.05, 0.1, 2.0)
     assert Path.from_goal(goal).goal() == goal

@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.goal import (
     Posture,
     Press,
     ProportionalOutput,
+    ScriptCall,
     Segment,
     SegmentType,
     Waypoint,
@@ -157,10 +158,12 @@ def test_what_happens_at_points_happens_there_and_the_last_of_before_again():
         for k in (0, 1, 3)
     )
     changes = (PayloadChange(waypoint=0, mass=1.0), PayloadChange(waypoint=2, mass=2.0))
-    of = goal(input_waits=waits, payload_changes=changes)
+    calls = tuple(ScriptCall(waypoint=k, function=f'f{k}') for k in (1, 3))
+    of = goal(input_waits=waits, payload_changes=changes, script_calls=calls)
     left = resume(of, at(2, 0.5)).goal
     assert [(each.waypoint, each.pin) for each in left.input_waits] == [(1, 1), (3, 3)]
     assert [(each.waypoint, each.mass) for each in left.payload_changes] == [(1, 1.0), (2, 2.0)]
+    assert [(each.waypoint, each.function) for each in left.script_calls] == [(1, 'f1'), (3, 'f3')]
 
 
 def test_an_amount_follows_the_speed_from_the_place_on():

@@ -32,6 +32,7 @@ from ur_cartesian_driver.motion.goal import (
     Press,
     ProportionalOutput,
     SafeOutput,
+    ScriptCall,
     Segment,
     SegmentType,
     Tolerance,
@@ -42,9 +43,17 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.validate import RULES
+from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
-OPTIONS = PlanningOptions(max_points=10)
+PRELUDE = Prelude(
+    file='gripper.script',
+    functions=(
+        PreludeFunction(name='open'),
+        PreludeFunction(name='close', required=1, allowed=2),
+    ),
+)
+OPTIONS = PlanningOptions(max_points=10, prelude=PRELUDE)
 TYPE = SegmentType
 
 
@@ -689,6 +698,42 @@ REFUSALS = [
         'presses[0].first_point is set, but a goal with keep_open does nothing at points but',
     ),
     (
+        with_fields(PLAIN, script_calls=(ScriptCall(waypoint=1, function='fly'),)),
+        InvalidGoal,
+        "script_calls[0].function is 'fly', but gripper.script has open, close; call one of",
+    ),
+    (
+        with_fields(
+            PLAIN, script_calls=(ScriptCall(waypoint=1, function='close', arguments=(1, 2, 3)),)
+        ),
+        InvalidGoal,
+        'script_calls[0].arguments has 3 entries, but close takes 1 to 2 arguments.',
+    ),
+    (
+        with_fields(
+            PLAIN, script_calls=(ScriptCall(waypoint=1, function='open', arguments=(nan,)),)
+        ),
+        InvalidGoal,
+        'script_calls[0].arguments[0] is nan, outside -2147 to 2147.',
+    ),
+    (
+        with_fields(
+            PLAIN, script_calls=(ScriptCall(waypoint=1, function='open', arguments=(0.0,) * 7),)
+        ),
+        InvalidGoal,
+        'script_calls[0].arguments has 7 entries, more than 6.',
+    ),
+    (
+        with_fields(PLAIN, script_calls=(ScriptCall(waypoint=1, function='open', timeout=601.0),)),
+        InvalidGoal,
+        'script_calls[0].timeout is 601 s; it must be more than 0, and at most 600 s.',
+    ),
+    (
+        with_fields(PLAIN, script_calls=(ScriptCall(waypoint=9, function='open'),)),
+        InvalidGoal,
+        'script_calls[0].point_index is 9, but the points are 0 to 2; name one of these.',
+    ),
+    (
         with_fields(PLAIN, payload_changes=(PayloadChange(waypoint=1, mass=101.0),)),
         InvalidGoal,
         'payload_changes[0].mass is 101 kg, outside 0 to 100 kg',
@@ -714,6 +759,13 @@ REFUSALS = [
         'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go; remove',
     ),
 ]
+
+
+def test_functions_are_called_only_where_the_driver_has_some():
+    goal = with_fields(PLAIN, script_calls=(ScriptCall(waypoint=1, function='open'),))
+    check(goal, OPTIONS)
+    with pytest.raises(NotAvailable, match='set its parameters script_prelude and allow_scripts'):
+        check(goal, replace(OPTIONS, prelude=NO_PRELUDE))
 
 
 @pytest.mark.parametrize(('goal', 'error', 'text'), REFUSALS, ids=[r[2][:60] for r in REFUSALS])

@@ -10,6 +10,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
+from ur_cartesian_driver.program.prelude import Prelude, PreludeFunction
 from ur_cartesian_driver.program.render import FEATURES, has_feature, MARKERS, PREFIX
 from ur_cartesian_driver.protocol.program.point_fields import MotionType, SplineKind
 from ur_cartesian_driver.protocol.program.registers import (
@@ -104,6 +105,17 @@ def test_functions_are_called_only_if_the_controller_has_them(feature, version, 
     name = {'optimove': 'optimovej(', 'target_payload': 'set_target_payload('}[feature]
     assert (name in text(version=version)) == known
     assert feature in FEATURES
+
+
+def test_a_prelude_is_in_the_program_as_it_is():
+    assert 'call_function' not in text()
+    lines = ('outputs = 3', 'def cancel(running):', '  # urcd', '  outputs = running', 'end')
+    prelude = Prelude(lines=lines, functions=(PreludeFunction(name='cancel', allowed=1),))
+    program = render(ProgramSettings(**SETTINGS, prelude=prelude))
+    assert parse(wrap_in_program(program))
+    assert '\n'.join(line for line in lines if '#' not in line) in program
+    assert '  if number == 0:\n    cancel()\n  elif number == 1:\n    cancel(x[0])\n' in program
+    assert program.index(lines[0]) < program.index('# HEADER_END')
 
 
 @pytest.mark.parametrize('allowed', [False, True])

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
     BeginPress,
+    CallFunction,
     ChangePayload,
     EndPress,
     MoveC,
@@ -430,6 +431,7 @@ PRIMITIVES = st.one_of(
     st.builds(
         ChangePayload, mass=POSITIVE, center_of_gravity=st.tuples(FRACTION, FRACTION, FRACTION)
     ),
+    st.builds(CallFunction, number=st.integers(0, 99), arguments=vector(2147.0)),
     st.builds(
         PressLaw,
         wrench=vector(100.0),

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from math import pi
 
+from example_goals import OPTIONS
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.planning import check, plan, PlanningOptions
+from ur_cartesian_driver.planning import check, plan
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
@@ -39,7 +40,7 @@ def goal_of(name):
 
 
 def planned(name):
-    return plan(goal_of(name), STATE, ARM, PlanningOptions())
+    return plan(goal_of(name), STATE, ARM, OPTIONS)
 
 
 def kinds(name):
@@ -63,12 +64,13 @@ def test_there_are_examples():
         'bead',
         'grind',
         'touch',
+        'pick',
     }
 
 
 @pytest.mark.parametrize('name', NAMES)
 def test_an_example_passes_all_checks_with_the_default_parameters(name):
-    check(goal_of(name), PlanningOptions())
+    check(goal_of(name), OPTIONS)
     result = planned(name)
     assert len(result.report) >= len({segment.waypoint for segment in result.segments})
     assert any('slowed' in line for line in result.report) == (name == 'stretch')

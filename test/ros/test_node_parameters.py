@@ -90,6 +90,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
         'optimove_known',
         'acceleration_known',
         'dialect',
+        'prelude',
     }
 
 

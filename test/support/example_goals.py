@@ -8,9 +8,16 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.robot.prelude_file import read_prelude
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+
+#: What the driver of an example needs that calls functions.
+PRELUDE = share_path() / 'config' / 'examples' / 'gripper.script'
+PRELUDE_ARGUMENTS = ('-p', 'allow_scripts:=true', '-p', f'script_prelude:={PRELUDE}')
+OPTIONS = PlanningOptions(prelude=read_prelude(str(PRELUDE)))
 
 
 def example_goal(name: str, state: RobotState) -> Goal:

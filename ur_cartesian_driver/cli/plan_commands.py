@@ -205,6 +205,7 @@ class GoalPlanning:
         options = replace(
             settings.planning,
             dialect=dialect,
+            prelude=settings.driver.prelude,
             allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
         )
         self.goal = goal_from_message(

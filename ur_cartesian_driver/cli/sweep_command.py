@@ -91,6 +91,7 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
         options=replace(
             settings.planning,
             dialect=dialect,
+            prelude=settings.driver.prelude,
             allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
         ),
         frames=settings.frames,

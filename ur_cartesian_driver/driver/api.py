@@ -440,6 +440,7 @@ class Driver(RobotServices, InteractiveMotions):
             self.options,
             calibration_known=status.calibration_known,
             dialect=self.config.dialect,
+            prelude=self.config.prelude,
             # A foreign program may skip the command, and would then move the wrong TCP.
             allow_tcp_change=self.options.allow_tcp_change
             and self.config.dialect.supports_tcp_change,

@@ -34,6 +34,7 @@ from ur_cartesian_driver.motion.goal import (
     PressFrame,
     ProportionalOutput,
     SafeOutput,
+    ScriptCall,
     Segment,
     SegmentType,
     Tolerance,
@@ -121,6 +122,15 @@ def goal_from_fields(message: Message) -> GoalTable:
         on_path_tolerance=_member(OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'),
         stall_timeout=seconds(message.stall_timeout),
         min_speed_fraction=message.min_speed_fraction,
+        script_calls=tuple(
+            ScriptCall(
+                waypoint=call.point_index,
+                function=call.function,
+                arguments=tuple(call.arguments),
+                timeout=call.timeout,
+            )
+            for call in message.script_calls
+        ),
         input_waits=tuple(
             _input_wait(wait, f'input_waits[{i}]') for i, wait in enumerate(message.input_waits)
         ),

@@ -102,6 +102,7 @@ GOAL: Mapping[str, Any] = {
             'go_on': False,
         }
     ],
+    'script_calls': [{'point_index': UINT32, 'function': '', 'arguments': [0.0], 'timeout': 10.0}],
     'payload_changes': [{'point_index': UINT32, 'mass': 0.0, 'center_of_gravity': VECTOR}],
     'proportional_outputs': [
         {

@@ -48,6 +48,15 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
             'goal_time_tolerance': _duration(table.goal_time_tolerance),
             'segments': _segments(table.segments),
             'io_commands': [_io_command(command) for command in table.io_commands],
+            'script_calls': [
+                {
+                    'point_index': call.waypoint,
+                    'function': call.function,
+                    **_given({'arguments': list(call.arguments)}),
+                    'timeout': call.timeout,
+                }
+                for call in table.script_calls
+            ],
             'input_waits': [
                 {
                     'point_index': wait.waypoint,

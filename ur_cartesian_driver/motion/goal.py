@@ -212,6 +212,17 @@ class PayloadChange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ScriptCall:
+    """Call a function of the script prelude at a waypoint, where the arm stops."""
+
+    waypoint: int
+    function: str
+    arguments: tuple[float, ...] = ()
+    #: Longest time until it returns [s].
+    timeout: float = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProportionalOutput:
     """An analog output that follows the speed of the tool between two waypoints."""
 
@@ -318,6 +329,7 @@ class Goal:
     #: The part of the speed asked for below which the goal is refused; 0 = not demanded.
     min_speed_fraction: float = 0.0
     input_waits: tuple[InputWait, ...] = ()
+    script_calls: tuple[ScriptCall, ...] = ()
     payload_changes: tuple[PayloadChange, ...] = ()
     proportional_outputs: tuple[ProportionalOutput, ...] = ()
     presses: tuple[Press, ...] = ()

@@ -10,7 +10,8 @@ type follows from the class and the kinds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
@@ -204,6 +205,24 @@ class ChangePayload:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CallFunction:
+    """
+    The robot program calls a function of its prelude.
+
+    :param number: of the function, as ``program.prelude`` counts.
+    :param arguments: six, the rest of them zeros.
+    :param text: the call as it is written; this and the next are not on the wire, because the
+        driver watches the time.
+    :param timeout: longest time until it returns [s].
+    """
+
+    number: int
+    arguments: Vector6 = ZERO6
+    text: str = field(default='', compare=False)
+    timeout: float = field(default=inf, compare=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PressLaw:
     """
     How the controller's force mode presses when it begins next.
@@ -241,7 +260,9 @@ class EndPress:
 
 
 #: What the robot program does while the arm stands; it counts each as a motion.
-Stop: TypeAlias = Wait | AwaitInput | ChangePayload | PressLaw | BeginPress | EndPress
+Stop: TypeAlias = (
+    Wait | AwaitInput | ChangePayload | CallFunction | PressLaw | BeginPress | EndPress
+)
 Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline | Stop
 #: One record of a trajectory on the wire.
 Instruction: TypeAlias = Primitive | OutputRecord

@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.goal import (
     Press,
     PressFrame,
     ProportionalOutput,
+    ScriptCall,
 )
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.path.outputs import Input, Output
@@ -28,6 +29,7 @@ from ur_cartesian_driver.planning.request.presses import check_press
 from ur_cartesian_driver.planning.request.stops import (
     check_input_wait,
     check_payload,
+    check_script_call,
     MAX_DWELL,
     MAX_OFFSET,
 )
@@ -247,6 +249,21 @@ class PathWithEvents(PathOfMotions):
         segment = replace(point.segment, dwell=length)
         return self._with(_points=(*self._points[:-1], replace(point, segment=segment)))
 
+    def call(self, function: str, *arguments: float, timeout: float = 10.0) -> Self:
+        """
+        Call a function of ``script_prelude`` at the point before; there it has no blend.
+
+        :param function: its name; a driver that does not have it refuses the path.
+        :param timeout: longest time until it returns [s].
+        :raises InvalidGoal: as :meth:`dwell`, or a number cannot be meant.
+        """
+        where, point = self._stop('call')
+        numbers = tuple(float(argument) for argument in arguments)
+        call = ScriptCall(waypoint=0, function=function, arguments=numbers, timeout=float(timeout))
+        check_script_call(where, call)
+        point = replace(point, stops=(*point.stops, call))
+        return self._with(_points=(*self._points[:-1], point))
+
     def wait_for(
         self,
         what: Input,
@@ -272,6 +289,10 @@ class PathWithEvents(PathOfMotions):
         check_input_wait(where, wait)
         if any(isinstance(other, InputWait) for other in point.stops):
             raise InvalidGoal(where, 'waits for a second input', 'add a point for it')
+        if any(isinstance(other, ScriptCall) for other in point.stops):
+            raise InvalidGoal(
+                where, 'follows a call(), which comes after it', 'let the function wait'
+            )
         point = replace(point, stops=(*point.stops, wait))
         return self._with(_points=(*self._points[:-1], point))
 

@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal import (
     PayloadChange,
     Press,
     ProportionalOutput,
+    ScriptCall,
     Segment,
     SegmentType,
 )
@@ -28,7 +29,8 @@ from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, PathSettings, SAME_POSITION
 
 _Stretch = TypeVar('_Stretch', ProportionalOutput, Press)
-_Event = TypeVar('_Event', IOCommand, InputWait, PayloadChange)
+_Event = TypeVar('_Event', IOCommand, InputWait, PayloadChange, ScriptCall)
+_Stop = TypeVar('_Stop', InputWait, PayloadChange, ScriptCall)
 
 #: The blend of a point on a process that has none [m], and how long the tool is in it at least
 #: [s]: the cycle of the slowest controller is 8 ms, and a blend that is passed in one is left out.
@@ -80,18 +82,9 @@ def goal_of_points(
             for i, point in enumerate(points)
             for command in point.outputs
         ),
-        input_waits=tuple(
-            replace(stop, waypoint=i)
-            for i, point in enumerate(points)
-            for stop in point.stops
-            if isinstance(stop, InputWait)
-        ),
-        payload_changes=tuple(
-            replace(stop, waypoint=i)
-            for i, point in enumerate(points)
-            for stop in point.stops
-            if isinstance(stop, PayloadChange)
-        ),
+        input_waits=_stops(points, InputWait),
+        script_calls=_stops(points, ScriptCall),
+        payload_changes=_stops(points, PayloadChange),
         proportional_outputs=_stretches(points, ProportionalOutput),
         presses=_stretches(points, Press),
         **{each.name: getattr(settings, each.name) for each in fields(settings)},
@@ -115,6 +108,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
     rests = [_nanoseconds(segment.dwell) for segment in segments] or [0] * len(points)
     outputs = _by_point('io_commands', goal.io_commands, len(points))
     waits = _by_point('input_waits', goal.input_waits, len(points))
+    calls = _by_point('script_calls', goal.script_calls, len(points))
     payloads = _by_point('payload_changes', goal.payload_changes, len(points))
     stretches: dict[int, list[ProportionalOutput | Press]] = {}
     for name in ('proportional_outputs', 'presses'):
@@ -135,7 +129,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
             duration=times[i] - (times[i - 1] + rests[i - 1] if i and times[i] else 0),
             outputs=tuple(outputs.get(i, ())),
             stretches=tuple(stretches.get(i, ())),
-            stops=(*waits.get(i, ()), *payloads.get(i, ())),
+            stops=(*waits.get(i, ()), *calls.get(i, ()), *payloads.get(i, ())),
             in_spline=in_spline,
         )
         for i, point in enumerate(points)
@@ -152,6 +146,16 @@ def _by_point(field: str, events: Sequence[_Event], count: int) -> dict[int, lis
             )
         found.setdefault(event.waypoint, []).append(replace(event, waypoint=0))
     return found
+
+
+def _stops(points: Sequence[PathPoint], kind: type[_Stop]) -> tuple[_Stop, ...]:
+    """Return what is done at points where the arm stops, of one kind, with its waypoints."""
+    return tuple(
+        replace(stop, waypoint=i)
+        for i, point in enumerate(points)
+        for stop in point.stops
+        if isinstance(stop, kind)
+    )
 
 
 def _stretches(points: Sequence[PathPoint], kind: type[_Stretch]) -> tuple[_Stretch, ...]:

@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal import (
     Press,
     ProportionalOutput,
     SafeOutput,
+    ScriptCall,
     Segment,
     Tolerance,
     Waypoint,
@@ -67,7 +68,7 @@ class PathPoint:
     duration: int = 0
     #: With the waypoint 0, whichever point this is.
     outputs: tuple[IOCommand, ...] = ()
-    stops: tuple[InputWait | PayloadChange, ...] = ()
+    stops: tuple[InputWait | ScriptCall | PayloadChange, ...] = ()
     #: Those that begin here: with the first waypoint 0, and the number of points to their end as
     #: the last one; 0 = not ended yet.
     stretches: tuple[ProportionalOutput | Press, ...] = ()

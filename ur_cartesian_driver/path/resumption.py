@@ -31,6 +31,7 @@ from ur_cartesian_driver.motion.goal import (
     Posture,
     Press,
     ProportionalOutput,
+    ScriptCall,
     Segment,
     SegmentType,
     Waypoint,
@@ -58,7 +59,7 @@ _RAMP_TIME, _RAMP_POINTS = 0.4, 8
 #: Chords that measure the length of a piece of a spline.
 _CHORDS = 64
 _DIGITS = 9
-_Event = TypeVar('_Event', InputWait, PayloadChange)
+_Event = TypeVar('_Event', InputWait, PayloadChange, ScriptCall)
 _Stretch = TypeVar('_Stretch', ProportionalOutput, Press)
 _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
@@ -154,6 +155,7 @@ class _Resumption:
             waypoints=tuple(points),
             segments=tuple(segments) if self.goal.segments or self.spline is None else (),
             io_commands=self._outputs(places),
+            script_calls=self._events(self.goal.script_calls, places),
             input_waits=self._events(self.goal.input_waits, places),
             payload_changes=self._events(self.goal.payload_changes, places),
             proportional_outputs=self._stretches(self.goal.proportional_outputs, places),

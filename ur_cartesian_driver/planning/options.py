@@ -11,6 +11,7 @@ from typing import get_args, Literal, TypeAlias
 from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.output_names import parse_safe_outputs
+from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 #: The wire carries joint positions no finer than this [m].
@@ -93,6 +94,8 @@ class PlanningOptions:
     acceleration_known: bool = True
     #: The wire dialect of the robot program.
     dialect: Dialect = NEWEST_DIALECT
+    #: The functions of others that it contains.
+    prelude: Prelude = NO_PRELUDE
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
 

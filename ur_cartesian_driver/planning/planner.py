@@ -249,7 +249,7 @@ class GoalPlanner:
         running: PlannedSegment | None = None,
     ) -> None:
         check_press_support(retargeted.goal, arm.model, retargeted.T_tcp_controlled)
-        self.stops = Stops(retargeted.goal)
+        self.stops = Stops(retargeted.goal, options.prelude)
         goal, state = self.stops.moving_goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
         self.running = running

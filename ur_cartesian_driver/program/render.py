@@ -11,10 +11,14 @@ program that start with ``#!`` are instructions for this module:
     insert the constants.
 ``#! include NAME``
     insert the file ``NAME.script``.
+``#! prelude``
+    insert the script prelude, as it is.
+``#! calls``
+    insert what calls its functions by their numbers.
 ``#! if FEATURE`` ... ``#! end``
     keep these lines only if the controller's software has the feature, because a controller
     refuses a program that names an unknown function. ``freedrive`` does not depend on the
-    software: its lines are kept if freedrive is allowed.
+    software: its lines are kept if freedrive is allowed. Nor does ``prelude``: if there is one.
 
 What is sent has no comments, except the markers of the External Control node, and no empty lines.
 Programs on the pendant share one name space with ours, so each name that the program defines on
@@ -26,12 +30,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from importlib.resources import files
 import re
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
@@ -52,6 +58,7 @@ MARKERS = frozenset(
 )
 
 _DEFINITION = re.compile(r'(?:def|thread) (\w+)\(|(\w+) = ')
+_CALL, _FUNCTION = re.compile(r'(\w+)\('), re.compile(r'(?:def|thread) (\w+)\(')
 _STRING_OR_NAME = re.compile(r'"[^"]*"|\w+')
 
 #: The buffered servo repeats a set-point until each joint is within this tolerance [rad], but at
@@ -157,6 +164,8 @@ class ProgramSettings:
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.
     allow_freedrive: bool = False
+    #: The functions of others that it contains.
+    prelude: Prelude = NO_PRELUDE
 
     def __post_init__(self) -> None:
         """Refuse a host that could not stand in a quoted string."""
@@ -179,7 +188,26 @@ def render(settings: ProgramSettings) -> str:
     def rename(found: re.Match[str]) -> str:
         return PREFIX + found[0] if found[0] in own else found[0]
 
-    return ''.join(f'{_STRING_OR_NAME.sub(rename, line)}\n' for line in lines)
+    return ''.join(
+        f'{line if isinstance(line, _ForeignLine) else _STRING_OR_NAME.sub(rename, line)}\n'
+        for line in lines
+    )
+
+
+class _ForeignLine(str):
+    """A line whose names are not ours."""
+
+    __slots__ = ()
+
+
+@cache
+def calls_of_program() -> frozenset[str]:
+    """Return the functions of the controller that the program calls."""
+    text = ''.join(
+        files('ur_cartesian_driver.program').joinpath(f'{name}.script').read_text('ascii')
+        for name in ('driver', 'servo')
+    )
+    return frozenset(_CALL.findall(text)) - set(_FUNCTION.findall(text))
 
 
 def wrap_in_program(text: str) -> str:
@@ -209,6 +237,12 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
                 yield from constants(settings)
             case ['#!', 'include', part]:
                 yield from _lines(part, settings)
+            case ['#!', 'prelude']:
+                yield from map(_ForeignLine, settings.prelude.lines)
+            case ['#!', 'calls']:
+                yield from map(_ForeignLine, settings.prelude.dispatch())
+            case ['#!', 'if', 'prelude']:
+                keep = bool(settings.prelude.functions)
             case ['#!', 'if', 'freedrive']:
                 keep = settings.allow_freedrive
             case ['#!', 'if', feature] if feature in FEATURES:

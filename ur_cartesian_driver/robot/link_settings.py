@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 import ipaddress
 from math import isfinite
 
 from ur_cartesian_driver.motion.declared_types import declare_types
+from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
+from ur_cartesian_driver.robot.prelude_file import read_prelude
 
 #: A robot that reports less often cannot be monitored, nor be told from a lost one [Hz].
 MIN_RTDE_FREQUENCY = 10.0
@@ -65,6 +67,10 @@ class LinkSettings:
     servo_buffer_depth: int = 250
     #: Whether scripts of others are run on the robot.
     allow_scripts: bool = False
+    #: File with URScript functions that goals call; empty = none.
+    script_prelude: str = ''
+    #: Its functions, read once: what is planned is what the robot gets.
+    prelude: Prelude = field(init=False, default=NO_PRELUDE)
     #: Whether a person may guide the arm by hand (freedrive).
     allow_freedrive: bool = False
 
@@ -79,6 +85,13 @@ class LinkSettings:
         self._require_within('servoj_gain', 100.0, 2000.0)
         self._require_within('servoj_lookahead_time', 0.03, 0.2)
         self._require_within('servo_buffer_depth', 20, 1000)
+        if self.script_prelude and not self.allow_scripts:
+            raise ValueError(
+                f'script_prelude is {self.script_prelude!r}, but allow_scripts is false; its '
+                'functions are outside all checks of the driver: set allow_scripts to true, or '
+                'leave script_prelude out.'
+            )
+        object.__setattr__(self, 'prelude', read_prelude(self.script_prelude))
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
@@ -107,12 +120,12 @@ class LinkSettings:
     def _check_numbers(self) -> None:
         """Convert all fields to their types; refuse numbers that no setting takes."""
         declare_types(self)
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name in (each.name for each in fields(self)):
+            value = getattr(self, name)
             if isinstance(value, float) and not isfinite(value):
-                raise ValueError(f'{field.name} is {value}, it has to be finite.')
-            if field.name.endswith('_port'):
-                self._require_within(field.name, 0, 65535)
+                raise ValueError(f'{name} is {value}, it has to be finite.')
+            if name.endswith('_port'):
+                self._require_within(name, 0, 65535)
 
     def _check_dialect(self) -> None:
         if self.wire_dialect not in DIALECTS:

@@ -155,7 +155,7 @@ class Feeder(ABC):
         """Return where the goal ended, as a clause."""
         if not started:
             return 'before anything moved'
-        return f'on the way to point {self.monitor.waypoint()}'
+        return self.monitor.script_call()[1] or f'on the way to point {self.monitor.waypoint()}'
 
     def report_lines(self) -> tuple[str, ...]:
         """Return what the outcome reports beyond its sentence."""

@@ -73,6 +73,8 @@ class GoalMonitor:
         self._stalled_time = 0.0
         #: The same in scaled time, and how much of that is allowed.
         self._stalled_scaled, self._stall_timeout = 0.0, _stall_timeout(job)
+        #: How long the program has run the motion that it began last [s], and which it is.
+        self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
         #: Scaled time: time since the start, as the controller's clock ran [s].
@@ -112,6 +114,10 @@ class GoalMonitor:
         if not moving:
             return
         self._track(before, state, passed)
+        begun = self._motions_begun()
+        self._running_time += passed * playing
+        if begun != self._running:
+            self._running_time, self._running = 0.0, begun
         waits = self._has_begun and self._tracker.waits
         # The program waits in real time, and reports no scaling while it does not move the arm.
         held = state.target_speed_fraction <= 0.0 or not playing
@@ -260,6 +266,7 @@ class GoalMonitor:
         """
         return (
             self._plan_deviation(state)
+            or self._late_call()
             or self._speed_violation(state)
             or (None if may_stand_still else self._stall_fault())
             or self._path_violation(state)
@@ -363,11 +370,28 @@ class GoalMonitor:
         )
         return None if clause is None else (GoalSignal.DEVIATION, clause)
 
+    def _late_call(self) -> Fault | None:
+        """Return that a function of the prelude takes too long, or None."""
+        timeout, where = self.script_call()
+        if not timeout or self._running_time <= timeout:
+            return None
+        return GoalSignal.DEVIATION, (
+            f'the robot program has been {where} for more than its timeout of {timeout:g} s'
+        )
+
+    def script_call(self) -> tuple[float, str]:
+        """Return the longest time of the function that is called [s], and where; 0 s = none is."""
+        if not self.job.script_calls:
+            return 0.0, ''
+        record = self.records.begun_records(self._motions_begun()) - 1
+        return self.job.script_calls.get(record, (0.0, ''))
+
     def _stall_fault(self) -> Fault | None:
         """Return that the arm stands although nothing holds it, or None."""
         if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
             return None
-        if self._stalled_time < self._input_wait()[0] + STALL_MARGIN:
+        longest = max(self._input_wait()[0], self.script_call()[0])
+        if self._stalled_time < longest + STALL_MARGIN:
             return None
         return GoalSignal.STALLED, (
             f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '

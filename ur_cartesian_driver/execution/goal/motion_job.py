@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any
@@ -28,7 +28,13 @@ from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, sto
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import AwaitInput, Spline, SwitchOutput
+from ur_cartesian_driver.motion.primitive import (
+    AwaitInput,
+    CallFunction,
+    OutputRecord,
+    Spline,
+    SwitchOutput,
+)
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
@@ -81,6 +87,9 @@ class MotionJob:
     has_stops: bool = False
     #: By waypoint: the time-out of its input [s], and that it has not come, as a clause.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
+    #: By the number of the record: how long a function of the prelude may take [s], and where the
+    #: program is meanwhile, as a clause.
+    script_calls: Mapping[int, tuple[float, str]] = field(default_factory=dict)
     #: Where the tool may give way.
     presses: tuple[PressWindow, ...] = ()
     #: What outputs become when the motion does not go on as planned.
@@ -113,7 +122,7 @@ class MotionJob:
         if not self.is_motion.all():
             return 'outputs (io_commands)'
         if self.has_stops:
-            return 'what is done at points (dwell, input_waits, payload_changes, presses)'
+            return 'what is done at points (dwell, input_waits, script_calls and the like)'
         if self.safe_outputs:
             return 'outputs that have to be safe (safe_outputs)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
@@ -147,7 +156,10 @@ def job_from_plan(
     """
     goal = plan.goal
     rows = plan.rows
-    times, output_delay = goal.waypoints[-1].time, _last_output_delay(rows)
+    times, output_delay = (
+        goal.waypoints[-1].time,
+        _longest_delay(rows.outputs.get(len(rows) - 1, ())),
+    )
     duration = start_time + plan.duration
     end_times = start_time + np.cumsum(rows.durations)
     request_times = end_times - _blend_lead_times(rows)
@@ -188,6 +200,15 @@ def job_from_plan(
             )
             for row, stop in standing.items()
             if isinstance(stop, AwaitInput)
+        },
+        script_calls={
+            int(first_records[row]): (
+                # The delay of outputs that follow it counts as the same motion.
+                stop.timeout + _longest_delay(rows.outputs.get(row, ())),
+                f'in {stop.text} at point {rows.waypoints[row]}',
+            )
+            for row, stop in standing.items()
+            if isinstance(stop, CallFunction)
         },
         has_speed_profile=not (
             goal.keep_open
@@ -230,10 +251,9 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
         )
 
 
-def _last_output_delay(rows: PlannedRows) -> float:
-    """Return how long after the end of the motion the last output is switched [s]."""
-    last = rows.outputs.get(len(rows) - 1, ())
-    return max((each.delay for each in last if isinstance(each, SwitchOutput)), default=0.0)
+def _longest_delay(records: Iterable[OutputRecord]) -> float:
+    """Return how long after the end of the motion before them the last one is switched [s]."""
+    return max((each.delay for each in records if isinstance(each, SwitchOutput)), default=0.0)
 
 
 def _blend_lead_times(rows: PlannedRows) -> Floats:

@@ -3,7 +3,8 @@
 """
 What happens at points where the arm stops.
 
-It rests, waits for an input, gets another payload, begins or ends to press.
+It rests, waits for an input, calls a function of the script prelude, gets another payload, begins
+or ends to press.
 
 A goal is planned as if it did not rest, with times that count its motion only; the stops are put
 into the plan afterwards. So they change nothing of the motions before and behind them, and are not
@@ -20,12 +21,19 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import InputKind, InputWait, PayloadChange, Segment
+from ur_cartesian_driver.motion.goal import (
+    InputKind,
+    InputWait,
+    PayloadChange,
+    ScriptCall,
+    Segment,
+)
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows
 from ur_cartesian_driver.motion.plan import LateLines, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
+    CallFunction,
     ChangePayload,
     EndPress,
     Primitive,
@@ -43,6 +51,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
 )
 from ur_cartesian_driver.planning.request.presses import press_records
+from ur_cartesian_driver.program.prelude import MAX_ARGUMENTS, Prelude
 
 #: Longer rests and time-outs are mistakes [s].
 MAX_DWELL = 600.0
@@ -58,6 +67,8 @@ INPUTS = {
 MAX_LEVEL = 10.0
 #: Larger payloads are mistakes [kg], [m].
 MAX_MASS, MAX_OFFSET = 100.0, 5.0
+#: The largest argument that the wire carries.
+MAX_ARGUMENT = 2147.0
 
 
 def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
@@ -68,7 +79,7 @@ def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     :raises NotAvailable: the robot program is not ours, or the goal is kept open.
     """
     dwells, mode = goal.motions.dwells, resolve_execution_mode(goal)
-    for name in ('input_waits', 'payload_changes'):
+    for name in ('input_waits', 'script_calls', 'payload_changes'):
         if getattr(goal, name) and mode.traits.streams_setpoints:
             raise NotAvailable(
                 name,
@@ -107,6 +118,9 @@ def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
                 'add a point for the second one',
             )
         check_input_wait(f'input_waits[{i}]', wait)
+    for i, call in enumerate(goal.script_calls):
+        check_script_call(f'script_calls[{i}]', call)
+        _check_function(f'script_calls[{i}]', call, options.prelude)
     for i, change in enumerate(goal.payload_changes):
         check_payload(f'payload_changes[{i}]', change)
 
@@ -117,6 +131,8 @@ def _places(goal: GoalTable) -> Iterator[tuple[str, int]]:
         yield segment_field(i, 'dwell'), i
     for i, wait in enumerate(goal.input_waits):
         yield f'input_waits[{i}].point_index', wait.waypoint
+    for i, call in enumerate(goal.script_calls):
+        yield f'script_calls[{i}].point_index', call.waypoint
     for i, change in enumerate(goal.payload_changes):
         yield f'payload_changes[{i}].point_index', change.waypoint
     for i, press in enumerate(goal.presses):
@@ -209,6 +225,52 @@ def check_input_wait(field: str, wait: InputWait) -> None:
         )
 
 
+def check_script_call(field: str, call: ScriptCall) -> None:
+    """
+    Check arguments and time-out.
+
+    :raises InvalidGoal: names the field, the value and the bound.
+    """
+    if len(call.arguments) > MAX_ARGUMENTS:
+        raise InvalidGoal(
+            f'{field}.arguments', f'has {len(call.arguments)} entries, more than {MAX_ARGUMENTS}'
+        )
+    for k, argument in enumerate(call.arguments):
+        if not abs(argument) <= MAX_ARGUMENT:
+            raise InvalidGoal(
+                f'{field}.arguments[{k}]',
+                f'is {argument:g}, outside -{MAX_ARGUMENT:g} to {MAX_ARGUMENT:g}',
+            )
+    if not 0.0 < call.timeout <= MAX_DWELL:
+        raise InvalidGoal(
+            f'{field}.timeout',
+            f'is {call.timeout:g} s; it must be more than 0, and at most {MAX_DWELL:g} s',
+        )
+
+
+def _check_function(field: str, call: ScriptCall, prelude: Prelude) -> None:
+    """Refuse a function that the prelude does not have, or has with other parameters."""
+    if not prelude.functions:
+        raise NotAvailable(
+            f'{field}.function',
+            f"is '{call.function}', but the driver has no functions to call",
+            'set its parameters script_prelude and allow_scripts',
+        )
+    function = prelude.function(call.function)
+    if function is None:
+        names = ', '.join(each.name for each in prelude.functions)
+        raise InvalidGoal(
+            f'{field}.function',
+            f"is '{call.function}', but {prelude.file} has {names}",
+            'call one of these',
+        )
+    if not function.required <= len(call.arguments) <= function.allowed:
+        raise InvalidGoal(
+            f'{field}.arguments',
+            f'has {len(call.arguments)} entries, but {call.function} takes {function.counts}',
+        )
+
+
 def check_payload(field: str, change: PayloadChange) -> None:
     """
     Check mass and centre of gravity.
@@ -230,9 +292,10 @@ class Stops:
     What happens at the points of a goal that passed the checks.
 
     :param goal: for the TCP with which it runs.
+    :param prelude: of the robot program.
     """
 
-    def __init__(self, goal: GoalTable) -> None:
+    def __init__(self, goal: GoalTable, prelude: Prelude) -> None:
         """Collect it."""
         dwells = goal.motions.dwells
         self._before: Floats = np.cumsum(dwells) - dwells
@@ -242,6 +305,8 @@ class Stops:
             self._add(press.last_waypoint, (EndPress(), 'ends to press there'))
         for wait in goal.input_waits:
             self._add(wait.waypoint, _await_input(wait))
+        for call in goal.script_calls:
+            self._add(call.waypoint, _call_function(call, prelude))
         for change in goal.payload_changes:
             payload = ChangePayload(mass=change.mass, center_of_gravity=change.center_of_gravity)
             self._add(change.waypoint, (payload, f'sets a payload of {change.mass:g} kg there'))
@@ -341,6 +406,17 @@ def _await_input(wait: InputWait) -> tuple[Stop, str]:
     )
     end = 'then goes on' if wait.go_on else 'else ends'
     return stop, f'waits there for {stop.condition}, at most {stop.timeout:g} s, {end}'
+
+
+def _call_function(call: ScriptCall, prelude: Prelude) -> tuple[Stop, str]:
+    written = ', '.join(f'{argument:g}' for argument in call.arguments)
+    stop = CallFunction(
+        number=prelude.number(call.function, len(call.arguments)),
+        arguments=vector6((*call.arguments, *ZERO6)[:6]),
+        text=f'{call.function}({written})',
+        timeout=call.timeout,
+    )
+    return stop, f'calls {stop.text} there, for at most {call.timeout:g} s'
 
 
 def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:

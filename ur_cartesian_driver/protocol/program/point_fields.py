@@ -46,14 +46,16 @@ of the filter [s].
 
 These are of our own program, too, and motions that go nowhere. WAIT lets the arm rest: word 18 is
 the time from the end of the motion before until the next one may begin. AWAIT_INPUT rests until an
-input has a level, and CHANGE_PAYLOAD sets a payload. PRESS_LAW, BEGIN_PRESS and END_PRESS are the
-controller's force mode. The other words are zeros:
+input has a level, CHANGE_PAYLOAD sets a payload, CALL_FUNCTION calls a function of the prelude.
+PRESS_LAW, BEGIN_PRESS and END_PRESS are the controller's force mode. The other words are zeros:
 
 =======  =====================================================================  =====
 12, 13   AWAIT_INPUT: kind of input, pin                                        S
 14, 15   AWAIT_INPUT: threshold [A], [V] or 0 to 1; 1 = wait until below it     S
 16       AWAIT_INPUT: 1 = go on after the time-out, 0 = end                     S
 0 - 3    CHANGE_PAYLOAD: mass [kg], centre of gravity x y z in the flange [m]   S
+0 - 5    CALL_FUNCTION: arguments                                               S
+12       CALL_FUNCTION: number of the function                                  S
 0 - 5    PRESS_LAW: wrench [N, Nm]; BEGIN_PRESS: task frame in the base         S
          [m, rad]
 6 - 11   PRESS_LAW: limits [m/s, rad/s; m, rad]; BEGIN_PRESS: 1 = compliant     S
@@ -83,6 +85,7 @@ from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
     BeginPress,
+    CallFunction,
     ChangePayload,
     EndPress,
     Instruction,
@@ -154,6 +157,8 @@ class MotionType(IntEnum):
     BEGIN_PRESS = 205
     #: force mode ends
     END_PRESS = 206
+    #: calls a function of the prelude; our own robot program only
+    CALL_FUNCTION = 207
 
 
 class SplineKind(IntEnum):
@@ -188,6 +193,7 @@ class PointField(IntEnum):
     INPUT_THRESHOLD = 14
     INPUT_BELOW = 15
     INPUT_GOES_ON = 16
+    FUNCTION_NUMBER = 12
     PRESS_DAMPING = 12
     PRESS_GAIN_SCALING = 13
     PRESS_ZEROES_SENSOR = 14
@@ -253,6 +259,7 @@ _STOPS: dict[type[Stop], MotionType] = {
     Wait: MotionType.WAIT,
     AwaitInput: MotionType.AWAIT_INPUT,
     ChangePayload: MotionType.CHANGE_PAYLOAD,
+    CallFunction: MotionType.CALL_FUNCTION,
     PressLaw: MotionType.PRESS_LAW,
     BeginPress: MotionType.BEGIN_PRESS,
     EndPress: MotionType.END_PRESS,
@@ -405,6 +412,8 @@ def _stop_fields(stop: Stop) -> PointFields:
             return (*ZERO6, *ZERO6, *wanted, stop.timeout, 0, kind)
         case ChangePayload():
             return (stop.mass, *stop.center_of_gravity, *(0.0,) * 14, 0, 0, kind)
+        case CallFunction():
+            return (*stop.arguments, *ZERO6, stop.number, *(0.0,) * 7, kind)
         case PressLaw():
             law = (stop.damping, stop.gain_scaling, stop.zero_sensor, stop.contact, 0, 0)
             return (*stop.wrench, *stop.limits, *law, 0, 0, kind)
@@ -429,6 +438,8 @@ def _stop(fields: Sequence[float], kind: MotionType) -> Stop:
         )
     if kind is MotionType.CHANGE_PAYLOAD:
         return ChangePayload(mass=fields[0], center_of_gravity=(fields[1], fields[2], fields[3]))
+    if kind is MotionType.CALL_FUNCTION:
+        return CallFunction(number=int(fields[12]), arguments=vector6(fields[:6]))
     if kind is MotionType.PRESS_LAW:
         return PressLaw(
             wrench=vector6(fields[:6]),

@@ -46,7 +46,7 @@ _OPTIMOVES = frozenset((4, 5))
 _OTHER_TARGETS = frozenset(range(6, 14))
 _SPLINE = frozenset((51,))
 _OUTPUTS = frozenset((200,))
-_STOPS = frozenset(range(201, 207))
+_STOPS = frozenset(range(201, 208))
 
 #: Names of words 6 to 17 of a move in errors, with and without q_near.
 _NAMES_WITH_Q_NEAR = (

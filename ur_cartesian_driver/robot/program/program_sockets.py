@@ -142,6 +142,7 @@ class ProgramSockets:
                 servoj_lookahead_time=s.servoj_lookahead_time,
                 servo_buffer_depth=s.servo_buffer_depth,
                 allow_freedrive=s.allow_freedrive,
+                prelude=s.prelude,
             )
         )
 

@@ -30,7 +30,13 @@ from ur_cartesian_driver.ros.parameters.parameter_table import (
 )
 
 #: Fields that the driver detects; they are no parameters.
-_DETECTED_OPTIONS = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')
+_DETECTED_OPTIONS = (
+    'calibration_known',
+    'optimove_known',
+    'acceleration_known',
+    'dialect',
+    'prelude',
+)
 #: Parameters that rclpy declares itself.
 _RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 

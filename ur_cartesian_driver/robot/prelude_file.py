@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Read the URScript of the parameter ``script_prelude``, and refuse what is no prelude."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
+from ur_cartesian_driver.program.render import calls_of_program, PREFIX, PROGRAM_NAME
+from ur_cartesian_driver.urscript import CompileError, parse_line
+from ur_cartesian_driver.urscript.parsing.syntax_tree import (
+    AssignStatement,
+    children,
+    FunctionDefinition,
+    NameExpression,
+    Statement,
+    SyntaxNode,
+)
+
+#: Longer files are mistakes [bytes].
+MAX_SIZE = 200_000
+
+
+def read_prelude(path: str) -> Prelude:
+    """
+    Return the functions of a file; none for an empty path.
+
+    :raises ValueError: the file cannot be read or compiled; the sentence names file and line.
+    """
+    if not path:
+        return NO_PRELUDE
+    file = Path(path).expanduser()
+    try:
+        text = file.read_text(encoding='utf-8-sig')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else 'it is not text in UTF-8'
+        raise ValueError(f'script_prelude is {path!r}, which cannot be read: {reason}.') from None
+    if len(text) > MAX_SIZE:
+        raise ValueError(
+            f'script_prelude is {path!r}, which has {len(text)} characters, more than {MAX_SIZE}.'
+        )
+    return compile_prelude(text, file.name)
+
+
+def compile_prelude(text: str, name: str) -> Prelude:
+    """
+    Return the functions of a text.
+
+    :param name: of the file, for sentences.
+    :raises ValueError: it is no prelude; the sentence names file and line.
+    """
+    try:
+        statements = parse_line(text).body
+    except CompileError as error:
+        reason = error.reason or error.text.rstrip(':').replace('_', ' ')
+        raise ValueError(f'script_prelude: {name}, line {error.line}: {reason}.') from None
+    lines: dict[str, int] = {}
+    variables: set[str] = set()
+    functions: list[PreludeFunction] = []
+    for statement in statements:
+        defined = _defined_name(statement)
+        where = f'script_prelude: {name}, line {statement.line}:'
+        if defined is None:
+            raise ValueError(
+                f'{where} only functions (def), threads and assignments may stand outside of '
+                'functions; move it into one.'
+            )
+        is_variable = isinstance(statement, AssignStatement)
+        if defined in lines and not (is_variable and defined in variables):
+            raise ValueError(f'{where} {defined} is defined in line {lines[defined]}, too.')
+        lines[defined] = statement.line
+        if is_variable:
+            variables.add(defined)
+        if isinstance(statement, FunctionDefinition):
+            if defined == PROGRAM_NAME or defined in calls_of_program():
+                raise ValueError(
+                    f'{where} {defined} is a function of the controller that the driver uses; '
+                    'choose another name.'
+                )
+            if statement.kind == 'def':
+                functions.append(_function(statement))
+        for node, word in _names(statement):
+            if word.startswith(PREFIX):
+                raise ValueError(
+                    f'script_prelude: {name}, line {node.line}: {word} begins with {PREFIX}, as '
+                    "the names of the driver's own program do; choose another name."
+                )
+    if not functions:
+        raise ValueError(f'script_prelude: {name} defines no function (def).')
+    # Without comments: the External Control node divides the program by some.
+    kept = [line for line in text.split('\n') if line.lstrip()[:1] not in ('', '#')]
+    return Prelude(file=name, lines=tuple(kept), functions=tuple(functions))
+
+
+def _defined_name(statement: Statement) -> str | None:
+    """Return the name that a statement on the first level defines; None = it defines none."""
+    if isinstance(statement, FunctionDefinition):
+        return statement.name
+    if isinstance(statement, AssignStatement) and isinstance(statement.target, NameExpression):
+        return statement.target.identifier
+    return None
+
+
+def _function(definition: FunctionDefinition) -> PreludeFunction:
+    parameters = definition.parameters
+    return PreludeFunction(
+        name=definition.name,
+        required=sum(parameter.default is None for parameter in parameters),
+        allowed=len(parameters),
+    )
+
+
+def _names(node: SyntaxNode) -> Iterator[tuple[SyntaxNode, str]]:
+    """Yield all names below a node, with the nodes that have them."""
+    for field in ('identifier', 'name', 'function', 'thread'):
+        if isinstance(word := getattr(node, field, None), str):
+            yield node, word
+    for child in children(node):
+        yield from _names(child)
