@@ -46,16 +46,18 @@ def a_goal(
 
     :param faults: as on the command line of ``ur-cartesian sim``.
     :param execution: in the place of that of the file.
-    :param input_after: how long after the start digital input 3 comes [s].
+    :param input_after: how long after the start digital inputs come [s].
     """
 
     async def happens(cell: Any) -> Any:
+        import example_goals
+
         from ur_cartesian_driver.cli.commands import goal_file
         from ur_cartesian_driver.kinematics.chain import Arm
         from ur_cartesian_driver.kinematics.robot_models import robot_model
         from ur_cartesian_driver.motion.execution_modes import ExecutionMode
         from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-        from ur_cartesian_driver.planning import plan, PlanningOptions
+        from ur_cartesian_driver.planning import plan
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
         from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
@@ -68,11 +70,11 @@ def a_goal(
         if execution:
             goal = replace(goal, execution=ExecutionMode[execution])
         motion = cell.owner.start(
-            plan(goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions())
+            plan(goal, state, Arm(robot_model(cell.robot.config.model)), example_goals.OPTIONS)
         )
         if input_after > 0.0:
             await cell.sleep(input_after)
-            cell.robot.controller.io.digital_in.standard[3] = True
+            cell.robot.controller.io.digital_in.standard[:] = [True] * 8
         await cell.until(lambda: motion.outcome is not None, 120.0)
         return motion.outcome
 
@@ -183,6 +185,10 @@ PICTURES = {
         title='A seam that begins 0.3 s after its arc burns (input_waits, dwell)',
         happens=a_goal('arc_start', input_after=1.6),
     ),
+    'calls': Picture(
+        title='A part is picked: close_gripper() returns when it is held (script_calls)',
+        happens=a_goal('pick', input_after=1.5),
+    ),
     'amounts': Picture(
         title='A bead: the pump follows the speed of the tool (proportional_outputs)',
         happens=a_goal('bead'),
@@ -204,9 +210,16 @@ PICTURES = {
 
 def record(picture: Picture, directory: Path) -> Path:
     """Run the scenario and return the recording."""
+    from example_goals import PRELUDE
     from robot_cell import run_cell
 
-    outcome = run_cell(picture.happens, record_directory=str(directory), io_publish_rate=125.0)
+    outcome = run_cell(
+        picture.happens,
+        record_directory=str(directory),
+        io_publish_rate=125.0,
+        allow_scripts=True,
+        script_prelude=str(PRELUDE),
+    )
     assert outcome.succeeded, outcome
     (file,) = directory.glob('*.npz')
     return file

@@ -14,9 +14,10 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 pytestmark = pytest.mark.slow
 
 #: An arm that is held off its path is not where the next goal could begin, one that rests at a
-#: point does not move, and one that presses stops as PRIMITIVES do: three kinds are left out.
+#: point does not move, nor does one in a function, and one that presses stops as PRIMITIVES do.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
-del KINDS['Waiting for the arm'], KINDS['At a point'], KINDS['Press']
+for left_out in ('Waiting for the arm', 'At a point', 'Scripts', 'Press'):
+    del KINDS[left_out]
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',

@@ -8,12 +8,14 @@ import robot_cell
 from robot_cell import CYCLE, RobotCell
 from virtual_network import HOST
 
+from ur_cartesian_driver.driver.ipc.channel import CallRobot
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+from ur_cartesian_driver.robot.services.service_calls import RunScriptCall
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 
 #: Time for which the arm is watched after an unlock or a play, and while a goal waits [s].
@@ -57,6 +59,8 @@ async def inject_cause(cell: RobotCell, cause: str):
             cell.other_clients.append(end.peer)
     elif cause == 'take the inputs':
         cell.other_clients.append(await take_inputs())
+    elif kind == 'script':
+        cell.owner.send(CallRobot(number=1, call=RunScriptCall(script=what)))
     elif kind == 'freeze':
         cell.loop.freeze(PORTS[what])
     elif kind == 'cut':

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 from math import atan2, cos, pi, sin
 
+import example_goals
 from fault_table import BEFORE
 import robot_cell
 from robot_cell import CellMotion, CYCLE, RobotCell
@@ -33,13 +34,14 @@ from ur_cartesian_driver.motion.goal import (
     PressFrame,
     ProportionalOutput,
     SafeOutput,
+    ScriptCall,
     Segment,
     Tolerance,
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RuntimeState
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.registers import OutputInteger
@@ -63,7 +65,7 @@ SAFE_OUTPUTS = (
 REACHED_WITHIN = 1.0
 
 ARM = Arm(robot_model('ur5e'))
-OPTIONS = PlanningOptions(max_tool_speed=1.0)
+OPTIONS = replace(example_goals.OPTIONS, max_tool_speed=1.0)
 
 
 def planned(state, offsets, velocity, acceleration, blend=BLEND, **goal):
@@ -508,9 +510,11 @@ def rest_plan(start):
 class RestGoal(BlendGoal):
     """Three sides of a square, with a rest and a wait for an input between them."""
 
+    awaited = AWAITED
+
     def __init__(self, cell):
         self._inputs = cell.robot.controller.io.digital_in.standard
-        self._inputs[AWAITED] = False
+        self._inputs[self.awaited] = False
         self._comes = None
         super().__init__(cell)
 
@@ -523,12 +527,32 @@ class RestGoal(BlendGoal):
 
     def send_remaining_points(self, phase):
         self._comes = self.cell.loop.call_later(
-            COMES_AFTER, self._inputs.__setitem__, AWAITED, True
+            COMES_AFTER, self._inputs.__setitem__, self.awaited, True
         )
 
     def record_end(self):
         if self._comes is not None:
             self._comes.cancel()
+
+
+@lru_cache
+def call_plan(start):
+    """Return the plan of three sides of a square with the call of a function between them."""
+    call = ScriptCall(waypoint=1, function='close_gripper', arguments=(0.6,), timeout=5.0)
+    return square_plan(start.state, blend=0.0, script_calls=(call,))
+
+
+class CallGoal(RestGoal):
+    """Three sides of a square, with a function between them that waits for an input."""
+
+    awaited = 2
+
+    def plan_from(self, start):
+        return call_plan(start)
+
+    def is_in(self, phase):
+        assert phase == 'in a function'
+        return self.points_begun() == 3 and self.cell.at_rest()
 
 
 @lru_cache
@@ -660,6 +684,7 @@ GOALS = {
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,
+    'Scripts': CallGoal,
     'Press': PressGoal,
     'Freedrive': FreedriveGoal,
 }

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from example_goals import PRELUDE
 from fault_table import CONTINUED, HEADLESS, LOCAL, Row
 
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -380,6 +381,47 @@ AT_A_POINT = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+SCRIPTS = replace(
+    _mode(
+        'Scripts',
+        'PRIMITIVES that call a function of the `script_prelude` at a point, which returns 0.4 s '
+        'after the fault. Whatever ends the goal ends the function; what it has switched stays, '
+        'but for `safe_outputs`. A paused program that is played goes on in it until it reads '
+        'the message that ends it.',
+        {'in a function': 'the arm rests at the second point, the function has not returned'},
+        2.0,
+        {},
+        faults=(
+            'protective stop',
+            'emergency stop',
+            'an operator stops the program',
+            'an operator pauses the program',
+            'the network cable is cut',
+            "the program's sockets are cut",
+            'the node is silent',
+        ),
+        pendant=('protective stop',),
+        continued=(),
+        more=(
+            Row(
+                fault='a client runs a secondary script (`~/run_script`)',
+                cause=('script sec other(): set_tool_digital_out(1, True) end',),
+                code=E.SUCCESSFUL,
+                result_within=2.0,
+                rest_within=2.0,
+            ),
+            Row(
+                fault='a client runs a primary script, which is refused',
+                cause=('script def other(): set_tool_digital_out(1, True) end',),
+                code=E.SUCCESSFUL,
+                result_within=2.0,
+                rest_within=2.0,
+            ),
+        ),
+    ),
+    settings={'allow_scripts': True, 'script_prelude': str(PRELUDE)},
+)
+
 PRESS = _mode(
     'Press',
     'PRIMITIVES that press on a table with the force mode of the controller. Whatever ends the '
@@ -453,4 +495,4 @@ FREEDRIVE = replace(
     settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, PRESS, FREEDRIVE)
+MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, SCRIPTS, PRESS, FREEDRIVE)
