@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.robot.prelude_file import read_prelude
 
-pytestmark = [pytest.mark.acceptance]
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM = Arm(robot_model('ur5e'))
 FILE = """

@@ -25,6 +25,7 @@ COMPUTING = (
     'test/acceptance/test_free_axis_seams.py',
     'test/acceptance/test_hand_back.py',
     'test/acceptance/test_input_waits.py',
+    'test/acceptance/test_script_calls.py',
     'test/acceptance/test_io_commands.py',
     'test/acceptance/test_live_sessions.py',
     'test/acceptance/test_proportional_outputs.py',
