@@ -15,6 +15,7 @@ import contextlib
 import json
 from math import pi, sin
 from pathlib import Path
+import re
 import subprocess
 import sys
 import threading
@@ -483,6 +484,51 @@ def test_its_dashboard_unlocks_a_protective_stop_and_cycles_the_power():
     assert seen['cycled']['moved']
     assert seen['cycled']['q'] == pytest.approx(HOME, abs=1e-6)
     assert seen['ended']['ended']
+
+
+PAGE = Path(__file__).parents[2] / 'doc' / 'coming_from' / 'ur_rtde.md'
+
+
+def way_of(snippet: str) -> np.ndarray:
+    """Run a snippet of the page on a robot of its own; return where the tool has been [m]."""
+    with simulator() as robot:
+        snippet = snippet.replace('127.0.0.1', robot.config.host).replace(
+            'headless_mode=True',
+            'headless_mode=True, reverse_port=0, script_sender_port=0, trajectory_port=0, '
+            'script_command_port=0, robot_receive_timeout=1.0, max_state_age=0.0',
+        )
+        places = [robot.state().T_base_tcp.position]
+        with subprocess.Popen(
+            [sys.executable, '-c', snippet],
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        ) as client:
+            began = time.monotonic()
+            while client.poll() is None and time.monotonic() - began < TIMEOUT:
+                places.append(robot.state().T_base_tcp.position)
+                time.sleep(0.005)
+            client.kill()
+            said = client.communicate()[0]
+        assert client.returncode == 0, said
+        return np.array([*places, robot.state().T_base_tcp.position])
+
+
+@pytest.mark.acceptance
+@pytest.mark.slow
+@pytest.mark.exhaustive
+@pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+def test_the_page_for_those_who_come_from_it_does_one_job_on_both_sides():
+    snippets = re.findall(r'^```python\n(.*?)^```', PAGE.read_text('utf-8'), re.DOTALL | re.M)
+    theirs, ours = map(way_of, snippets)
+    start = theirs[0]
+    end = np.add(start, (0.0, 0.1, 0.0))
+    for way in theirs, ours:
+        assert way[-1] == pytest.approx(end, abs=1e-4)
+        assert np.min(way[:, 2]) == pytest.approx(start[2] - 0.05, abs=1e-4)
+    # Each place of one way is near the other way, whose places are some millimetres apart.
+    apart = np.linalg.norm(theirs[:, None] - ours[None], axis=2)
+    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 0.004
 
 
 if __name__ == '__main__':
