@@ -45,6 +45,7 @@ LAUNCH_ARGUMENTS = {
         'headless_mode',
         'config_file',
     },
+    'beside_ur_driver.launch.py': {'ur_type', 'robot_ip', 'launch_rviz', 'config_file'},
     'simulated_robot.launch.py': {
         'ur_type',
         'robot_ip',
