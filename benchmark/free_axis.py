@@ -20,7 +20,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import FreeAxis
 from ur_cartesian_driver.motion.goal_table import GoalTable, WaypointRows
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ import pytest
 from robot_cell import run_cell
 
 from ur_cartesian_driver.cli import main, parser
-from ur_cartesian_driver.cli.commands import code_text, goal_file, simulator_config
+from ur_cartesian_driver.cli.commands import code_text, goal_file
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -29,6 +29,7 @@ from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.sim import SimulatedRobot
+from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.faults.fault_values import AfterTime
 from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 

@@ -8,9 +8,10 @@ import contextlib
 
 import pytest
 
-from ur_cartesian_driver.cli import commands, main, parser
+from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.sim.calibration import random_calibration
+from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterTime,
     DropFault,
@@ -52,7 +53,10 @@ def test_a_calibration_that_there_is_not_is_one_sentence(capsys):
         (['validate', 'square', '--tcp', '0,0,10,0,0,0'], '10 is not within -5 and 5'),
         (['sim', '--rtde-port', '65536'], '65536 is no port; give 0 to 65535'),
         (['where', '--rtde-port', '-1'], '-1 is no port'),
-        (['check-robot', '--robot-ip', 'localhost', '--primary-port', '1e9'], 'invalid'),
+        (
+            ['check-robot', '--robot-ip', 'localhost', '--primary-port', '1e9'],
+            '1e9 is no port; give',
+        ),
         (['check-robot', '--robot-ip', 'localhost', '--seconds', 'nan'], 'nan s is not within 0'),
         (['check-robot', '--robot-ip', 'localhost', '--seconds', '-1'], '-1 s is not within 0'),
         (['check-robot', '--robot-ip', 'localhost', '--seconds', 'x'], "to float: 'x'; give"),
@@ -83,7 +87,7 @@ def test_options_reach_the_robot():
         'drop rtde',
     ]
     arguments = parser().parse_args(['sim', '--model', 'ur10e', *options])
-    config = commands.simulator_config(arguments)
+    config = simulator_config(arguments)
     assert config.rate == 0.0
     assert config.geometry == random_calibration(robot_model('ur10e'), 3)
     assert config.faults == [
@@ -101,7 +105,7 @@ def test_programs_of_a_directory_and_the_loaded_one_have_the_names_of_the_dashbo
     arguments = parser().parse_args(
         ['sim', '--programs', str(tmp_path), '--program', str(loaded), '--no-remote-control']
     )
-    config = commands.simulator_config(arguments)
+    config = simulator_config(arguments)
     assert config.programs == {
         'wait.urp': 'def wait():\n  sleep(1)\nend\n',
         'glue.urp': loaded.read_text(),

@@ -9,18 +9,11 @@ ROS import it, so ``sim`` and ``where`` run without.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Sequence
-import contextlib
-import logging
-import os
-import signal
+from collections.abc import Sequence
 import sys
-from types import FrameType
 
-from ur_cartesian_driver.cli import commands
 from ur_cartesian_driver.cli.command_parser import parser
-from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.sim.command_line.console import run_command
 
 __all__ = ['main', 'parser']
 
@@ -28,36 +21,4 @@ __all__ = ['main', 'parser']
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; 0 means that the command succeeded."""
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
-    logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # SIGINT is ignored by default in a background process, SIGHUP after nohup.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _end)
-    run: Callable[[argparse.Namespace], int] = arguments.run
-    try:
-        status = run(arguments)
-        sys.stdout.flush()
-        return status
-    except KeyboardInterrupt as interrupt:
-        return commands.SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else signal.SIGINT)
-    except (DriverError, OSError, ValueError) as error:
-        _discard_unwritten_output()
-        with contextlib.suppress(OSError):
-            text = '; '.join([str(error), *getattr(error, '__notes__', ())])
-            print(f'ur-cartesian {arguments.command}: {text}', file=sys.stderr)
-        is_output_closed = isinstance(error, BrokenPipeError)
-        return commands.SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
-
-
-def _end(number: int, _frame: FrameType | None) -> None:
-    """Clean up like after Ctrl-C, but end with the exit status of this signal."""
-    raise KeyboardInterrupt(number)
-
-
-def _discard_unwritten_output() -> None:
-    """Forget what cannot be written; Python would try again when it exits."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return run_command(f'ur-cartesian {arguments.command}', arguments.run, arguments)

@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from typing import TypeVar
 
 import numpy as np
 
@@ -16,42 +14,29 @@ from ur_cartesian_driver.importing.import_options import (
     parse_code_output,
     parse_length,
 )
-from ur_cartesian_driver.planning.request.validate import MAX_JOINT_VALUE
+from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
-from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
-from ur_cartesian_driver.sim.faults.fault_values import Fault
+from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
 
 #: Of options that are times [s].
 MAX_SECONDS = 86400.0
 #: Of offsets of a goal [m], [rad].
 MAX_OFFSET = 50.0
 
-T = TypeVar('T')
-
-
-def fault(text: str) -> Fault:
-    """Return a fault of the simulator, and when it happens."""
-    return _parsed(parse_fault, text)
-
 
 def length(text: str) -> float:
     """Return a length with its unit [m]."""
-    return _parsed(parse_length, text)
+    return parsed(parse_length, text)
 
 
 def code_output(text: str) -> tuple[str, CodeOutput]:
     """Return a code of a G-code file, and the output that it sets."""
-    return _parsed(parse_code_output, text)
-
-
-def joints(text: str) -> tuple[float, ...]:
-    """Return six joint positions [rad]."""
-    return _six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
+    return parsed(parse_code_output, text)
 
 
 def tcp(text: str) -> tuple[float, ...]:
     """Return a pose of six numbers [m], [rad]."""
-    return _six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
+    return six_numbers(text, (MAX_TOOL_OFFSET, MAX_JOINT_VALUE))
 
 
 def offsets(text: str) -> tuple[float, ...]:
@@ -84,14 +69,6 @@ def factor(text: str) -> float:
     return number
 
 
-def port(text: str) -> int:
-    """Return the number of a port; 0 = any."""
-    number = int(text)
-    if not 0 <= number <= 65535:
-        raise argparse.ArgumentTypeError(f'{number} is no port; give 0 to 65535')
-    return number
-
-
 def seconds(text: str) -> float:
     """Return a time [s]."""
     try:
@@ -101,30 +78,3 @@ def seconds(text: str) -> float:
     if not 0.0 <= number <= MAX_SECONDS:  # NaN neither
         raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
     return number
-
-
-def _parsed(parse: Callable[[str], T], text: str) -> T:
-    """Let argparse print the reason that a parser gives."""
-    try:
-        return parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
-    """
-    Return six numbers separated by commas.
-
-    :param bounds: of the first three, and of the last three.
-    """
-    try:
-        numbers = tuple(float(part) for part in text.split(','))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f'{error}; give six numbers, with commas') from None
-    if len(numbers) != 6:
-        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
-    for i, number in enumerate(numbers):
-        bound = bounds[i // 3]
-        if not abs(number) <= bound:  # NaN neither
-            raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
-    return numbers

@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-import re
 
 from ur_cartesian_driver.cli import (
     argument_types,
@@ -21,6 +20,16 @@ from ur_cartesian_driver.cli import (
 )
 from ur_cartesian_driver.importing.import_options import LENGTH_UNITS, ToolOrientation
 from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.sim.command_line.simulate import simulate
+from ur_cartesian_driver.sim.command_line.simulator_options import (
+    add_calibration,
+    add_model,
+    add_ports,
+    add_simulator_options,
+    joints,
+    port_number,
+    take_negative_numbers,
+)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -43,8 +52,6 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-_NUMBERS = re.compile(r'-[\d.][-+\d.,eE]*')
-
 Commands = argparse._SubParsersAction  # argparse has no public name for it
 
 
@@ -61,20 +68,8 @@ def _add(
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     command.set_defaults(run=run)
-    # Six numbers that begin with a minus are a value too; argparse has no public option for that.
-    command._negative_number_matcher = _NUMBERS
+    take_negative_numbers(command)
     return command
-
-
-def _add_ports(command: argparse.ArgumentParser, text: str, **ports: int) -> None:
-    for name, port in ports.items():
-        command.add_argument(
-            f'--{name.replace("_", "-")}-port', type=argument_types.port, default=port, help=text
-        )
-
-
-def _add_model(command: argparse.ArgumentParser, name: str = '--ur-type') -> None:
-    command.add_argument(name, default='ur5e', choices=sorted(MODELS), help='model of the robot')
 
 
 def _add_tcp(command: argparse.ArgumentParser, text: str) -> None:
@@ -112,94 +107,12 @@ def _add_demo(sub: Commands[argparse.ArgumentParser]) -> None:
     demo.add_argument(
         '--second-goal', default='square', metavar='GOAL', help='goal of the second arm'
     )
-    _add_model(demo, '--model')
+    add_model(demo, '--model')
 
 
 def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
-    sim = _add(sub, 'sim', commands.sim, 'run a simulated controller on the ports of a real one')
-    _add_model(sim, '--model')
-    sim.add_argument('--host', default='127.0.0.1', help='address to listen on')
-    sim.add_argument(
-        '--polyscope',
-        default='',
-        metavar='VERSION',
-        help='software version, such as 5.21; empty = the newest for the model',
-    )
-    _add_ports(sim, '0 = any free port', rtde=30004, primary=30001, dashboard=29999)
-    for name, port in (
-        ('secondary', 30002),
-        ('realtime', 30003),
-        ('interpreter', 30020),
-        ('robot-api', 8000),
-    ):
-        sim.add_argument(
-            f'--{name}-port',
-            type=argument_types.port,
-            default=None,
-            help=f'0 = any free port; by default {port} if the primary port is 30001, else any',
-        )
-    sim.add_argument(
-        '--joints',
-        type=argument_types.joints,
-        metavar='Q1,...,Q6',
-        help='initial joint positions [rad]',
-    )
-    _add_calibration(sim)
-    sim.add_argument(
-        '--imperfect',
-        nargs='?',
-        type=int,
-        const=1,
-        metavar='SEED',
-        help='let the arm lag, ring and be measured with noise, and leave out RTDE packets, as '
-        'recorded on real robots',
-    )
-    sim.add_argument(
-        '--rate',
-        type=float,
-        default=1.0,
-        help='speed of time; 2 = twice as fast, 0 = as fast as possible',
-    )
-    sim.add_argument(
-        '--fault',
-        type=argument_types.fault,
-        action='append',
-        default=[],
-        metavar='TEXT',
-        dest='faults',
-        help="fault, and when it happens: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
-        'given several times, see doc/simulation.md',
-    )
-    sim.add_argument(
-        '--contact',
-        action='append',
-        default=[],
-        metavar='TEXT',
-        dest='contacts',
-        help="what the tool can touch, in the base [m]: 'plane x y z nx ny nz' or 'box x y z dx "
-        "dy dz'; may be given several times, see doc/simulation.md",
-    )
-    sim.add_argument('--power-off', action='store_true', help='start with the arm powered off')
-    sim.add_argument(
-        '--local', action='store_true', help='local control: refuse scripts from the network'
-    )
-    sim.add_argument(
-        '--no-remote-control',
-        action='store_true',
-        help='the feature is off: take scripts, but report no remote control',
-    )
-    sim.add_argument(
-        '--program',
-        type=Path,
-        metavar='FILE',
-        help='URScript that is loaded for the dashboard from the start; NAME.script is NAME.urp',
-    )
-    sim.add_argument(
-        '--programs',
-        type=Path,
-        metavar='DIR',
-        help='directory of such files, which the dashboard can load',
-    )
+    sim = _add(sub, 'sim', simulate, 'run a simulated controller on the ports of a real one')
+    add_simulator_options(sim)
 
 
 def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
@@ -211,21 +124,6 @@ def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
     )
     command.add_argument(
         '--tf-prefix', default='', help='prefix for the names of frames and joints in the file'
-    )
-
-
-def _add_calibration(command: argparse.ArgumentParser) -> None:
-    calibration = command.add_mutually_exclusive_group()
-    calibration.add_argument(
-        '--calibration',
-        metavar='FILE',
-        help='kinematics of this arm, in the YAML of ur_calibration of the UR ROS driver',
-    )
-    calibration.add_argument(
-        '--calibration-seed',
-        type=int,
-        metavar='N',
-        help='seed of a random calibration',
     )
 
 
@@ -287,7 +185,7 @@ def _add_planning(command: argparse.ArgumentParser, optional: bool = False) -> N
     )
     command.add_argument(
         '--joints',
-        type=argument_types.joints,
+        type=joints,
         metavar='Q1,...,Q6',
         help='initial joint positions [rad]; by default home',
     )
@@ -308,7 +206,7 @@ def _add_planning(command: argparse.ArgumentParser, optional: bool = False) -> N
         metavar='NAME:=VALUE',
         help='one parameter of the driver; may be given several times',
     )
-    _add_calibration(command)
+    add_calibration(command)
 
 
 def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
@@ -344,7 +242,7 @@ def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
         'serve a page with where it is',
     )
     show.add_argument(
-        '--rtde-port', type=argument_types.port, default=30004, help='RTDE port of that robot'
+        '--rtde-port', type=port_number, default=30004, help='RTDE port of that robot'
     )
     show.add_argument(
         '--host',
@@ -354,7 +252,7 @@ def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     show.add_argument(
         '--port',
-        type=argument_types.port,
+        type=port_number,
         default=8080,
         help='port of that page, or the next free one',
     )
@@ -494,9 +392,9 @@ def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
         help='output of an M-code, like M3=standard:2:1, or of S with the number that means 1, '
         'like S=analog:0:10000; may be given several times',
     )
-    _add_model(bring)  # for joint positions
+    add_model(bring)  # for joint positions
     _add_tcp(bring, ', for joint positions [m, rad]')
-    _add_calibration(bring)
+    add_calibration(bring)
 
 
 def _add_teach(sub: Commands[argparse.ArgumentParser]) -> None:
@@ -508,8 +406,8 @@ def _add_teach(sub: Commands[argparse.ArgumentParser]) -> None:
     )
     command.add_argument('-o', '--output', default='path.yaml', help='goal file')
     command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    _add_model(command)
-    _add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
+    add_model(command)
+    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999)
     command.add_argument(
         '--speed', type=argument_types.factor, help="of lines and arcs [m/s]; else the driver's"
     )
@@ -532,7 +430,7 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
         'print the pose of the robot, as a point to paste into a goal',
     )
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    _add_ports(where, 'its RTDE port', rtde=30004)
+    add_ports(where, 'its RTDE port', rtde=30004)
 
 
 def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
@@ -544,7 +442,7 @@ def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
         'without being asked',
     )
     check.add_argument('--robot-ip', required=True, metavar='ADDRESS', help='address of the robot')
-    _add_ports(check, 'its port', rtde=30004, primary=30001, dashboard=29999, robot_api=80)
+    add_ports(check, 'its port', rtde=30004, primary=30001, dashboard=29999, robot_api=80)
     check.add_argument(
         '--seconds',
         type=argument_types.seconds,

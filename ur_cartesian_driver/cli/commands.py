@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands ``demo``, ``sim``, ``send`` and ``where``."""
+"""The commands ``demo``, ``send`` and ``where``."""
 
 from __future__ import annotations
 
@@ -15,23 +15,13 @@ from time import monotonic
 from typing import Any, BinaryIO
 
 from ur_cartesian_driver.cli.stopped_place import read_place, write_place
-from ur_cartesian_driver.kinematics.robot_models import (
-    DhTable,
-    JOINT_NAMES,
-    robot_model,
-    RobotModel,
-)
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde.probe import read_state
-from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
-from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections, typical_imperfections
-
-#: The exit status of a command that a signal ended, less the signal's number, as in a shell.
-SIGNAL_STATUS = 128
+from ur_cartesian_driver.sim.command_line.console import SIGNAL_STATUS
 
 
 def demo(arguments: argparse.Namespace) -> int:
@@ -53,95 +43,6 @@ def demo(arguments: argparse.Namespace) -> int:
             for name, its_goal in (('left', goal), ('right', goal_file(arguments.second_goal)))
         ]
     )
-
-
-def sim(arguments: argparse.Namespace) -> int:
-    """Run a simulated controller until it is interrupted."""
-    robot = SimulatedRobot(simulator_config(arguments))
-    asyncio.run(_simulate(robot))
-    return 0
-
-
-def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
-    """
-    Return the configuration of the simulated robot.
-
-    :raises ValueError: there is no such robot, or its calibration is not readable.
-    """
-    files = [arguments.program] if arguments.program else []
-    if arguments.programs:
-        files += [file for file in arguments.programs.iterdir() if file.suffix == '.script']
-    return SimulatorConfig(
-        model=arguments.model,
-        host=arguments.host,
-        polyscope=arguments.polyscope,
-        rtde_port=arguments.rtde_port,
-        primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port,
-        secondary_port=arguments.secondary_port,
-        realtime_port=arguments.realtime_port,
-        interpreter_port=arguments.interpreter_port,
-        robot_api_port=arguments.robot_api_port,
-        power='off' if arguments.power_off else 'running',
-        remote_control=not arguments.local,
-        has_remote_control=not arguments.no_remote_control,
-        rate=arguments.rate,
-        faults=arguments.faults,
-        contacts=arguments.contacts,
-        imperfections=imperfections(arguments),
-        geometry=calibration(arguments, robot_model(arguments.model)),
-        programs={_program_name(file): file.read_text() for file in files},
-        program=_program_name(arguments.program) if arguments.program else '',
-        **({'q': arguments.joints} if arguments.joints else {}),
-    )
-
-
-def _program_name(file: Path) -> str:
-    """Return the name by which the dashboard loads a file of URScript."""
-    return f'{file.stem}.urp'
-
-
-def imperfections(arguments: argparse.Namespace) -> Imperfections | None:
-    """Return the imperfections of the simulated robot from the arguments; None = none."""
-    if arguments.imperfect is None:
-        return None
-    return typical_imperfections(robot_model(arguments.model), arguments.imperfect)
-
-
-def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:
-    """Return the calibrated DH table from the arguments; None = the nominal one."""
-    if arguments.calibration is not None:
-        return read_calibration(Path(arguments.calibration), model)
-    if arguments.calibration_seed is not None:
-        return random_calibration(model, arguments.calibration_seed)
-    return None
-
-
-async def _simulate(robot: SimulatedRobot) -> None:
-    """Print the ports of the simulator, then its state if the output is a terminal."""
-    showing = asyncio.create_task(_show_status(robot))
-    try:
-        await robot.run(on_listening=lambda: _show_ports(robot))
-    finally:
-        showing.cancel()
-
-
-def _show_ports(robot: SimulatedRobot) -> None:
-    ports = robot.ports
-    print(
-        f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
-        f'primary {ports.primary}, dashboard {ports.dashboard}, '
-        f'secondary {ports.secondary}, real-time {ports.realtime}, '
-        f'interpreter {ports.interpreter}'
-        + (f', Robot API {ports.robot_api}' if ports.robot_api else ''),
-        flush=True,
-    )
-
-
-async def _show_status(robot: SimulatedRobot) -> None:
-    while sys.stdout.isatty():
-        await asyncio.sleep(0.5)
-        print(f'\r{robot.status_line()}\033[K', end='', flush=True)
 
 
 def send(arguments: argparse.Namespace) -> int:

@@ -8,7 +8,6 @@ import argparse
 from pathlib import Path
 import sys
 
-from ur_cartesian_driver.cli.commands import calibration
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.goal_files import fields_of_goal, goal_text
 from ur_cartesian_driver.importing import (
@@ -21,6 +20,7 @@ from ur_cartesian_driver.importing import (
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 __all__ = ['FORMATS', 'import_goal', 'options_of']
 

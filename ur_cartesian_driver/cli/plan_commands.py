@@ -20,7 +20,7 @@ from time import time_ns
 from typing import NoReturn, TYPE_CHECKING
 import webbrowser
 
-from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
+from ur_cartesian_driver.cli.commands import code_text, read_goal
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -36,6 +36,7 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.preview.live_page import LivePage

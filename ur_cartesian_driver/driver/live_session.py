@@ -29,9 +29,8 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, SafeOutput, Waypoint
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.vectors import Joints, vector6
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_names import parse_safe_outputs

@@ -180,6 +180,8 @@ def _torques(j1: float, j2: float, j3: float, wrist: float) -> Vector6:
 
 
 _TURN = (-2 * pi, 2 * pi)
+#: Larger joint values of users are mistakes, such as degrees [rad].
+MAX_JOINT_VALUE = 8.0 * pi
 _LIMITS: PositionLimits = (_TURN,) * 6
 _ENDLESS_WRIST: PositionLimits = (_TURN,) * 5 + ((-inf, inf),)
 

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
-from ur_cartesian_driver.motion.primitive import Joints, Spline
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.vectors import Joints, Vector6, ZERO6
 
 Floats = NDArray[np.float64]
 

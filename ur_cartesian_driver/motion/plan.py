@@ -20,9 +20,9 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Instruction, Joints, OutputRecord, Primitive, Stop
+from ur_cartesian_driver.motion.primitive import Instruction, OutputRecord, Primitive, Stop
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.vectors import Joints, vector6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

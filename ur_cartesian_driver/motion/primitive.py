@@ -17,9 +17,8 @@ from typing import TypeAlias
 from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Joints, Vector3, Vector6, ZERO6
 
-Joints: TypeAlias = Vector6
 Target: TypeAlias = Pose | Joints
 
 #: Defaults of the trajectory point interface, for the leading axis [rad/s, rad/s^2] or the tool.

@@ -16,6 +16,8 @@ from typing import TypeAlias
 Vector3: TypeAlias = tuple[float, float, float]
 #: Six floats: joint positions [rad], a twist [m/s, rad/s] or a pose ``x y z rx ry rz`` [m, rad].
 Vector6: TypeAlias = tuple[float, float, float, float, float, float]
+#: Joint positions [rad].
+Joints: TypeAlias = Vector6
 
 ZERO3: Vector3 = (0.0, 0.0, 0.0)
 ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -27,7 +27,8 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Joints, SpeedLaw
+from ur_cartesian_driver.motion.primitive import SpeedLaw
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.motion.workspace import Plane
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.io_commands import describe_command

@@ -23,15 +23,8 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import (
-    Joints,
-    MoveJ,
-    OptimoveJ,
-    OptimoveL,
-    Spline,
-    Stop,
-)
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.primitive import MoveJ, OptimoveJ, OptimoveL, Spline, Stop
+from ur_cartesian_driver.motion.vectors import Joints, vector6, ZERO6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

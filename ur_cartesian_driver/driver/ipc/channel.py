@@ -27,8 +27,8 @@ from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProto
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 

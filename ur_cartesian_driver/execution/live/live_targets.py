@@ -18,7 +18,7 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     OnlineTrajectoryGenerator,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Joints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

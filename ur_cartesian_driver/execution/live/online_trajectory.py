@@ -30,8 +30,16 @@ from ur_cartesian_driver.motion.pose import (
     Quaternion,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import add, norm, scale, subtract, Vector3, Vector6, ZERO3
+from ur_cartesian_driver.motion.vectors import (
+    add,
+    Joints,
+    norm,
+    scale,
+    subtract,
+    Vector3,
+    Vector6,
+    ZERO3,
+)
 
 #: Part of the acceleration that braking for a target is planned with; the rest is for corrections.
 _BRAKING_FRACTION = 0.8

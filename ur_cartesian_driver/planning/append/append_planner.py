@@ -30,8 +30,9 @@ from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, Waypoin
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
-from ur_cartesian_driver.motion.primitive import Joints, OutputRecord, SpeedLaw, SwitchOutput
+from ur_cartesian_driver.motion.primitive import OutputRecord, SpeedLaw, SwitchOutput
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
     AppendedPoints,

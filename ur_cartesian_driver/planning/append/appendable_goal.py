@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.goal_table import (
 )
 from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
 from ur_cartesian_driver.planning.request.goal_fields import point_field

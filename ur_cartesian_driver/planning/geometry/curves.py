@@ -33,8 +33,15 @@ from ur_cartesian_driver.motion.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import cross, dot, scale, subtract, Vector3, vector6
+from ur_cartesian_driver.motion.vectors import (
+    cross,
+    dot,
+    Joints,
+    scale,
+    subtract,
+    Vector3,
+    vector6,
+)
 
 #: This close to half a turn, rounding on the wire and the arm's actual pose decide in which
 #: direction a line turns the tool [rad].

@@ -20,7 +20,6 @@ from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.primitive import (
-    Joints,
     MoveC,
     MoveJ,
     MoveL,
@@ -32,7 +31,7 @@ from ur_cartesian_driver.motion.primitive import (
     Stop,
     Target,
 )
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES

@@ -28,7 +28,7 @@ from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_M
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.motion.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field

@@ -23,8 +23,7 @@ from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_p
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
-from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.vectors import Joints, vector6
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (

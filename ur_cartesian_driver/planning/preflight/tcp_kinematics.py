@@ -35,8 +35,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.vectors import Joints, vector6
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: How far a named joint may arrive from the chosen solution, turns included [rad].

@@ -13,12 +13,12 @@ Refusals name fields as the ROS messages do (``trajectory.points[2].pose.orienta
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, pi
+from math import isfinite
 from typing import TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.declared_types import WrongType
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
@@ -68,8 +68,6 @@ from ur_cartesian_driver.planning.request.presses import check_presses
 from ur_cartesian_driver.planning.request.spline_rules import check_spline
 from ur_cartesian_driver.planning.request.stops import check_stops
 
-#: Larger joint values in postures are mistakes, such as degrees [rad].
-MAX_JOINT_VALUE = 8.0 * pi
 #: How far in the future a stamp may be [s].
 MAX_STAMP_AHEAD = 60.0
 

@@ -35,9 +35,9 @@ from ur_cartesian_driver.motion.plan import (
 from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
-from ur_cartesian_driver.motion.primitive import Joints, Spline
+from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Joints, Vector6, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.min_speed import slower_by

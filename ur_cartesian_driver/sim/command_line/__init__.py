@@ -1,0 +1,31 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The simulated controller as a command: its options, and what it prints.
+
+``ur-cartesian sim`` is one command of many; :func:`main` is ``ur-controller-sim``, the command of
+the simulator when it is installed alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import sys
+
+from ur_cartesian_driver.sim.command_line.console import run_command
+from ur_cartesian_driver.sim.command_line.simulate import simulate
+from ur_cartesian_driver.sim.command_line.simulator_options import add_simulator_options
+
+NAME = 'ur-controller-sim'
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a simulated controller until it is interrupted; return the exit status."""
+    command = argparse.ArgumentParser(
+        prog=NAME,
+        description='Run a simulated UR controller on the ports of a real one.',
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    add_simulator_options(command)
+    return run_command(NAME, simulate, command.parse_args(sys.argv[1:] if argv is None else argv))

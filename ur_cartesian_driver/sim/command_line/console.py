@@ -1,0 +1,57 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A command in a shell: signals end it like Ctrl-C, and errors are one sentence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import contextlib
+import logging
+import os
+import signal
+import sys
+from types import FrameType
+
+from ur_cartesian_driver.motion.errors import DriverError
+
+#: The exit status of a command that a signal ended, less the signal's number, as in a shell.
+SIGNAL_STATUS = 128
+
+
+def run_command(
+    name: str, run: Callable[[argparse.Namespace], int], arguments: argparse.Namespace
+) -> int:
+    """Run a command and return its exit status; 0 means that it succeeded."""
+    logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
+    # SIGINT is ignored by default in a background process, SIGHUP after nohup.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _end)
+    try:
+        status = run(arguments)
+        sys.stdout.flush()
+        return status
+    except KeyboardInterrupt as interrupt:
+        return SIGNAL_STATUS + (interrupt.args[0] if interrupt.args else signal.SIGINT)
+    except (DriverError, OSError, ValueError) as error:
+        _discard_unwritten_output()
+        with contextlib.suppress(OSError):
+            text = '; '.join([str(error), *getattr(error, '__notes__', ())])
+            print(f'{name}: {text}', file=sys.stderr)
+        is_output_closed = isinstance(error, BrokenPipeError)
+        return SIGNAL_STATUS + signal.SIGPIPE if is_output_closed else 1
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    """Clean up like after Ctrl-C, but end with the exit status of this signal."""
+    raise KeyboardInterrupt(number)
+
+
+def _discard_unwritten_output() -> None:
+    """Forget what cannot be written; Python would try again when it exits."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

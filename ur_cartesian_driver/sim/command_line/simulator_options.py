@@ -1,0 +1,188 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The options of the simulated controller; other commands have some of them too."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+import re
+from typing import TypeVar
+
+from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE, MODELS
+from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
+from ur_cartesian_driver.sim.faults.fault_values import Fault
+
+T = TypeVar('T')
+
+_NUMBERS = re.compile(r'-[\d.][-+\d.,eE]*')
+
+
+def add_simulator_options(command: argparse.ArgumentParser) -> None:
+    """Add all options of the simulator."""
+    take_negative_numbers(command)
+    add_model(command, '--model')
+    command.add_argument('--host', default='127.0.0.1', help='address to listen on')
+    command.add_argument(
+        '--polyscope',
+        default='',
+        metavar='VERSION',
+        help='software version, such as 5.21; empty = the newest for the model',
+    )
+    add_ports(command, '0 = any free port', rtde=30004, primary=30001, dashboard=29999)
+    for name, port in (
+        ('secondary', 30002),
+        ('realtime', 30003),
+        ('interpreter', 30020),
+        ('robot-api', 8000),
+    ):
+        command.add_argument(
+            f'--{name}-port',
+            type=port_number,
+            default=None,
+            help=f'0 = any free port; by default {port} if the primary port is 30001, else any',
+        )
+    command.add_argument(
+        '--joints',
+        type=joints,
+        metavar='Q1,...,Q6',
+        help='initial joint positions [rad]',
+    )
+    add_calibration(command)
+    command.add_argument(
+        '--imperfect',
+        nargs='?',
+        type=int,
+        const=1,
+        metavar='SEED',
+        help='let the arm lag, ring and be measured with noise, and leave out RTDE packets, as '
+        'recorded on real robots',
+    )
+    command.add_argument(
+        '--rate',
+        type=float,
+        default=1.0,
+        help='speed of time; 2 = twice as fast, 0 = as fast as possible',
+    )
+    command.add_argument(
+        '--fault',
+        type=fault,
+        action='append',
+        default=[],
+        metavar='TEXT',
+        dest='faults',
+        help="fault, and when it happens: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
+        'given several times, see doc/simulation.md',
+    )
+    command.add_argument(
+        '--contact',
+        action='append',
+        default=[],
+        metavar='TEXT',
+        dest='contacts',
+        help="what the tool can touch, in the base [m]: 'plane x y z nx ny nz' or 'box x y z dx "
+        "dy dz'; may be given several times, see doc/simulation.md",
+    )
+    command.add_argument('--power-off', action='store_true', help='start with the arm powered off')
+    command.add_argument(
+        '--local', action='store_true', help='local control: refuse scripts from the network'
+    )
+    command.add_argument(
+        '--no-remote-control',
+        action='store_true',
+        help='the feature is off: take scripts, but report no remote control',
+    )
+    command.add_argument(
+        '--program',
+        type=Path,
+        metavar='FILE',
+        help='URScript that is loaded for the dashboard from the start; NAME.script is NAME.urp',
+    )
+    command.add_argument(
+        '--programs',
+        type=Path,
+        metavar='DIR',
+        help='directory of such files, which the dashboard can load',
+    )
+
+
+def take_negative_numbers(command: argparse.ArgumentParser) -> None:
+    """Let six numbers that begin with a minus be a value; argparse has no public option."""
+    command._negative_number_matcher = _NUMBERS
+
+
+def add_model(command: argparse.ArgumentParser, name: str = '--ur-type') -> None:
+    """Add the option for the model of the robot."""
+    command.add_argument(name, default='ur5e', choices=sorted(MODELS), help='model of the robot')
+
+
+def add_ports(command: argparse.ArgumentParser, text: str, **ports: int) -> None:
+    """Add an option for each port."""
+    for name, port in ports.items():
+        command.add_argument(
+            f'--{name.replace("_", "-")}-port', type=port_number, default=port, help=text
+        )
+
+
+def add_calibration(command: argparse.ArgumentParser) -> None:
+    """Add the options for the calibration of an arm."""
+    calibration = command.add_mutually_exclusive_group()
+    calibration.add_argument(
+        '--calibration',
+        metavar='FILE',
+        help='kinematics of this arm, in the YAML of ur_calibration of the UR ROS driver',
+    )
+    calibration.add_argument(
+        '--calibration-seed',
+        type=int,
+        metavar='N',
+        help='seed of a random calibration',
+    )
+
+
+# The kinds of arguments, for `type=` of argparse
+
+
+def fault(text: str) -> Fault:
+    """Return a fault of the simulator, and when it happens."""
+    return parsed(parse_fault, text)
+
+
+def joints(text: str) -> tuple[float, ...]:
+    """Return six joint positions [rad]."""
+    return six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
+
+
+def port_number(text: str) -> int:
+    """Return the number of a port; 0 = any."""
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f'{text} is no port; give 0 to 65535')
+    return int(text)
+
+
+def parsed(parse: Callable[[str], T], text: str) -> T:
+    """Let argparse print the reason that a parser gives."""
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
+    """
+    Return six numbers separated by commas.
+
+    :param bounds: of the first three, and of the last three.
+    """
+    try:
+        numbers = tuple(float(part) for part in text.split(','))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'{error}; give six numbers, with commas') from None
+    if len(numbers) != 6:
+        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
+    for i, number in enumerate(numbers):
+        bound = bounds[i // 3]
+        if not abs(number) <= bound:  # NaN neither
+            raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
+    return numbers
