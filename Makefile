@@ -64,4 +64,5 @@ release-check: $(stamp)  ## Refuse placeholders, versions that disagree, an empt
 
 clean:  ## Remove all that was built or installed here
 	rm -rf $(VENV) build install log dist *.egg-info .*_cache .hypothesis
+	rm -rf simulator/build simulator/dist simulator/src simulator/LICENSE
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -3,6 +3,7 @@
 """Settings for all tests."""
 
 import gc
+from importlib.util import find_spec
 import os
 
 from hypothesis import settings
@@ -57,8 +58,12 @@ def pytest_configure(config):
 
 
 def pytest_ignore_collect(collection_path, config):
-    is_for_browser = collection_path.name == 'browser' and collection_path.is_dir()
-    return True if is_for_browser and not config.getoption('--browser') else None
+    """Leave out the folders of tests that need what most environments do not have."""
+    missing = {
+        'browser': not config.getoption('--browser'),
+        'simulator_alone': find_spec('ur_controller_sim') is None,
+    }
+    return True if collection_path.is_dir() and missing.get(collection_path.name) else None
 
 
 def pytest_collection_modifyitems(config, items):

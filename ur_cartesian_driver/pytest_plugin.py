@@ -30,6 +30,8 @@ from typing import Any, TYPE_CHECKING
 
 import pytest
 
+from ur_cartesian_driver.simulator_fixture import marker_values, simulated_robot
+
 if TYPE_CHECKING:
     from ur_cartesian_driver.ros import CartesianDriverNode
     from ur_cartesian_driver.sim import SimulatedRobot
@@ -53,16 +55,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture
 def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
     """Yield a simulated robot that listens on free ports, in a thread of this process."""
-    from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-
-    settings: dict[str, Any] = {
-        'rtde_port': 0,
-        'primary_port': 0,
-        'dashboard_port': 0,
-        'when_late': 'wait',
-    } | _marker_values(request, 'ur_sim')
-    with SimulatedRobot(SimulatorConfig(**settings)) as robot:
-        yield robot
+    yield from simulated_robot(request, 'ur_sim')
 
 
 @pytest.fixture(scope='session')
@@ -122,7 +115,7 @@ def cartesian_driver(
         # Robot, driver and test share one interpreter, which can be busy for longer than 0.2 s.
         'robot_receive_timeout': 1.0,
         'max_state_age': 0.0,
-    } | _marker_values(request, 'cartesian_driver')
+    } | marker_values(request, 'cartesian_driver')
     started_here = not get_default_context().ok()
     if started_here:
         rclpy.init()
@@ -136,10 +129,3 @@ def cartesian_driver(
     finally:
         if started_here:
             rclpy.shutdown()
-
-
-def _marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for marker in reversed(list(request.node.iter_markers(name))):  # the closest comes last
-        values |= marker.kwargs
-    return values

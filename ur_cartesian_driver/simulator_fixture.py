@@ -1,0 +1,44 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the fixtures of a simulated robot have in common: ours, and that of the simulator alone.
+
+pytest plugins import this module in every project of the environment, so it imports the simulator
+only when one is started.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim import SimulatedRobot
+
+
+def simulated_robot(request: pytest.FixtureRequest, marker: str) -> Iterator[SimulatedRobot]:
+    """
+    Yield a simulated robot that listens on free ports, in a thread of this process.
+
+    :param marker: the marker whose arguments are fields of its configuration.
+    """
+    from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+    settings: dict[str, Any] = {
+        'rtde_port': 0,
+        'primary_port': 0,
+        'dashboard_port': 0,
+        'when_late': 'wait',
+    } | marker_values(request, marker)
+    with SimulatedRobot(SimulatorConfig(**settings)) as robot:
+        yield robot
+
+
+def marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
+    """Return the arguments of the markers of a test, of which the closest comes last."""
+    values: dict[str, Any] = {}
+    for marker in reversed(list(request.node.iter_markers(name))):
+        values |= marker.kwargs
+    return values
