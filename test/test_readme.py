@@ -20,6 +20,7 @@ import pytest
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.sim.command_line import parser as simulator_parser
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
@@ -35,6 +36,8 @@ DOCUMENTS = [
 ]
 #: Programs that the documents start and that are no part of this package.
 FOREIGN = {'git', 'cd', '.', 'export', 'make', 'rosdep', 'colcon', 'pip', 'ros2'}
+#: Where the simulator's own package can be imported from a checkout, with the driver's modules.
+SIMULATOR_ALONE = {'PYTHONPATH': str(CHECKOUT / 'simulator')}
 
 
 def name_of(document):
@@ -266,6 +269,41 @@ def test_snippet_of_a_test_passes(part, tmp_path):
     assert '1 passed' in ended.stdout
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('part', 'printed'),
+    [('def reach()', 'PROTECTIVE_STOP'), ('MemorySockets()', '0.5')],
+)
+def test_snippet_of_the_simulator_alone_prints_what_it_says(part, printed):
+    ended = subprocess.run(
+        [sys.executable, '-c', snippet(part)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env=os.environ | SIMULATOR_ALONE,
+    )
+    assert ended.stdout.strip() == printed, ended.stderr
+
+
+@pytest.mark.slow
+def test_snippet_of_a_test_with_the_simulator_alone_passes(tmp_path):
+    file = tmp_path / 'test_snippet.py'
+    file.write_text(snippet('def test_my_program'), encoding='utf-8')
+    plugin = ('-p', 'ur_controller_sim.pytest_plugin')
+    ended = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', *plugin, file],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | SIMULATOR_ALONE,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert '1 passed' in ended.stdout
+
+
 # ---- commands and links -------------------------------------------------------------------------
 
 
@@ -274,6 +312,8 @@ def test_commands_exist(document):
     for words in commands(document):
         if words[0] == 'ur-cartesian':
             parser().parse_args([word.replace('FILE', 'square') for word in words[1:]])
+        elif words[0] == 'ur-controller-sim':
+            simulator_parser().parse_args(words[1:])
         elif words[0] == 'ur-cartesian-driver':
             check_parameters(words)
         elif words[0].startswith('scripts/'):

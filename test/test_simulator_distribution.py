@@ -20,7 +20,7 @@ import pytest
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
     not (CHECKOUT / 'simulator' / 'setup.py').is_file(),
-    reason='only a checkout can build the simulator',
+    reason='only a checkout can build it',
 )
 NAME, DRIVER = 'ur_controller_sim', 'ur_cartesian_driver'
 #: Beside the files that only this package has.

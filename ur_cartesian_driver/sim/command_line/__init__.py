@@ -20,12 +20,18 @@ from ur_cartesian_driver.sim.command_line.simulator_options import add_simulator
 NAME = 'ur-controller-sim'
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run a simulated controller until it is interrupted; return the exit status."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command."""
     command = argparse.ArgumentParser(
         prog=NAME,
         description='Run a simulated UR controller on the ports of a real one.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add_simulator_options(command)
-    return run_command(NAME, simulate, command.parse_args(sys.argv[1:] if argv is None else argv))
+    return command
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a simulated controller until it is interrupted; return the exit status."""
+    arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
+    return run_command(NAME, simulate, arguments)
