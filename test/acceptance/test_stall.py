@@ -3,6 +3,8 @@
 """Goals that wait for an arm that is off its path, judged by what RTDE reports."""
 
 from dataclasses import replace
+from pathlib import Path as FilePath
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ ARM = Arm(robot_model('ur5e'))
 #: Of the planned motion [s], [m].
 TIME, DISTANCE = 2.0, 0.2
 ALLOWED, PUSHED = 0.005, 0.02
+EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'stall.py'
 
 
 class Seam:
@@ -99,6 +102,25 @@ def test_the_motion_waits_on_its_path_and_goes_on():
     )
     (line,) = [line for line in outcome.report if 'waited' in line]
     assert line.startswith('the motion waited once for an arm that was off its path, for 0.9')
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_example_waits():
+    async def scenario(cell):
+        path = run_path(str(EXAMPLE))['stall'](cell.memory.read().actual_tcp_pose).goal()
+        fields = ('waypoints', 'segments', 'path_tolerance', 'execution', 'on_path_tolerance')
+        seam = Seam(
+            cell,
+            stall_timeout=path.stall_timeout,
+            **{name: getattr(path, name) for name in fields},
+        )
+        seam.push(1.0)
+        return seam, await seam.end()
+
+    seam, outcome = run_cell(scenario)
+    assert outcome.succeeded, outcome
+    assert any('waited once' in line for line in outcome.report)
+    assert seam.off_path < 1e-4
 
 
 def test_an_arm_that_does_not_come_back_ends_the_goal():

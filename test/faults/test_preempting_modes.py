@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 #: An arm that is held off its path is not where the next goal could begin, one that rests at a
 #: point does not move, nor does one in a function, and one that presses stops as PRIMITIVES do.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
-for left_out in ('Waiting for the arm', 'At a point', 'Scripts', 'Press'):
+for left_out in ('Waiting for the arm', 'At a point', 'At a point, SERVO', 'Scripts', 'Press'):
     del KINDS[left_out]
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',

@@ -163,7 +163,7 @@ def test_what_happens_at_points_happens_there_and_the_last_of_before_again():
     left = resume(of, at(2, 0.5)).goal
     assert [(each.waypoint, each.pin) for each in left.input_waits] == [(1, 1), (3, 3)]
     assert [(each.waypoint, each.mass) for each in left.payload_changes] == [(1, 1.0), (2, 2.0)]
-    assert [(each.waypoint, each.function) for each in left.script_calls] == [(1, 'f1'), (3, 'f3')]
+    assert [(each.waypoint, each.function) for each in left.script_calls] == [(3, 'f3')]
 
 
 def test_an_amount_follows_the_speed_from_the_place_on():

@@ -15,7 +15,7 @@ from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
-from ur_cartesian_driver.robot.services.service_calls import RunScriptCall
+from ur_cartesian_driver.robot.services.service_calls import HandBackCall, RunScriptCall
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 
 #: Time for which the arm is watched after an unlock or a play, and while a goal waits [s].
@@ -59,6 +59,9 @@ async def inject_cause(cell: RobotCell, cause: str):
             cell.other_clients.append(end.peer)
     elif cause == 'take the inputs':
         cell.other_clients.append(await take_inputs())
+    elif cause == 'hand back':
+        cell.owner.send(CallRobot(number=1, call=HandBackCall()))
+        await cell.sleep(2.0 * CYCLE)
     elif kind == 'script':
         cell.owner.send(CallRobot(number=1, call=RunScriptCall(script=what)))
     elif kind == 'freeze':
@@ -207,6 +210,8 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         context,
     )
     goal.record_end()
+    if phase not in BEFORE and not row.cause[0].startswith(FOREIGN_MOTION):
+        goal.check_place(context)
     has_crashed = row.state_after is ConnectionState.DISCONNECTED and 'crash' in row.cause
     # A program may make outputs safe and end in the very moment in which its goal succeeds.
     ends_with_success = outcome.succeeded and row.state_after is ConnectionState.CONNECTED

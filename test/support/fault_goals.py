@@ -9,7 +9,7 @@ by the position of the tool; never by the time that it should take.
 
 from dataclasses import replace
 from functools import lru_cache
-from math import atan2, cos, pi, sin
+from math import atan2, cos, dist, pi, sin
 
 import example_goals
 from fault_table import BEFORE
@@ -61,6 +61,8 @@ PROCESS = 5
 SAFE_OUTPUTS = (
     SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=PROCESS, value=0.0, restore=True),
 )
+#: A tool that is farther from where it was has begun [m].
+BEGUN = 0.001
 #: How long it may take until a robot that was out of reach is written to [s].
 REACHED_WITHIN = 1.0
 
@@ -140,6 +142,12 @@ class FaultGoal:
         await self.cell.until(
             lambda: self.is_process_on() is expected, REACHED_WITHIN, f'process, {context}'
         )
+
+    def check_place(self, context):
+        """Check that a goal that did not succeed says where it was stopped, if it has moved."""
+        tool, outcome = self.cell.robot.controller.motion.T_base_tcp.position, self.motion.outcome
+        if dist(tool, self.start) > BEGUN and not outcome.succeeded:
+            assert outcome.stopped, context
 
     def plan_from(self, start: StartState):
         """Return the plan, cached: the arm begins at the same pose each time."""
@@ -536,6 +544,37 @@ class RestGoal(BlendGoal):
 
 
 @lru_cache
+def servo_rest_plan(start):
+    """Return the plan of two sides of a square, by set-points, with a rest between them."""
+    state = start.state
+    (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+    goal = Goal(
+        waypoints=tuple(
+            Waypoint(pose=Pose((x + dx, y + SIDE, z), turned), time=time)
+            for dx, time in ((0.0, 0.4), (SIDE, 0.8 + REST))
+        ),
+        segments=(Segment(dwell=REST), Segment()),
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+        safe_outputs=SAFE_OUTPUTS,
+        execution=ExecutionMode.SERVO,
+    )
+    return plan(goal, state, ARM, OPTIONS)
+
+
+class ServoRestGoal(ServoGoal):
+    """Two sides of a square by set-points, with a rest between them."""
+
+    def plan_from(self, start):
+        return servo_rest_plan(start)
+
+    def is_in(self, phase):
+        assert phase == 'resting'
+        return dist(self.tool_offset(), (0.0, SIDE)) < 2e-4 and self.cell.at_rest()
+
+
+@lru_cache
 def call_plan(start):
     """Return the plan of three sides of a square with the call of a function between them."""
     call = ScriptCall(waypoint=1, function='close_gripper', arguments=(0.6,), timeout=5.0)
@@ -658,6 +697,9 @@ class FreedriveGoal(FaultGoal):
 
     has_process = False
 
+    def check_place(self, context):
+        """It has no path."""
+
     def send_motion(self):
         self.motion = self.cell.owner.run(b'', stationary_job(self.plan), freedrive=True)
 
@@ -684,6 +726,7 @@ GOALS = {
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,
+    'At a point, SERVO': ServoRestGoal,
     'Scripts': CallGoal,
     'Press': PressGoal,
     'Freedrive': FreedriveGoal,

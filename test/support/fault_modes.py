@@ -381,6 +381,22 @@ AT_A_POINT = _mode(
     pendant=('protective stop', 'an operator pauses the program'),
 )
 
+SERVO_AT_A_POINT = _mode(
+    'At a point, SERVO',
+    'Set-points with a `dwell`, in which they stay the same.',
+    {'resting': 'the arm rests at the first point'},
+    2.0,
+    {},
+    faults=(
+        'protective stop',
+        'an operator pauses the program',
+        'the network cable is cut',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+    continued=(),
+)
+
 SCRIPTS = replace(
     _mode(
         'Scripts',
@@ -495,4 +511,15 @@ FREEDRIVE = replace(
     settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, WAITING, APPEND, OUTPUTS, AT_A_POINT, SCRIPTS, PRESS, FREEDRIVE)
+MODES = (
+    SPLINE,
+    SERVO,
+    WAITING,
+    APPEND,
+    OUTPUTS,
+    AT_A_POINT,
+    SERVO_AT_A_POINT,
+    SCRIPTS,
+    PRESS,
+    FREEDRIVE,
+)

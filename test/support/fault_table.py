@@ -127,6 +127,24 @@ UNSEEN_STOP = Row(
     differs=REFUSED,
 )
 
+#: During a goal that is refused; without one the program ends.
+HANDED_BACK = Row(
+    fault='a client hands the control back (`~/hand_back_control`)',
+    cause=('hand back',),
+    code=E.SUCCESSFUL,
+    **UNDISTURBED,
+    phases=('idle', 'mid-segment'),
+    differs={
+        'idle': {
+            'code': E.ROBOT_NOT_READY,
+            'result_within': 0.3,
+            'rest_within': 0.5,
+            'state_after': S.CONNECTED,
+            'steps': ('resend',),
+        }
+    },
+)
+
 #: States come ever later; so does the one that shows the arm at rest.
 CONGESTED = Row(
     fault='RTDE carries less data than needed',
@@ -176,6 +194,7 @@ HEADLESS = (
         steps=(*POWER_UP, 'play', 'resend'),
         differs=REFUSED,
     ),
+    HANDED_BACK,
     Row(
         fault="another client's program replaces ours",
         cause=('foreign_motion z 0.02',),
@@ -497,6 +516,10 @@ LOCAL = (
         state_after=S.CONNECTED,
         steps=('play',),
         differs=REFUSED,
+    ),
+    replace(
+        HANDED_BACK,
+        differs=_in(('idle',), **HANDED_BACK.differs['idle'] | {'steps': ('play',)}),
     ),
     Row(
         fault='an operator pauses the program',

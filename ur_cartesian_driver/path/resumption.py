@@ -155,7 +155,7 @@ class _Resumption:
             waypoints=tuple(points),
             segments=tuple(segments) if self.goal.segments or self.spline is None else (),
             io_commands=self._outputs(places),
-            script_calls=self._events(self.goal.script_calls, places),
+            script_calls=tuple(self._ahead(self.goal.script_calls, places)),
             input_waits=self._events(self.goal.input_waits, places),
             payload_changes=self._events(self.goal.payload_changes, places),
             proportional_outputs=self._stretches(self.goal.proportional_outputs, places),
@@ -350,11 +350,7 @@ class _Resumption:
     def _events(self, events: Sequence[_Event], places: Sequence[float]) -> tuple[_Event, ...]:
         """Return what happens at the points that are left, and the last of before at the place."""
         passed = [each for each in events if self._is_passed(each.waypoint)]
-        left: list[_Event] = [
-            replace(each, waypoint=_index(places, each.waypoint))
-            for each in events
-            if not self._is_passed(each.waypoint)
-        ]
+        left = self._ahead(events, places)
         first = self._start_index(places)
         if places[first] > self.begin + _NO_FRACTION:  # the arm need not stop there
             return tuple(left)
@@ -363,6 +359,14 @@ class _Resumption:
             replace(each, waypoint=first) for each in passed if each.waypoint == last
         ]
         return tuple(again + left)
+
+    def _ahead(self, events: Sequence[_Event], places: Sequence[float]) -> list[_Event]:
+        """Return what happens at the points that are left."""
+        return [
+            replace(each, waypoint=_index(places, each.waypoint))
+            for each in events
+            if not self._is_passed(each.waypoint)
+        ]
 
     def _stretches(
         self, stretches: Sequence[_Stretch], places: Sequence[float]

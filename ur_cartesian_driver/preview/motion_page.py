@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import SpeedLaw
+from ur_cartesian_driver.motion.primitive import AwaitInput, CallFunction, SpeedLaw
 from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.motion.workspace import Plane
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
@@ -246,12 +246,16 @@ def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:
 
 
 def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
-    """Yield the outputs in words, with the places at which they switch."""
-    for waypoint, outputs in (
-        (segment.waypoint, segment.outputs) for segment in plan.segments if segment.outputs
-    ):
-        last = int(np.flatnonzero(plan.reference.point == waypoint)[-1])
-        for output in outputs:
+    """Yield outputs, waits for inputs and calls in words, with the places where they happen."""
+    for segment in plan.segments:
+        stop = segment.primitive
+        if not (segment.outputs or isinstance(stop, AwaitInput | CallFunction)):
+            continue
+        last = int(np.flatnonzero(plan.reference.point == segment.waypoint)[-1])
+        if isinstance(stop, AwaitInput | CallFunction):
+            text = stop.text if isinstance(stop, CallFunction) else f'waits for {stop.condition}'
+            yield text, plan.reference.poses[last, :3]
+        for output in segment.outputs:
             if isinstance(output, SpeedLaw):
                 continue
             at = output.trigger_pose or pose_from_row(plan.reference.poses[last])

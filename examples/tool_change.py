@@ -1,0 +1,20 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Between two paths the pendant's program has the arm: behind its node, External Control."""
+
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.path import mm, Path, Pose
+
+
+def tool_change(start: Pose) -> Path:
+    return Path(start).at(speed=0.1).by(dz=mm(-40)).by(dy=mm(60)).by(dz=mm(40))
+
+
+if __name__ == '__main__':
+    with Driver(DriverConfig(robot_ip='192.168.56.101', ur_type='ur5e')) as driver:
+        while True:
+            driver.wait_ready(timeout=60.0)  # a person plays the program, or it comes round
+            state = driver.state
+            assert state is not None
+            print(driver.execute(tool_change(state.actual_tcp_pose)).raise_for_error().text)
+            print(driver.hand_back_control().text)
