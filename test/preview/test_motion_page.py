@@ -11,6 +11,7 @@ from math import pi
 import re
 import sys
 
+from example_goals import example_goal, OPTIONS
 import numpy as np
 import pytest
 
@@ -156,3 +157,21 @@ def test_the_command_writes_pages_of_plans_and_of_refusals(tmp_path, capsys):
     assert main(['show', 'square', '--ur-type', 'ur3e', '-o', str(refused)]) == 1
     assert 'class="refused"' in refused.read_text()
     assert 'refused' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('name', 'marks'),
+    [
+        ('pick', ['close_gripper(0.6)', 'open_gripper()']),
+        ('arc_start', ['waits for standard digital input 3 on']),
+    ],
+)
+def test_what_happens_at_points_is_marked(name, marks):
+    arm = Arm(MODELS['ur5e'])
+    state = state_at_rest(arm, (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0))
+    made = plan(example_goal(name, state), state, arm, OPTIONS)
+    scene = scenes_of(motion_page(made, arm))['type']
+    texts = [
+        message['props']['text'] for _, message in scene if 'text' in message.get('props', {})
+    ]
+    assert [text for text in texts if text in marks] == marks
