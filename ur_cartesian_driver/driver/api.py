@@ -185,6 +185,12 @@ class Driver(RobotServices, InteractiveMotions):
         """Start the robot loop and return; it connects and reconnects by itself."""
         if remark := self_collision_remark(self.config.ur_type, self.options):
             LOG.warning('%s', remark)
+        if functions := self.config.prelude.functions:
+            LOG.info(
+                'The robot program has functions of %s, outside all checks of the driver: %s.',
+                self.config.prelude.file,
+                ', '.join(function.name for function in functions),
+            )
         self._loop.open()
 
     def close(self) -> None:
