@@ -6,11 +6,16 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.driver import Driver, DriverConfig, MotionHandle
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 
 
-def run(make: Callable[[Pose], Path], frames: Sequence[StaticFrame] = (), **settings: Any) -> None:
+def run(
+    make: Callable[[Pose], Path],
+    frames: Sequence[StaticFrame] = (),
+    meanwhile: Callable[[MotionHandle], None] = lambda motion: None,
+    **settings: Any,
+) -> None:
     """Make a path from where the tool of a robot is, print its plan, and carry it out."""
     parser = argparse.ArgumentParser()
     parser.add_argument('--robot-ip', default='127.0.0.1')
@@ -25,6 +30,9 @@ def run(make: Callable[[Pose], Path], frames: Sequence[StaticFrame] = (), **sett
         state = driver.state
         assert state is not None
         path = make(state.actual_tcp_pose)
-        print(*driver.plan(path).report, sep='\n')
+        plan = driver.plan(path)
+        print(*plan.report, sep='\n')
         if not given.plan:
-            print(driver.execute(path).raise_for_error().text)
+            motion = driver.start(plan)
+            meanwhile(motion)
+            print(motion.result().raise_for_error().text)

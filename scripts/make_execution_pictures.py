@@ -39,7 +39,7 @@ class Picture:
 
 
 def a_goal(
-    name: str, *faults: str, execution: str = '', input_after: float = nan
+    name: str, *faults: str, execution: str = '', input_after: float = nan, arm: Any = None
 ) -> Callable[[Any], Coroutine[None, None, Any]]:
     """
     Return the execution of an example.
@@ -47,6 +47,7 @@ def a_goal(
     :param faults: as on the command line of ``ur-cartesian sim``.
     :param execution: in the place of that of the file.
     :param input_after: how long after the start digital inputs come [s].
+    :param arm: for a path that may give way.
     """
 
     async def happens(cell: Any) -> Any:
@@ -70,7 +71,8 @@ def a_goal(
         if execution:
             goal = replace(goal, execution=ExecutionMode[execution])
         motion = cell.owner.start(
-            plan(goal, state, Arm(robot_model(cell.robot.config.model)), example_goals.OPTIONS)
+            plan(goal, state, Arm(robot_model(cell.robot.config.model)), example_goals.OPTIONS),
+            arm=arm,
         )
         if input_after > 0.0:
             await cell.sleep(input_after)
@@ -162,6 +164,56 @@ def draw_press() -> Path:
     return drawing
 
 
+async def a_tracked_seam(cell: Any) -> list[tuple[float, ...]]:
+    """Follow a seam that is bent by 5 mm, on the way back by a sensor that jumps."""
+    from math import pi, sin
+
+    from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
+    from ur_cartesian_driver.kinematics.chain import Arm
+    from ur_cartesian_driver.kinematics.robot_models import robot_model
+
+    rows: list[tuple[float, ...]] = []
+    x, y, _ = cell.memory.read().actual_tcp_pose.position
+    arm = Arm(robot_model(cell.robot.config.model))
+    setup = ArmSetup(model=arm.model, geometry=arm.geometry)
+    running = asyncio.ensure_future(a_goal('tracked_seam', arm=setup)(cell))
+    asked = nan
+    while not running.done():
+        place = cell.memory.read().actual_tcp_pose.position
+        along = (place[1] - y) / 0.2
+        is_back = bool(rows) and rows[-1][0] - rows[0][0] > 5.1
+        seen = 0.005 * sin(pi * min(max(1.25 * along, 0.0), 1.0)) ** 2
+        if len(rows) % 3 == 0 and cell.owner.motions:
+            # Across is -x on the way there, and x on the way back.
+            asked = seen if not is_back else 0.005 * (int(rows[-1][0] / 0.7) % 2)
+            cell.owner.send(SetPathOffset(motion=1, offset=(0.0, asked, 0.0), age=0.0))
+        beside = (x - place[0]) * (-1.0 if is_back else 1.0)
+        rows.append((cell.loop.time(), 1e3 * asked, 1e3 * beside))
+        await cell.sleep(CYCLE)
+    assert running.result().succeeded, running.result()
+    return rows
+
+
+def draw_path_offset() -> Path:
+    """Draw what a sensor sees and where the tool is; return the file of the picture."""
+    from matplotlib import pyplot
+    import numpy as np
+    from robot_cell import run_cell
+
+    drawing = CHECKOUT / 'doc' / 'execution_path_offset.png'
+    time, asked, beside = np.array(run_cell(a_tracked_seam)).T
+    figure, axes = pyplot.subplots(figsize=(9.0, 3.2))
+    axes.plot(time - time[0], asked, color='#9aa5b1', label='offset that came')
+    axes.plot(time - time[0], beside, color='#c8372d', label='tool')
+    axes.set(xlabel='time [s]', ylabel='across the path [mm]')
+    axes.set_title('A seam bent by 5 mm; then a sensor that jumps (path_offset)')
+    axes.legend(loc='upper right')
+    figure.tight_layout()
+    figure.savefig(drawing, dpi=100)
+    compress(drawing)
+    return drawing
+
+
 PICTURES = {
     'primitives': Picture(
         title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
@@ -247,6 +299,7 @@ def compress(drawing: Path) -> None:
 
 
 if __name__ == '__main__':
-    for wanted in sys.argv[1:] or (*PICTURES, 'press'):
-        path = draw_press() if wanted == 'press' else draw(wanted)
+    others = {'press': draw_press, 'path_offset': draw_path_offset}
+    for wanted in sys.argv[1:] or (*PICTURES, *others):
+        path = others[wanted]() if wanted in others else draw(wanted)
         sys.stdout.write(f'{path}: {path.stat().st_size / 1000:.0f} kB\n')

@@ -7,7 +7,14 @@ from dataclasses import replace
 import pytest
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.driver.ipc.channel import LENGTH, pack, SetLiveTarget, StartMotion, unpack
+from ur_cartesian_driver.driver.ipc.channel import (
+    ArmSetup,
+    LENGTH,
+    pack,
+    SetLiveTarget,
+    StartMotion,
+    unpack,
+)
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, stationary_plan
 from ur_cartesian_driver.driver.loop.goal_machine_factory import is_slow_to_make, make_machine
@@ -73,6 +80,7 @@ def start(arm=ARM, **fields):
             motion=7,
             points=b'',
             job=stationary_job(stationary_plan(STATE)),
+            arm=ArmSetup(model=arm.model, geometry=arm.geometry),
             live=live_setup(arm, HOME, PlanningOptions()),
             **fields,
         )
@@ -95,7 +103,7 @@ def test_only_a_calibrated_arm_takes_long():
     other = Arm(UR5E, replace(UR5E.geometry, a=(0.0, -0.4252, -0.3925, 0.0, 0.0, 0.0)))
     assert is_slow_to_make(start(other))
     assert not is_slow_to_make(start())
-    assert not is_slow_to_make(replace(start(), live=None))
+    assert not is_slow_to_make(replace(start(), live=None, arm=None))
 
 
 def test_another_robot_program_does_not_follow_targets():

@@ -2,11 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the owner of a motion holds."""
 
+from math import nan
 from threading import Event, Thread
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion
-from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome
 
 
@@ -14,12 +20,42 @@ class PlanWithReport:
     """A plan whose report somebody counts."""
 
     T_flange_tcp = None
+    offset_band: Any = None
     made = 0
 
     @property
     def report(self):
         self.made += 1
         return ('point 0: LINEAR -> MOVEL',)
+
+
+class PlanWithBand(PlanWithReport):
+    offset_band = SimpleNamespace(timeout=0.5)
+
+
+def test_an_offset_is_sent_in_plain_numbers():
+    sent: list[Any] = []
+    plan: Any = PlanWithBand()
+    motion = ActiveMotion(7, plan, None, sent.append).motion
+    motion.set_path_offset(across=cast('float', np.float32(0.5)), age=0.1)
+    assert sent == [SetPathOffset(motion=7, offset=(0.0, 0.5, 0.0), age=0.1)]
+    assert type(sent[0].offset[1]) is float
+
+
+@pytest.mark.parametrize(
+    ('plan', 'values', 'text'),
+    [
+        (PlanWithReport, {}, 'path_offset is empty in the goal that runs; set its limits'),
+        (PlanWithBand, {'across': nan}, 'across is nan; it must be finite'),
+        (PlanWithBand, {'normal': 'near'}, "normal is 'near'"),
+        (PlanWithBand, {'age': -1.0}, 'age is -1.0; it must be finite, and at least 0'),
+        (PlanWithBand, {'age': 0.6}, 'age is 0.600 s, path_offset.timeout is 0.5 s'),
+    ],
+)
+def test_an_offset_that_cannot_be_followed_is_refused(plan, values, text):
+    motion = ActiveMotion(7, plan(), None, lambda request: pytest.fail('was sent')).motion
+    with pytest.raises(InvalidGoal, match=text):
+        motion.set_path_offset(**values)
 
 
 def test_a_motion_can_be_cancelled_before_the_report_of_its_plan_is_made():

@@ -14,9 +14,18 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 pytestmark = pytest.mark.slow
 
 #: An arm that is held off its path is not where the next goal could begin, one that rests at a
-#: point does not move, nor does one in a function, and one that presses stops as PRIMITIVES do.
+#: point does not move, nor does one in a function, one that presses stops as PRIMITIVES do, and
+#: one whose path has given way as SERVO does.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
-for left_out in ('Waiting for the arm', 'At a point', 'At a point, SERVO', 'Scripts', 'Press'):
+LEFT_OUT = (
+    'Waiting for the arm',
+    'At a point',
+    'At a point, SERVO',
+    'Scripts',
+    'Press',
+    'Path offset',
+)
+for left_out in LEFT_OUT:
     del KINDS[left_out]
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',

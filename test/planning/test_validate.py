@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    PathOffset,
     PayloadChange,
     Posture,
     Press,
@@ -68,6 +69,7 @@ GRIND = Press(first_waypoint=0, last_waypoint=1, axes=('z',), forces=(20.0,))
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
+SIDEWAYS = (0.0, 0.005, 0.0)
 PATIENT = replace(
     TIMED,
     execution=ExecutionMode.SERVO,
@@ -757,6 +759,33 @@ REFUSALS = [
         with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))),
         InvalidGoal,
         'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go; remove',
+    ),
+    # path offsets
+    *(
+        (replace(PATIENT, path_offset=PathOffset(**fields)), InvalidGoal, text)
+        for fields, text in (
+            ({'limits': (0.0, -0.1, 0.0)}, 'path_offset.limits.y is -0.1 m, outside 0 to 0.1 m'),
+            ({'limits': (0.0, 0.0, 0.2)}, 'path_offset.limits.z is 0.2 m, outside 0 to 0.1 m'),
+            ({'limits': (nan, 0.0, 0.0)}, 'path_offset.limits.x is nan m'),
+            ({'limits': SIDEWAYS, 'speed': 0.2}, 'path_offset.speed is 0.2 m/s, outside 0 to 0.1'),
+            ({'limits': SIDEWAYS, 'acceleration': inf}, 'path_offset.acceleration is inf m/s^2'),
+            (
+                {'limits': SIDEWAYS, 'timeout': nan},
+                'path_offset.timeout is nan s, outside 0 to 60',
+            ),
+            ({'speed': 0.01}, 'path_offset.limits are all 0'),
+        )
+    ),
+    *(
+        (
+            replace(TIMED, execution=mode, path_offset=PathOffset(limits=SIDEWAYS)),
+            NotAvailable,
+            f'path_offset is set, but the robot {text}',
+        )
+        for mode, text in (
+            (ExecutionMode.PRIMITIVES, 'makes the path of a PRIMITIVES goal by itself'),
+            (ExecutionMode.SPLINE, 'has the joints of a SPLINE goal before it moves'),
+        )
     ),
 ]
 

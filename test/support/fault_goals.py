@@ -9,7 +9,7 @@ by the position of the tool; never by the time that it should take.
 
 from dataclasses import replace
 from functools import lru_cache
-from math import atan2, cos, dist, pi, sin
+from math import atan2, cos, dist, hypot, pi, sin
 
 import example_goals
 from fault_table import BEFORE
@@ -17,6 +17,7 @@ import robot_cell
 from robot_cell import CellMotion, CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.appender import encode_plan
+from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
 from ur_cartesian_driver.driver.live_session import stationary_job, stationary_plan
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -30,6 +31,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    PathOffset,
     Press,
     PressFrame,
     ProportionalOutput,
@@ -108,6 +110,8 @@ class FaultGoal:
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion: CellMotion | None = None
 
+    #: The arm, for a goal whose path may give way.
+    arm: ArmSetup | None = None
     #: Whether its process has an output that has to be safe.
     has_process = True
     #: Whether the arm was in place already in a pause: the output is restored if the goal goes on
@@ -121,7 +125,7 @@ class FaultGoal:
 
     def send_motion(self):
         """Send it to the robot loop."""
-        self.motion = self.cell.owner.start(self.plan)
+        self.motion = self.cell.owner.start(self.plan, arm=self.arm)
 
     def switch_process(self, on):
         """Switch the output of the process, as the program of a cell would."""
@@ -392,6 +396,37 @@ class WaitingGoal(ServoGoal):
             self._pushed_until = self.cell.loop.time() + PUSHED + 0.05  # until it is reported
             self.cell.robot.inject(f'offset pose z {2.0 * PATH_TOLERANCE} for {PUSHED} s')
         return self._pushed_until and self.cell.at_rest()
+
+
+#: How far the path of a goal gives way [m].
+SIDEWAYS = 0.002
+
+
+@lru_cache
+def displaced_half_circle(start):
+    """Return the plan of a half circle that may be left by 2 mm to its sides."""
+    goal = replace(
+        half_circle_goal(start.state, ExecutionMode.SERVO),
+        path_offset=PathOffset(limits=(0.0, SIDEWAYS, 0.0), speed=0.02, acceleration=0.5),
+    )
+    return plan(goal, start.state, ARM, OPTIONS)
+
+
+class OffsetGoal(ServoGoal):
+    """The same half circle, beside which the tool moves because an offset came once."""
+
+    arm = ArmSetup(model=ARM.model, geometry=ARM.geometry)
+
+    def plan_from(self, start):
+        return displaced_half_circle(start)
+
+    def is_in(self, phase):
+        assert phase == 'beside its path'
+        offset = (0.0, SIDEWAYS, 0.0)
+        motion = len(self.cell.owner.motions)
+        self.cell.owner.send(SetPathOffset(motion=motion, offset=offset, age=0.0))
+        x, y = self.tool_offset()
+        return self.fraction() > 0.5 and hypot(x, y - RADIUS) < RADIUS - 0.9 * SIDEWAYS
 
 
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the
@@ -723,6 +758,7 @@ GOALS = {
     'SPLINE': SplineGoal,
     'SERVO': ServoGoal,
     'Waiting for the arm': WaitingGoal,
+    'Path offset': OffsetGoal,
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,

@@ -334,6 +334,25 @@ WAITING = _mode(
     pendant=('protective stop',),
 )
 
+PATH_OFFSET = _mode(
+    'Path offset',
+    'The same set-points with `path_offset`; an offset has moved the tool 2 mm to the side. '
+    'Whatever ends the goal, the arm brakes where it is, beside the path; a pause and the slider '
+    'keep it there.',
+    {'beside its path': 'between the points, the path has given way'},
+    1.8,
+    {},
+    faults=(
+        'protective stop',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'the pose is measured 6 mm off',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
@@ -515,6 +534,7 @@ MODES = (
     SPLINE,
     SERVO,
     WAITING,
+    PATH_OFFSET,
     APPEND,
     OUTPUTS,
     AT_A_POINT,

@@ -28,6 +28,7 @@ COMPUTING = (
     'test/acceptance/test_script_calls.py',
     'test/acceptance/test_io_commands.py',
     'test/acceptance/test_live_sessions.py',
+    'test/acceptance/test_path_offsets.py',
     'test/acceptance/test_proportional_outputs.py',
     'test/acceptance/test_safe_outputs.py',
     'test/acceptance/test_servo_drives_the_guide.py',

@@ -110,8 +110,8 @@ class Owner:
     def send(self, request):
         self._writer.write(pack(request))
 
-    def start(self, plan):
-        return self.run(encode_points(plan.instructions), job_from_plan(plan))
+    def start(self, plan, **more):
+        return self.run(encode_points(plan.instructions), job_from_plan(plan), **more)
 
     def run(self, points, job, **more):
         number = len(self.motions) + 1

@@ -21,6 +21,7 @@ from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.driver.callbacks import LOG, run_callback
 from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
+    ArmSetup,
     CallAnswered,
     CallRobot,
     Configure,
@@ -477,6 +478,9 @@ class Driver(RobotServices, InteractiveMotions):
             points=points,
             job=job,
             live=live,
+            arm=None
+            if live is None and job.offset_band is None
+            else ArmSetup(model=self.arm.model, geometry=self.arm.geometry),
             freedrive=freedrive,
             plan_metadata=plan_metadata(plan, self.options)
             if self.config.record_directory

@@ -256,8 +256,6 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
             max_age=options.live_target_max_age,
             timeout=options.live_target_timeout,
         ),
-        model=arm.model,
-        geometry=arm.geometry,
         start=start,
     )
 

@@ -7,15 +7,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from math import isfinite
 import threading
 
 from ur_cartesian_driver.driver.appender import Appender, AppendResult
 from ur_cartesian_driver.driver.callbacks import run_callback
-from ur_cartesian_driver.driver.ipc.channel import CancelMotion, Request, TemporaryTcpSet
-from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.driver.ipc.channel import (
+    CancelMotion,
+    Request,
+    SetPathOffset,
+    TemporaryTcpSet,
+)
+from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.vectors import vector3
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 OnProgress = Callable[[Progress], None]
@@ -36,6 +44,8 @@ class MotionHandle:
         self._outcome, self._send, self._make_report = outcome, send, make_report
         #: Appends points; None = the goal was sent without keep_open. Set by the driver.
         self.appender: Appender | None = None
+        #: How old path offsets may be [s]; None = the goal permits none. Set by the driver.
+        self.offset_timeout: float | None = None
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
@@ -81,6 +91,39 @@ class MotionHandle:
             )
         )
 
+    def set_path_offset(
+        self, *, along: float = 0.0, across: float = 0.0, normal: float = 0.0, age: float = 0.0
+    ) -> None:
+        """
+        Displace the tool from its path from now on; ignored by a motion that has ended.
+
+        :param along: [m], in the frame of the path
+            (:mod:`~ur_cartesian_driver.motion.offset_band`), as ``across`` and ``normal``; what is
+            beyond ``path_offset.limits`` of the goal is cut.
+        :param age: how long ago that was measured [s].
+        :raises InvalidGoal: the goal permits no offset, a number is none, or the age is more than
+            ``path_offset.timeout``; the offset before stays.
+        """
+        if self.offset_timeout is None:
+            raise InvalidGoal(
+                'path_offset', 'is empty in the goal that runs', 'set its limits in the goal'
+            )
+        values = {'along': along, 'across': across, 'normal': normal, 'age': age}
+        for name, value in values.items():
+            try:
+                values[name] = with_declared_types(value, float, name)
+            except WrongType as error:
+                raise InvalidGoal(error.field, error.problem) from None
+            if not isfinite(values[name]) or (name == 'age' and value < 0.0):
+                bound = ', and at least 0' if name == 'age' else ''
+                raise InvalidGoal(name, f'is {value}; it must be finite{bound}')
+        *offset, age = values.values()
+        if age > self.offset_timeout:
+            raise InvalidGoal(
+                'age', f'is {age:.3f} s, path_offset.timeout is {self.offset_timeout:g} s'
+            )
+        self._send(SetPathOffset(motion=self.number, offset=vector3(offset), age=age))
+
     def done(self) -> bool:
         """Tell whether the outcome is there."""
         return self._outcome.done()
@@ -125,6 +168,8 @@ class ActiveMotion:
         self._ended: Outcome | None = None
         #: What the owner holds.
         self.motion = MotionHandle(number, self._outcome, send, self.make_report)
+        if plan.offset_band is not None:
+            self.motion.offset_timeout = plan.offset_band.timeout
         #: The TCP that the robot has as long as this motion runs.
         self.temporary_tcp = (
             None

@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.goal import (
     IOCommand,
     OnPathTolerance,
     OutputKind,
+    PathOffset,
     PayloadChange,
     Posture,
     Press,
@@ -37,6 +38,7 @@ from ur_cartesian_driver.motion.goal import (
     ScriptCall,
     Segment,
     SegmentType,
+    StaleOffset,
     Tolerance,
 )
 from ur_cartesian_driver.motion.goal_table import (
@@ -147,6 +149,7 @@ def goal_from_fields(message: Message) -> GoalTable:
             for i, output in enumerate(message.proportional_outputs)
         ),
         presses=tuple(_press(press, f'presses[{i}]') for i, press in enumerate(message.presses)),
+        path_offset=_path_offset(message.path_offset),
     )
 
 
@@ -284,6 +287,16 @@ def _press(press: Message, field: str) -> Press:
         speed_limits=tuple(press.speed_limits),
         contact=_member(ContactEnd, press.contact, f'{field}.contact'),
         **{name: getattr(press, name) for name in PRESS_SETTINGS},
+    )
+
+
+def _path_offset(offset: Message) -> PathOffset:
+    return PathOffset(
+        limits=_three(offset.limits),
+        speed=offset.speed,
+        acceleration=offset.acceleration,
+        timeout=offset.timeout,
+        on_stale=_member(StaleOffset, offset.on_stale, 'path_offset.on_stale'),
     )
 
 

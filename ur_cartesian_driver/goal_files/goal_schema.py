@@ -146,6 +146,13 @@ GOAL: Mapping[str, Any] = {
     'min_speed_fraction': 0.0,
     'on_path_tolerance': UINT8,
     'stall_timeout': TIME,
+    'path_offset': {
+        'limits': VECTOR,
+        'speed': 0.0,
+        'acceleration': 0.0,
+        'timeout': 0.0,
+        'on_stale': UINT8,
+    },
 }
 
 

@@ -112,6 +112,15 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
             'min_speed_fraction': table.min_speed_fraction,
             'on_path_tolerance': int(table.on_path_tolerance),
             'stall_timeout': _duration(table.stall_timeout),
+            'path_offset': _given(
+                {
+                    'limits': _vector(table.path_offset.limits) if table.path_offset else None,
+                    'speed': table.path_offset.speed,
+                    'acceleration': table.path_offset.acceleration,
+                    'timeout': table.path_offset.timeout,
+                    'on_stale': int(table.path_offset.on_stale),
+                }
+            ),
         }
     )
 

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal import SafeOutput
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
 
 
 class TrajectoryResult(IntEnum):
@@ -136,6 +136,8 @@ class Progress:
     timestamp: float = 0.0
     #: Whether the arm is at rest and the goal waits for more points (keep_open).
     awaiting_points: bool = False
+    #: How far the path has given way: along, across, normal [m].
+    path_offset: Vector3 = ZERO3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -109,6 +109,19 @@ PRESS_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 #: How far the tool may give way where a press does not say it [m], [rad].
 DEFAULT_YIELDS = (0.02, 0.2)
 
+
+class StaleOffset(IntEnum):
+    """What becomes of a path offset of which no newer one comes."""
+
+    #: It stays.
+    HOLD = 0
+    #: The tool goes back to its path.
+    FADE = 1
+
+
+#: Speed [m/s], acceleration [m/s^2] and timeout [s] of a path offset where the goal gives none.
+DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
+
 #: How much later than planned the end may come where the goal does not say it [s], also how long
 #: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -300,6 +313,24 @@ class Tolerance:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PathOffset:
+    """How far the path may give way to offsets that come while the arm moves."""
+
+    #: Along the path, across it and normal to both [m]; 0 = not at all.
+    limits: Vector3 = ZERO3
+    #: Largest speed [m/s] and acceleration [m/s^2] along each of them; 0 = the default.
+    speed: float = 0.0
+    acceleration: float = 0.0
+    #: An offset is stale when it is so old [s]; 0 = the default.
+    timeout: float = 0.0
+    on_stale: StaleOffset = StaleOffset.HOLD
+
+    def __bool__(self) -> bool:
+        """Tell whether the path may give way."""
+        return any(self.limits)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A Cartesian trajectory and how to execute it."""
 
@@ -333,3 +364,4 @@ class Goal:
     payload_changes: tuple[PayloadChange, ...] = ()
     proportional_outputs: tuple[ProportionalOutput, ...] = ()
     presses: tuple[Press, ...] = ()
+    path_offset: PathOffset = PathOffset()

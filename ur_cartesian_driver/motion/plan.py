@@ -19,8 +19,16 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.offset_band import OffsetBand
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Instruction, OutputRecord, Primitive, Stop
+from ur_cartesian_driver.motion.primitive import (
+    Instruction,
+    OutputRecord,
+    Primitive,
+    Spline,
+    Stop,
+)
 from ur_cartesian_driver.motion.slow_stretch import SlowStretch
 from ur_cartesian_driver.motion.vectors import Joints, vector6
 
@@ -235,6 +243,8 @@ class Plan:
     T_tcp_controlled: Pose = IDENTITY
     #: PRIMITIVES, SPLINE or SERVO: how it is carried out.
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
+    #: Where the path may give way; None = nowhere.
+    offset_band: OffsetBand | None = None
     #: What is ignored, slowed or changed, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
     #: Finds where the tool is slower than asked: long goals have many such stretches.
@@ -257,6 +267,12 @@ class Plan:
         lines = (line + rows.notes.get(i, '') for i, line in enumerate(rows.report_lines))
         slow = (stretch.line for stretch in self.find_slow_stretches())
         return (*filter(None, lines), *self.remarks, *slow)
+
+    @property
+    def joint_spline(self) -> JointSpline:
+        """The joints over time, where all primitives are splines."""
+        pieces = (piece for piece in self.rows.primitives if isinstance(piece, Spline))
+        return JointSpline.of(self.start, pieces)
 
     @property
     def instructions(self) -> Iterator[Instruction]:

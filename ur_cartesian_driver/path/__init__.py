@@ -13,7 +13,7 @@ Compose a path of the tool in a few lines, without ROS and for ROS.
 
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ContactEnd, PressFrame, Tolerance
+from ur_cartesian_driver.motion.goal import ContactEnd, PressFrame, StaleOffset, Tolerance
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.motion.pose import Pose
@@ -59,6 +59,7 @@ __all__ = [
     'Pose',
     'PressFrame',
     'ResumedGoal',
+    'StaleOffset',
     'StaticFrame',
     'Tolerance',
     'X',

@@ -26,7 +26,14 @@ from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, OnPathTolerance, Segment, Tolerance
+from ur_cartesian_driver.motion.goal import (
+    Goal,
+    OnPathTolerance,
+    PathOffset,
+    Segment,
+    StaleOffset,
+    Tolerance,
+)
 from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -114,6 +121,37 @@ class Path(PathWithEvents):
     def steady(self, min_fraction: float = 0.95) -> Path:
         """Refuse the path where the tool would be slower than this part of its speed (0 to 1)."""
         return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
+
+    def path_offset(
+        self,
+        *,
+        along: float = 0.0,
+        across: float = 0.0,
+        normal: float = 0.0,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        timeout: float = 0.0,
+        on_stale: StaleOffset = StaleOffset.HOLD,
+    ) -> Path:
+        """
+        Let the path give way to offsets that come while the arm moves, SERVO only.
+
+        They are given by ``set_path_offset`` of the running motion, or on ``~/path_offset``.
+
+        :param along: how far to both sides [m], as ``across`` the path and ``normal`` to it.
+        :param speed: of the offset along each axis [m/s]; 0 = 0.02.
+        :param acceleration: [m/s^2]; 0 = 0.2.
+        :param timeout: an offset that is older [s] is stale; 0 = 0.5.
+        :param on_stale: whether a stale offset stays, or the tool goes back to its path.
+        """
+        offset = PathOffset(
+            limits=(along, across, normal),
+            speed=speed,
+            acceleration=acceleration,
+            timeout=timeout,
+            on_stale=on_stale,
+        )
+        return self._with(_settings=replace(self._settings, path_offset=offset))
 
     def keep_open(self) -> Path:
         """Let points be appended while the arm moves."""

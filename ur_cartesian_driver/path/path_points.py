@@ -15,6 +15,7 @@ from ur_cartesian_driver.motion.goal import (
     InputWait,
     IOCommand,
     OnPathTolerance,
+    PathOffset,
     PayloadChange,
     Press,
     ProportionalOutput,
@@ -97,6 +98,7 @@ class PathSettings:
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
     stall_timeout: float = 0.0
     min_speed_fraction: float = 0.0
+    path_offset: PathOffset = field(default_factory=PathOffset)
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,11 @@ from ur_cartesian_driver.planning.moves.slow_moves import slow_move_stretches, u
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.offset_bands import (
+    offset_band,
+    offset_remarks,
+    OffsetBandCheck,
+)
 from ur_cartesian_driver.planning.preflight.start_checks import (
     check_approach,
     check_reported_tcp,
@@ -222,13 +227,33 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         first=first,
         tool_tips=tool_tips(goal, planner.T_flange_active),
     )
-    return planner.plan(
+    planned = planner.plan(
         stretch_times(goal, found.stretch),
         found.segments,
         found.reference,
         found.remarks,
         found.find_slow_stretches,
     )
+    return _with_offset_band(planned, planner) if goal.path_offset else planned
+
+
+def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
+    """
+    Return a plan whose path may give way.
+
+    :raises GoalRefused: nowhere, or the arm could not be everywhere in the band.
+    """
+    band = offset_band(plan.goal.path_offset, plan.reference, plan.T_tcp_controlled)
+    OffsetBandCheck(
+        kinematics=planner.kinematics,
+        options=planner.options,
+        band=band,
+        reference=plan.reference,
+        spline=plan.joint_spline,
+        tool_tips=tool_tips(planner.goal, planner.T_flange_active),
+    ).check()
+    remarks = (*plan.remarks, *offset_remarks(band, plan.duration))
+    return replace(plan, offset_band=band, remarks=remarks)
 
 
 class GoalPlanner:

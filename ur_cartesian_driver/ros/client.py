@@ -19,12 +19,14 @@ from types import FrameType
 from typing import Any, TypeAlias
 
 from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Header
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
@@ -173,6 +175,7 @@ class GoalClient:
             rclpy.init(args=[], context=self._own_context)
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
+        self._offsets: Any = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
         #: None: another one spins the node.
         self._executor: SingleThreadedExecutor | None = None
@@ -281,6 +284,25 @@ class GoalClient:
         """
         _, result = self.send(path.to_message(), on_feedback, timeout)
         return outcome_of(result)
+
+    def set_path_offset(
+        self, *, along: float = 0.0, across: float = 0.0, normal: float = 0.0
+    ) -> None:
+        """
+        Displace the tool from its path from now on, if the goal that runs permits it.
+
+        May be called from anywhere while the goal runs, also from the callback of :meth:`send`.
+
+        :param along: [m], in the frame of the path, as ``across`` and ``normal``; what is beyond
+            ``path_offset.limits`` of the goal is cut.
+        """
+        if self._offsets is None:
+            self._offsets = self._node.create_publisher(
+                Vector3Stamped, f'{self._driver}/path_offset', 1
+            )
+        header = Header(stamp=self._node.get_clock().now().to_msg())
+        vector = Vector3(x=along, y=across, z=normal)
+        self._offsets.publish(Vector3Stamped(header=header, vector=vector))
 
     def wait_ready(self, timeout: float) -> None:
         """

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo_report import ServoReport
-from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.motion.vectors import Joints, Vector3
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
@@ -81,13 +81,18 @@ class Configure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ArmSetup:
+    """The arm, with its calibration and its limits, as far as they are known."""
+
+    model: RobotModel
+    geometry: DhTable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSetup:
     """What a live session needs beside its job."""
 
     settings: LiveSettings
-    #: The arm, with its calibration and its limits, as far as they are known.
-    model: RobotModel
-    geometry: DhTable
     #: Where the arm stands [rad].
     start: Joints
 
@@ -101,6 +106,8 @@ class StartMotion:
     points: bytes
     #: Metadata of the plan for the recording, as JSON; empty = none.
     plan_metadata: str = ''
+    #: Where set-points are displaced, or lead to live targets: the arm.
+    arm: ArmSetup | None = None
     #: A session of live targets; None = a goal.
     live: LiveSetup | None = None
     #: Whether a person guides the arm by hand.
@@ -113,6 +120,17 @@ class SetLiveTarget:
 
     motion: int
     T_base_tcp: Pose
+    #: How old it is [s].
+    age: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPathOffset:
+    """Give a motion whose path may give way another offset."""
+
+    motion: int
+    #: Along, across, normal [m].
+    offset: Vector3
     #: How old it is [s].
     age: float
 
@@ -246,6 +264,7 @@ Request: TypeAlias = (
     | StartMotion
     | AppendToMotion
     | SetLiveTarget
+    | SetPathOffset
     | CancelMotion
     | ResendProgram
     | CallRobot

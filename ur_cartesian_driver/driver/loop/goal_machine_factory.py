@@ -9,7 +9,7 @@ from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TypeAlias
 
-from ur_cartesian_driver.driver.ipc.channel import LiveSetup, StartMotion
+from ur_cartesian_driver.driver.ipc.channel import ArmSetup, LiveSetup, StartMotion
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
@@ -21,12 +21,12 @@ from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 
 #: What the registry of execution modes names as feeder.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
@@ -68,13 +68,17 @@ def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
         lookahead_time=config.servoj_lookahead_time,
     )
     if request.live is not None:
-        targets = _live_targets(request.live, job)
+        assert request.arm is not None
+        targets = _live_targets(request.live, request.arm, job)
         return LiveFeeder(GoalMonitor(job, ANY_DEVIATION), targets, settings)
     if request.freedrive:
         return FreedriveFeeder(GoalMonitor(job, ANY_DEVIATION), settings)
     assert job.spline is not None
-    stream = ServoStream(SplineSetpoints(job.spline), settings)
-    return ServoFeeder(_monitor(request, config), stream)
+    setpoints = SplineSetpoints(job.spline)
+    if job.offset_band is None or request.arm is None:
+        return ServoFeeder(_monitor(request, config), ServoStream(setpoints, settings))
+    offsets = OffsetSetpoints(setpoints, job.offset_band, _arm(request.arm))
+    return ServoFeeder(_monitor(request, config), ServoStream(offsets, settings), offsets)
 
 
 def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
@@ -83,20 +87,20 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 
 def is_slow_to_make(request: StartMotion) -> bool:
     """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
-    live = request.live
-    return live is not None and live.geometry != live.model.geometry
+    arm = request.arm
+    return arm is not None and arm.geometry != arm.model.geometry
 
 
-def _live_targets(live: LiveSetup, job: MotionJob) -> LiveTargets:
+def _live_targets(live: LiveSetup, arm: ArmSetup, job: MotionJob) -> LiveTargets:
     generator = OnlineTrajectoryGenerator(
-        _arm(live.model, live.geometry), job.T_flange_active, live.start, live.settings.limits
+        _arm(arm), job.T_flange_active, live.start, live.settings.limits
     )
     return LiveTargets(generator, live.settings)
 
 
 @lru_cache(maxsize=4)
-def _arm(model: RobotModel, geometry: DhTable) -> Arm:
+def _arm(setup: ArmSetup) -> Arm:
     """Return the arm of a robot; the slow computations of a calibrated one are done once."""
-    arm = Arm(model, geometry)
+    arm = Arm(setup.model, setup.geometry)
     ideal_arm_of(arm)
     return arm

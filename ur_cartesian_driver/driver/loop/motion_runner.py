@@ -20,6 +20,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     MotionProgress,
     ServoProgress,
     SetLiveTarget,
+    SetPathOffset,
     StartMotion,
     TemporaryTcpRestored,
     TemporaryTcpSet,
@@ -196,6 +197,11 @@ class MotionRunner:
         """Give the session that runs another target, if it is for it."""
         if request.motion == self._number and self._machine is not None:
             self._machine.feeder.set_target(request.T_base_tcp, request.age, _now())
+
+    def set_path_offset(self, request: SetPathOffset) -> None:
+        """Give the motion that runs another path offset, if it is for it."""
+        if request.motion == self._number and self._machine is not None:
+            self._machine.feeder.set_path_offset(request.offset, request.age, _now())
 
     def cancel(self, request: CancelMotion) -> None:
         """Stop the motion, if it is the one that runs."""

@@ -34,6 +34,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
     Request,
     ResendProgram,
     SetLiveTarget,
+    SetPathOffset,
     Shutdown,
     SignalsChanged,
     StartMotion,
@@ -166,6 +167,8 @@ class RobotLoop:
                 await self._motion.append(request)
             case SetLiveTarget():
                 self._motion.set_live_target(request)
+            case SetPathOffset():
+                self._motion.set_path_offset(request)
             case CancelMotion():
                 self._motion.cancel(request)
             case ResendProgram():

@@ -22,8 +22,10 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 )
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.events import Event
+from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector3
 
 
 class Feeder(ABC):
@@ -81,6 +83,16 @@ class Feeder(ABC):
         """
         return False
 
+    def set_path_offset(self, offset: Vector3, age: float, now: float) -> bool:
+        """
+        Take a path offset; False = the goal permits none.
+
+        :param offset: along the path, across it and normal to both [m].
+        :param age: how long ago it was true [s].
+        :param now: time of a steady clock [s].
+        """
+        return False
+
     # ---- what the robot confirms --------------------------------------------------------------
 
     def take(self, event: Event, now: float) -> list[GoalCommand]:
@@ -107,6 +119,10 @@ class Feeder(ABC):
             the controller's target may be behind it.
         """
         return (packet.points_begun if self.monitor.job.reports_points_begun else None), 0
+
+    def applied_offset(self, packet: RobotState) -> AppliedOffset:
+        """Return how far the path has given way where the arm is."""
+        return NO_OFFSET
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
         """

@@ -203,7 +203,13 @@ class GoalMachine:
         if self.temporary_tcp is not None:
             self.temporary_tcp.observe(packet, now)
         begun, behind = self.feeder.motions_begun(packet)
-        self._monitor.update(packet, begun, behind, moving=self.state in RUNNING_STATES)
+        self._monitor.update(
+            packet,
+            begun,
+            behind,
+            moving=self.state in RUNNING_STATES,
+            applied_offset=self.feeder.applied_offset(packet),
+        )
         if self.state is GoalState.SETTLING:  # its time is that of the controller
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time

@@ -21,9 +21,11 @@ from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
 from ur_cartesian_driver.motion.events import PathPlace, Progress
+from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.vectors import add, scale, Vector3
 
 #: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
@@ -77,6 +79,7 @@ class GoalMonitor:
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
+        self._applied_offset = NO_OFFSET
         #: Scaled time: time since the start, as the controller's clock ran [s].
         self.scaled_time = 0.0
         #: By how much the slider or a pause delayed the controller's clock in the newest packet,
@@ -98,15 +101,23 @@ class GoalMonitor:
         self.scaled_time = self._tracker.time()  # waiting at rest is no delay of the motion
 
     def update(
-        self, state: RobotState, begun: int | None, behind: int = 0, *, moving: bool
+        self,
+        state: RobotState,
+        begun: int | None,
+        behind: int = 0,
+        *,
+        moving: bool,
+        applied_offset: AppliedOffset = NO_OFFSET,
     ) -> None:
         """
         Take a packet; while the goal moves the arm: also time, and position on the path.
 
         :param begun: how many motions the robot reports as begun; None = it reports none.
         :param behind: by how many motions the controller's target may be behind that.
+        :param applied_offset: how far the path has given way there.
         """
         before, self.latest = self.latest, state
+        self._applied_offset = applied_offset
         self._reported_begun, self._behind = begun, behind
         passed = 0.0 if before is None else max(0.0, state.timestamp - before.timestamp)
         playing = state.runtime_state is RuntimeState.PLAYING
@@ -233,11 +244,15 @@ class GoalMonitor:
             lag=lag,
             timestamp=state.timestamp,
             awaiting_points=waits,
+            path_offset=self._applied_offset.offset,
         )
 
     def _desired(self, state: RobotState) -> Pose:
         """Return where the tool should be, near its progress."""
-        return self._tracker.desired(self._tracked(state.actual_tcp_pose), state.target_tcp_twist)
+        planned = self._tracker.desired(
+            self._tracked(state.actual_tcp_pose), state.target_tcp_twist
+        )
+        return _moved(planned, self._applied_offset.shift)
 
     # ---- whether it is what was planned -------------------------------------------------------
 
@@ -329,6 +344,7 @@ class GoalMonitor:
 
     def _tracked(self, pose: Pose) -> Pose:
         """Return the pose that tells how far the tool is on its path."""
+        pose = _moved(pose, scale(self._applied_offset.shift, -1.0))
         press = self._press()
         if press is None or self._tracker.time() > press.end:
             return pose
@@ -338,7 +354,8 @@ class GoalMonitor:
         )
 
     def _stiff(self, pose: Pose) -> Pose:
-        """Return a pose of the tool without what it has given way."""
+        """Return a pose of the tool without what it, or its path, has given way."""
+        pose = _moved(pose, scale(self._applied_offset.shift, -1.0))
         press = self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 
@@ -420,6 +437,11 @@ class GoalMonitor:
         return check.violation(
             desired @ T_tcp_controlled, shift_reference_point(state, T_tcp_controlled)
         )
+
+
+def _moved(pose: Pose, shift: Vector3) -> Pose:
+    """Return a pose, moved along the axes of the base."""
+    return pose if not any(shift) else Pose(add(pose.position, shift), pose.quaternion)
 
 
 def _stands_still(before: RobotState | None, state: RobotState) -> bool:

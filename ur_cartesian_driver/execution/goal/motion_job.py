@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, stops
+from ur_cartesian_driver.motion.offset_band import OffsetBand
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.pose_rows import Floats
@@ -32,7 +33,6 @@ from ur_cartesian_driver.motion.primitive import (
     AwaitInput,
     CallFunction,
     OutputRecord,
-    Spline,
     SwitchOutput,
 )
 from ur_cartesian_driver.motion.vectors import vector6
@@ -98,6 +98,8 @@ class MotionJob:
     stall_timeout: float = 0.0
     #: Analog outputs that the robot program writes again after a pause by itself.
     following_outputs: frozenset[int] = frozenset()
+    #: Where the path may give way; None = nowhere.
+    offset_band: OffsetBand | None = None
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
@@ -216,15 +218,12 @@ def job_from_plan(
             or has_optimized(rows.primitives)
         ),
         execution=plan.execution,
+        offset_band=plan.offset_band,
         waypoint=np.repeat(rows.waypoints, records),
         is_motion=is_motion,
         end_times=np.repeat(end_times, records),
         request_times=np.repeat(request_times, records),
-        spline=JointSpline.of(
-            plan.start, (piece for piece in rows.primitives if isinstance(piece, Spline))
-        )
-        if plan.execution.traits.streams_setpoints
-        else None,
+        spline=plan.joint_spline if plan.execution.traits.streams_setpoints else None,
     )
 
 

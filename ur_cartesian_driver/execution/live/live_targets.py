@@ -17,6 +17,7 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     LiveLimits,
     OnlineTrajectoryGenerator,
 )
+from ur_cartesian_driver.execution.servo.freshness import Freshness
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Joints
 
@@ -48,13 +49,10 @@ class LiveTargets:
     def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
         """Begin with no target."""
         self.generator = generator
-        #: How many targets were followed, and how many were ignored as older than another one or
-        #: too old.
-        self.accepted = self.dropped = 0
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
         self.settings = settings
-        self._stamp = -inf
+        self._freshness = Freshness(settings.max_age)
         self._last_came = inf
         self._is_over = False
         # The first wording of each reason.
@@ -66,20 +64,16 @@ class LiveTargets:
 
         :param age: how long ago it was true [s].
         """
-        stamp = now - max(0.0, age)
         self._last_came = now
-        if stamp <= self._stamp or not age <= self.settings.max_age:  # NaN is no age
-            self.dropped += 1
+        if not self._freshness.accept(age, now):
             return
-        self._stamp = stamp
-        self.accepted += 1
         self._is_over = False
         self.generator.set_target(T_base_tcp)
 
     def update(self, now: float) -> None:
         """Drop the newest target if it is too old; end the session after the timeout."""
         generator = self.generator
-        if generator.target is not None and now - self._stamp > self.settings.max_age:
+        if generator.target is not None and self._freshness.is_stale(now):
             # An arm that rests at its target is not stopped by that.
             self.pauses += not generator.arrived
             generator.clear_target()
@@ -94,6 +88,16 @@ class LiveTargets:
         if reason := self.generator.blocked:
             self._reasons.setdefault(_without_numbers(reason), reason)
         return q
+
+    @property
+    def accepted(self) -> int:
+        """How many targets were followed."""
+        return self._freshness.accepted
+
+    @property
+    def dropped(self) -> int:
+        """How many were ignored as older than another one, or too old."""
+        return self._freshness.dropped
 
     @property
     def done(self) -> bool:

@@ -16,13 +16,14 @@ The length of a cycle is an argument; there is no clock in here.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, inf, isfinite, sin, sqrt
+from math import cos, inf, isfinite, sin
 
 from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace, WorkspaceGuard
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import explain_unreachable
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances, track_pose
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.approach import approach_speed, ARRIVAL_TOLERANCE
 from ur_cartesian_driver.motion.pose import (
     conjugate,
     multiply,
@@ -41,10 +42,6 @@ from ur_cartesian_driver.motion.vectors import (
     ZERO3,
 )
 
-#: Part of the acceleration that braking for a target is planned with; the rest is for corrections.
-_BRAKING_FRACTION = 0.8
-#: A target within this distance is reached [m, rad].
-_ARRIVAL_TOLERANCE = 1e-9
 #: A stopped arm goes on only if it can go at least so far [m], [rad]; otherwise it would jitter at
 #: a bound.
 _MIN_RESTART_MOTION = (0.002, 0.01)
@@ -147,8 +144,8 @@ class OnlineTrajectoryGenerator:
         return (
             self.at_rest
             and self._target is not None
-            and self.T_base_tcp.distance_to(self._target) < _ARRIVAL_TOLERANCE
-            and self.T_base_tcp.angle_to(self._target) < 2.0 * _ARRIVAL_TOLERANCE
+            and self.T_base_tcp.distance_to(self._target) < ARRIVAL_TOLERANCE
+            and self.T_base_tcp.angle_to(self._target) < 2.0 * ARRIVAL_TOLERANCE
         )
 
     def set_target(self, T_base_tcp: Pose) -> None:
@@ -281,7 +278,7 @@ class OnlineTrajectoryGenerator:
             self.T_base_tcp.distance_to(self._target) / _MIN_RESTART_MOTION[0],
             self.T_base_tcp.angle_to(self._target) / _MIN_RESTART_MOTION[1],
         )
-        if ratio < _ARRIVAL_TOLERANCE:
+        if ratio < ARRIVAL_TOLERANCE:
             return True
         self._q_stop = self.q
         return not self._violation_at_stop(
@@ -345,23 +342,11 @@ def _pose_difference(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
 def _approach_velocity(
     difference: Vector3, limit: float, acceleration: float, dt: float
 ) -> Vector3:
-    """
-    Return the velocity of the next cycle for a path that ends at rest.
-
-    The speed v at which one cycle of length dt, followed by braking by b dt in each cycle, covers
-    the distance d is v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2: after each such cycle the formula
-    gives exactly b dt less. The last step is d / dt.
-    """
+    """Return the velocity of the next cycle for a path that ends at rest."""
     distance = norm(difference)
-    if distance < _ARRIVAL_TOLERANCE:
+    if distance < ARRIVAL_TOLERANCE:
         return ZERO3
-    half = 0.5 * _BRAKING_FRACTION * acceleration * dt
-    speed = min(
-        limit,
-        sqrt(half * half + 2.0 * _BRAKING_FRACTION * acceleration * distance) - half,
-        distance / dt,
-    )
-    return scale(difference, speed / distance)
+    return scale(difference, approach_speed(distance, limit, acceleration, dt) / distance)
 
 
 def _limit_change(speed: Vector3, desired: Vector3, limit: float) -> Vector3:

@@ -43,12 +43,14 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     NO_MEANING,
 )
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
+from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
 from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
-from ur_cartesian_driver.motion.vectors import subtract6, Vector6, vector6
+from ur_cartesian_driver.motion.vectors import subtract6, Vector3, Vector6, vector6
 
 #: The connection to the inputs, as :class:`LinkLost` names it.
 SERVO_LINK = 'RTDE inputs'
@@ -58,6 +60,8 @@ ANSWER_TIMEOUT = 1.0
 #: The controller's target is behind the set-point that the arm is led to by about the lookahead
 #: time of ``servoj``, by more with a low gain: so many lookahead times at most.
 MAX_LAG_LOOKAHEADS = 4.0
+#: Shortest time between two warnings of the same kind [s].
+WARNING_PERIOD = 2.0
 #: So near to its last set-point servoj has come to its end [rad].
 _END_TOLERANCE = 1e-4
 
@@ -65,13 +69,17 @@ _END_TOLERANCE = 1e-4
 class ServoFeeder(Feeder):
     """Answers each packet of the servo's registers with a set-point."""
 
-    def __init__(self, monitor: GoalMonitor, stream: ServoStream) -> None:
+    def __init__(
+        self, monitor: GoalMonitor, stream: ServoStream, offsets: OffsetSetpoints | None = None
+    ) -> None:
         """
         Prepare; the inputs are not taken yet.
 
         :param stream: of the set-points of the goal's spline, or of another source.
+        :param offsets: that source, where the path may give way.
         """
         super().__init__(monitor)
+        self._offsets, self._next_warning = offsets, -inf
         self.stream = stream
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
@@ -145,10 +153,19 @@ class ServoFeeder(Feeder):
         row = self.stream.stop()
         return [] if row is None else [WriteServo(values=row)]
 
+    def set_path_offset(self, offset: Vector3, age: float, now: float) -> bool:
+        """Take a path offset; False = the goal permits none."""
+        if self._offsets is not None:
+            self._offsets.set_offset(offset, age, now)
+        return self._offsets is not None
+
     # ---- what the robot confirms --------------------------------------------------------------
 
     def take(self, event: Event, now: float) -> list[GoalCommand]:
         """Answer a packet of the servo's registers with a write."""
+        if self._offsets is not None and self._offsets.update(now) and now >= self._next_warning:
+            self._next_warning = now + WARNING_PERIOD
+            self._unsaid.append(LogWarning(text=self._offsets.stale_clause))
         if not isinstance(event, ServoReceived):
             return []
         commands, self._unsaid = self._write(event.feedback, now) + self._unsaid, []
@@ -208,6 +225,12 @@ class ServoFeeder(Feeder):
         """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
         return 0 if self._spline is None or time <= 0.0 else self._spline.piece(time) + 1
 
+    def applied_offset(self, packet: RobotState) -> AppliedOffset:
+        """Return how far the path has given way where the controller's target is."""
+        if self._offsets is None:
+            return NO_OFFSET
+        return self._offsets.applied_offset(packet.target_q)
+
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
         """Hold the motion while the arm is off its path, where the goal asks for that."""
         wait = self._wait
@@ -252,8 +275,8 @@ class ServoFeeder(Feeder):
         return [] if report is None else [ReportServo(report=report)]
 
     def report_lines(self) -> tuple[str, ...]:
-        """Return how often and how long the motion has waited for the arm."""
-        return self._wait.report
+        """Return how often the motion has waited for the arm, and what became of offsets."""
+        return (*self._wait.report, *(self._offsets.report if self._offsets else ()))
 
     def _joint_error(self) -> Vector6:
         packet = self.monitor.latest

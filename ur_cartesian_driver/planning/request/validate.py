@@ -64,6 +64,7 @@ from ur_cartesian_driver.planning.request.number_rules import (
     check_segment_numbers,
     check_tolerance_numbers,
 )
+from ur_cartesian_driver.planning.request.path_offset import check_path_offset
 from ur_cartesian_driver.planning.request.presses import check_presses
 from ur_cartesian_driver.planning.request.spline_rules import check_spline
 from ur_cartesian_driver.planning.request.stops import check_stops
@@ -279,6 +280,7 @@ RULES: tuple[Rule, ...] = (
     check_blends,
     check_stops,
     check_presses,
+    check_path_offset,
     _motions,
 )
 

@@ -22,7 +22,7 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.known_frames import Frames
@@ -91,6 +91,14 @@ class CartesianActionServer:
         """Tell whether every accepted goal has its result."""
         with self._lock:
             return not self._runs
+
+    @property
+    def running_motion(self) -> MotionHandle | None:
+        """The motion of the goal that moves the arm; None = no goal does."""
+        with self._lock:
+            runs = list(self._runs.values())
+        motions = (run.motion(timeout=0.0) for run in runs)
+        return next((motion for motion in motions if motion and not motion.done()), None)
 
     def find_run(self, key: bytes) -> GoalRun | None:
         """Return the run of a goal that has not ended, by the bytes of its id."""

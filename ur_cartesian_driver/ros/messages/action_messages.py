@@ -73,6 +73,7 @@ def feedback_message(
     message.points_received = progress.points_received
     message.buffered = duration_message(progress.buffered)
     message.lag = progress.lag
+    message.path_offset = vector_message(progress.path_offset)
     return message
 
 

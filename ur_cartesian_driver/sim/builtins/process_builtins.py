@@ -21,7 +21,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     within,
 )
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
-from ur_cartesian_driver.sim.state.controller_state import PathOffset
+from ur_cartesian_driver.sim.state.controller_state import ControllerPathOffset
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
@@ -33,7 +33,7 @@ class PathOffsetBuiltins(BuiltinGroup):
     """A Cartesian offset on top of the moves: kept and reported, not applied."""
 
     @property
-    def _state(self) -> PathOffset:
+    def _state(self) -> ControllerPathOffset:
         return self._controller.process.path_offset
 
     def path_offset_enable(self) -> None:

@@ -41,7 +41,7 @@ class Pendant:
 
 
 @dataclass(slots=True, kw_only=True)
-class PathOffset:
+class ControllerPathOffset:
     """A Cartesian offset on top of the moves; the limits are a robot's defaults."""
 
     enabled: bool = False
@@ -56,7 +56,7 @@ class PathOffset:
 class ProcessState:
     """Process settings of a program; they end with it."""
 
-    path_offset: PathOffset = field(default_factory=PathOffset)
+    path_offset: ControllerPathOffset = field(default_factory=ControllerPathOffset)
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 

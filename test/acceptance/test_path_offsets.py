@@ -1,0 +1,159 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Paths that give way to offsets while the arm moves, judged by what RTDE reports."""
+
+from dataclasses import replace
+from math import pi, sin
+
+import numpy as np
+import pytest
+from robot_cell import run_cell
+
+from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, PathOffset, StaleOffset, Tolerance, Waypoint
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+pytestmark = [pytest.mark.acceptance]
+
+ARM = Arm(robot_model('ur5e'))
+SETUP = ArmSetup(model=ARM.model, geometry=ARM.geometry)
+#: Of the planned seam [s], [m], and how far the real one is bent to the side [m].
+TIME, LENGTH, BEND = 4.0, 0.16, 0.005
+#: Time between two offsets [s].
+PERIOD = 0.02
+
+
+class Seam:
+    """A line along y, whose tool points down: across is -x, normal is z."""
+
+    def __init__(self, cell, *, tolerance=0.0015, **changes):
+        self._cell, self.states = cell, []
+        state = cell.memory.read()
+        x, y, z = state.actual_tcp_pose.position
+        there = replace(state.actual_tcp_pose, position=(x, y + LENGTH, z))
+        goal = Goal(
+            waypoints=(Waypoint(pose=there, time=TIME),),
+            path_tolerance=Tolerance(position=(tolerance,) * 3),
+            execution=ExecutionMode.SERVO,
+            path_offset=PathOffset(limits=(0.0, 0.006, 0.006), **changes),
+        )
+        self.start = np.array((x, y, z))
+        self.motion = cell.owner.start(plan(goal, state, ARM, PlanningOptions()), arm=SETUP)
+        self._next = 0.0
+
+    def send(self, across, normal=0.0, age=0.0):
+        number = len(self._cell.owner.motions)
+        self._cell.owner.send(SetPathOffset(motion=number, offset=(0.0, across, normal), age=age))
+
+    async def end(self, sensor=lambda place: None):
+        """Run to the end; a sensor sees where the tool is, every PERIOD."""
+
+        def looked():
+            state = self._cell.memory.read()
+            if not self.states or state.timestamp > self.states[-1].timestamp:
+                self.states.append(state)
+                if state.timestamp >= self._next:
+                    self._next = state.timestamp + PERIOD
+                    sensor(np.array(state.actual_tcp_pose.position) - self.start)
+            return self.motion.outcome is not None
+
+        await self._cell.until(looked, 60.0)
+        return self.motion.outcome
+
+    @property
+    def target(self):
+        """Where the controller's target is from the start (n, 3) [m]."""
+        return np.array([state.target_tcp_pose.position for state in self.states]) - self.start
+
+    @property
+    def times(self):
+        return np.array([state.timestamp for state in self.states])
+
+
+def bent(y):
+    """Return how far the real seam is beside the line, across it [m]."""
+    return BEND * sin(pi * min(max(y / (0.8 * LENGTH), 0.0), 1.0)) ** 2
+
+
+def test_a_seam_bent_by_5_mm_is_followed_within_the_stated_lag():
+    async def scenario(cell):
+        seam = Seam(cell)
+        # The sensor is where the tool is: it sees the seam there, not the offset that is asked.
+        outcome = await seam.end(lambda place: seam.send(bent(place[1])))
+        return seam, outcome
+
+    seam, outcome = run_cell(scenario)
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    _, y, _ = np.array([state.actual_tcp_pose.position for state in seam.states]).T
+    x = np.array([state.actual_tcp_pose.position[0] for state in seam.states])
+    y, across = y - seam.start[1], -(x - seam.start[0])
+    wanted = np.array([bent(each) for each in y])
+    assert across.max() > 0.95 * BEND
+    # 0.08 s of set-points in flight, 0.02 s between offsets, 0.04 s of braking distance.
+    speed = np.abs(np.diff(wanted) / np.diff(seam.times)).max()
+    assert np.abs(across - wanted).max() < 0.15 * speed
+    assert np.abs(seam.target[-1] - (0.0, LENGTH, 0.0)).max() < 2e-5
+    # The feedback says how far the path has given way, and the error is small beside it.
+    given = np.array([progress.path_offset for progress in seam.motion.progress])
+    assert given[:, 1].max() > 0.95 * BEND
+    assert not given[:, [0, 2]].any()
+    for progress in seam.motion.progress:
+        assert progress.desired_pose.distance_to(progress.actual_pose) < 0.001
+
+
+def test_jumps_and_nonsense_move_the_tool_within_the_bounds():
+    limits, speed, acceleration = (0.0, 0.006, 0.006), 0.02, 0.2
+
+    async def scenario(cell):
+        seam = Seam(cell, tolerance=0.003)
+        rng = np.random.default_rng(1)
+
+        def sensor(place):
+            offset = rng.choice((-1.0, 1.0, 0.004, np.nan, np.inf, 0.0), 2)
+            across, normal = offset.tolist()
+            seam.send(across, normal, float(rng.choice((0.0, 0.0, 9.0, np.nan))))
+
+        return seam, await seam.end(sensor)
+
+    seam, outcome = run_cell(scenario)
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    beside = seam.target[:, [0, 2]]
+    assert 0.5 * limits[1] < np.abs(beside).max() < limits[1] + 1e-4
+    speeds = np.diff(beside, axis=0) / np.diff(seam.times)[:, None]
+    assert np.abs(speeds).max() < 1.1 * speed
+    accelerations = np.diff(speeds, axis=0) / np.diff(seam.times)[1:, None]
+    assert np.abs(accelerations).max() < 2.0 * acceleration  # servoj smooths, and quantises
+    assert np.abs(seam.target[-1] - (0.0, LENGTH, 0.0)).max() < 2e-5
+    assert any('were ignored' in line for line in outcome.report)
+
+
+def test_a_sensor_that_fails_leaves_the_tool_where_the_goal_says():
+    async def scenario(cell):
+        seam = Seam(cell, on_stale=StaleOffset.HOLD, timeout=0.3)
+        return seam, await seam.end(lambda place: place[1] < 0.3 * LENGTH and seam.send(0.004))
+
+    seam, outcome = run_cell(scenario)
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    late = seam.target[(seam.target[:, 1] > 0.7 * LENGTH) & (seam.target[:, 1] < 0.8 * LENGTH)]
+    assert late[:, 0] == pytest.approx(-0.004, abs=5e-5)
+    assert any('stale once' in line for line in outcome.report)
+
+
+def test_an_arm_that_is_pushed_off_the_path_that_gave_way_is_noticed():
+    async def scenario(cell):
+        seam = Seam(cell)
+
+        def sensor(place):
+            seam.send(0.005)
+            if place[1] > 0.3 * LENGTH:
+                cell.robot.inject('offset pose x 0.005 for 1 s')  # back onto the line of the goal
+
+        return await seam.end(sensor)
+
+    outcome = run_cell(scenario)
+    assert outcome.code is ErrorCode.PATH_TOLERANCE_VIOLATED
+    assert 'position x is off by' in outcome.text

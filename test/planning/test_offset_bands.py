@@ -1,0 +1,147 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a path may give way, in which frame, and what refuses it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.motion.errors import (
+    CollisionPredicted,
+    InvalidGoal,
+    NearSingularity,
+    TooFast,
+    Unreachable,
+)
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, PathOffset, Segment
+from ur_cartesian_driver.motion.pose import rotate
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+OPTIONS = PlanningOptions(self_collision='off')
+SIDEWAYS = PathOffset(limits=(0.0, 0.005, 0.004), speed=0.05, acceleration=0.5)
+
+
+def goal(*points, path_offset=SIDEWAYS, **fields):
+    return Goal(waypoints=points, execution=ExecutionMode.SERVO, path_offset=path_offset, **fields)
+
+
+def band_of(cell, *points, **fields):
+    return plan(goal(*points, **fields), cell.state, cell.arm, OPTIONS).offset_band
+
+
+def test_the_frame_is_that_of_the_controllers_own_offsets(cell):
+    band = band_of(cell, cell.point(y=0.1, time=2.0))
+    tool_z = np.array(rotate(cell.home.quaternion, (0.0, 0.0, 1.0)))
+    for row in (0, 100, -1):
+        along, across, normal = band.axes[row]
+        assert along == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
+        expected = np.cross(along, tool_z)
+        assert across == pytest.approx(expected / np.linalg.norm(expected), abs=1e-9)
+        assert normal == pytest.approx(np.cross(along, across), abs=1e-9)
+    assert normal @ tool_z < -0.9, 'out of the work'
+    assert band.shift(1.0, (0.001, 0.002, 0.003)) == pytest.approx(
+        0.001 * along + 0.002 * across + 0.003 * normal
+    )
+
+
+def test_the_offset_fades_out_before_the_end_and_before_a_corner(cell):
+    corner = cell.point(y=0.1, time=2.0), cell.point(x=0.1, y=0.1, time=4.0)
+    band = band_of(cell, *corner)
+    open_times = np.flatnonzero(band.is_open) * band.step
+    assert open_times[0] == 0.0
+    gaps = np.flatnonzero(np.diff(open_times) > 2 * band.step)
+    ((last, first),) = [(open_times[k], open_times[k + 1]) for k in gaps]
+    fading = 0.005 / 0.05 + 2 * 0.05 / 0.5
+    assert last < 2.0 - fading, 'in time'
+    assert 2.0 < first < 2.5
+    assert 4.0 - 3 * fading < open_times[-1] < 4.0 - fading
+    # Straight on, nothing closes: not even where the arm rests.
+    straight = cell.point(y=0.1, time=2.0), cell.point(y=0.2, time=4.5)
+    rests = (Segment(dwell=0.5), Segment())
+    band = band_of(cell, *straight, segments=rests)
+    assert (np.diff(np.flatnonzero(band.is_open)) == 1).all()
+
+
+def test_the_report_names_bounds_and_gaps(cell):
+    made = plan(goal(cell.point(y=0.1, time=2.0)), cell.state, cell.arm, OPTIONS)
+    (line,) = [line for line in made.report if line.startswith('path_offset')]
+    assert 'up to 5 mm across, 4 mm normal, at 0.05 m/s and 0.5 m/s^2 along each' in line
+    assert 'to 2.00 s' in line
+
+
+@pytest.mark.parametrize(
+    ('options', 'offset', 'error', 'text'),
+    [
+        (
+            {'workspace_planes': ('table 0 0 {low} 0 0 1',)},
+            {},
+            CollisionPredicted,
+            r'With a path offset of across -5 mm, normal -4 mm: trajectory\.points\[0\]\.pose, '
+            r'at .* % of its segment: .* "table"',
+        ),
+        (
+            {'singularity_margin_elbow': 1.5},
+            {'limits': (0.0, 0.1, 0.1)},
+            NearSingularity,
+            r'With a path offset of across .* mm: .* the elbow singularity .*, less than',
+        ),
+        (
+            {},
+            {'limits': (0.0, 0.1, 0.1), 'speed': 0.1, 'acceleration': 2.0},
+            TooFast,
+            'With a path offset of .* would need .* rad/s of .*, more than its 0.150 rad/s',
+        ),
+    ],
+    ids=['plane', 'singularity', 'joint speed'],
+)
+def test_a_band_in_which_the_arm_cannot_be_is_refused(cell, options, offset, error, text):
+    arm = cell.arm
+    if error is TooFast:
+        limits = (0.15,) * 6
+        arm = type(arm)(replace(arm.model, max_joint_speed=limits), arm.geometry)
+    low = cell.home.position[2] - 0.002
+    options = {
+        name: tuple(each.format(low=low) for each in value) if isinstance(value, tuple) else value
+        for name, value in options.items()
+    }
+    asked = goal(cell.point(y=0.1, time=8.0), path_offset=replace(SIDEWAYS, **offset))
+    with pytest.raises(error, match=text):
+        plan(asked, cell.state, arm, replace(OPTIONS, **options))
+    plan(replace(asked, path_offset=PathOffset()), cell.state, arm, replace(OPTIONS, **options))
+
+
+def test_a_band_out_of_reach_is_refused(cell):
+    # Towards the stretched arm, as far as it may go.
+    far = next(
+        point
+        for x in np.arange(-0.5, 0.0, 0.01)
+        if (point := _reached(cell, cell.point(x=float(x), time=20.0)))
+    )
+    asked = goal(far, path_offset=PathOffset(limits=(0.1, 0.1, 0.1)))
+    with pytest.raises((Unreachable, NearSingularity), match='With a path offset of along'):
+        plan(asked, cell.state, cell.arm, OPTIONS)
+
+
+def _reached(cell, point):
+    try:
+        plan(goal(point, path_offset=PathOffset()), cell.state, cell.arm, OPTIONS)
+    except (Unreachable, NearSingularity):
+        return None
+    return point
+
+
+@pytest.mark.parametrize(
+    ('changes', 'time', 'text'),
+    [
+        ({}, 0.3, r'path_offset is not possible anywhere on this path of 0\.30 s'),
+        ({'pure': True}, 2.0, 'path_offset is set, but the path has no direction across'),
+    ],
+)
+def test_a_path_that_can_give_way_nowhere_is_refused(cell, changes, time, text):
+    there = (
+        cell.point(turn=(0.0, 0.0, 0.2), time=time) if changes else cell.point(y=0.01, time=time)
+    )
+    with pytest.raises(InvalidGoal, match=text):
+        plan(goal(there), cell.state, cell.arm, OPTIONS)

@@ -1,0 +1,69 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The band in which a path may give way, and the frame of the path.
+
+The frame is that of the controller's own path offsets (``path_offset_set``, type MOTION): *along*
+is the tangent of the path, *across* = along x the z axis of the tool, *normal* = along x across.
+For a tool whose z axis points into the work, normal points out of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import StaleOffset
+from ur_cartesian_driver.motion.vectors import Vector3, vector3, ZERO3
+
+#: The axes of the frame, as words for users.
+OFFSET_AXES = ('along', 'across', 'normal')
+
+
+class AppliedOffset(NamedTuple):
+    """How far the tool is off the path of the goal, because the path has given way."""
+
+    #: In the base [m].
+    shift: Vector3 = ZERO3
+    #: In the frame of the path [m].
+    offset: Vector3 = ZERO3
+
+
+#: The path is as the goal says.
+NO_OFFSET = AppliedOffset()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OffsetBand:
+    """How far a path may give way, and where."""
+
+    #: Along, across, normal [m].
+    limits: Vector3
+    #: Of the offset along each axis [m/s], [m/s^2].
+    speed: float
+    acceleration: float
+    #: When an offset is stale [s], and what follows.
+    timeout: float
+    on_stale: StaleOffset
+    #: Of the rows below [s].
+    step: float
+    #: (n, 3 axes, 3) in the base, at the times 0, step, 2 step, ... of the motion.
+    axes: NDArray[np.float64]
+    #: (n,) whether the path may give way there; if not, the offset fades out.
+    is_open: NDArray[np.bool_]
+
+    def shift(self, time: float, offset: Vector3) -> Vector3:
+        """Return an offset at a time of the motion [s] in the base."""
+        row = min(max(time / self.step, 0.0), len(self.axes) - 1.0)
+        k = min(int(row), len(self.axes) - 2)
+        part = row - k
+        before, after = offset @ self.axes[k : k + 2]
+        return vector3(((1.0 - part) * before + part * after).tolist())
+
+    def opens(self, time: float) -> bool:
+        """Tell whether the path may give way at a time of the motion [s]."""
+        row = int(time / self.step)
+        return row < len(self.is_open) and bool(self.is_open[row])

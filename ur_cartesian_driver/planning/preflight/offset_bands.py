@@ -1,0 +1,321 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The band in which a path may give way (``path_offset``): its frame, its gaps, and its checks.
+
+The frame of the path turns with it. Where it turns so fast that a displaced tool would be faster,
+or accelerated more, than an offset may be, the path does not give way: in corners where the arm
+stops, and in arcs that are too tight. The offset fades out before them, and before the end.
+
+All corners of the band are checked along the whole path, as the path itself was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import ceil, hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    InvalidGoal,
+    NearSingularity,
+    TooFast,
+)
+from ur_cartesian_driver.motion.goal import PathOffset
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.offset_band import OFFSET_AXES, OffsetBand
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.motion.vectors import norm, Vector3, vector3, vector6
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.preflight.tightest_margins import (
+    singularity_distance_rows,
+    SINGULARITY_MEASURES,
+)
+from ur_cartesian_driver.planning.request.path_offset import offset_motion
+
+#: Time between two frames [s].
+STEP = 0.01
+#: Frames are the mean of those within twice this time [s], so that none turns at once.
+SMOOTHING = 0.08
+#: Edges of the path that are shorter have no direction [m].
+_MIN_EDGE = 1e-7
+#: Where sin of the angle between path and tool is less, the frame stays as it was.
+_MIN_ANGLE_SINE = 0.05
+#: How much longer than the law of the offset needs it has to fade out.
+_FADE_MARGIN = 1.1
+#: A corner is reached from the path in steps that are no longer [m], in which a joint that turns
+#: farther would change the branch [rad].
+_STRIDE, _MAX_CHANGE = 0.02, 0.5
+
+
+def offset_band(
+    wanted: PathOffset, reference: ReferencePath, T_tcp_controlled: Pose
+) -> OffsetBand:
+    """
+    Return the band of a path.
+
+    :param T_tcp_controlled: the controlled frame, whose path it is.
+    :raises InvalidGoal: the path gives way nowhere.
+    """
+    speed, acceleration, timeout = offset_motion(wanted)
+    frames = _frames(reference, T_tcp_controlled)
+    turns = _turns_too_fast(frames, hypot(*wanted.limits), speed, acceleration)
+    fading = fade_time(max(wanted.limits), speed, acceleration)
+    times = STEP * np.arange(len(frames))
+    closed = turns | (times >= reference.time[-1] - fading)
+    fade = int(np.ceil(fading / STEP))
+    for begin in np.flatnonzero(turns & ~np.roll(turns, 1)).tolist():
+        closed[max(begin - fade, 0) : begin] = True
+    if closed.all():
+        raise InvalidGoal(
+            'path_offset',
+            f'is not possible anywhere on this path of {reference.time[-1]:.2f} s: it takes '
+            f'{fading:.2f} s to fade out before the end and before places where the path '
+            'turns too fast',
+            'allow less or faster offsets, or give the motion more time',
+        )
+    return OffsetBand(
+        limits=wanted.limits,
+        speed=speed,
+        acceleration=acceleration,
+        timeout=timeout,
+        on_stale=wanted.on_stale,
+        step=STEP,
+        axes=frames,
+        is_open=~closed,
+    )
+
+
+def fade_time(limit: float, speed: float, acceleration: float) -> float:
+    """Return how long an offset at its limit takes to be gone, at most [s]."""
+    # It brakes, comes back from where it then is, and brakes again with less than the bound.
+    return _FADE_MARGIN * (2.2 * speed / acceleration + limit / speed) + 2.0 * STEP
+
+
+def _frames(reference: ReferencePath, T_tcp_controlled: Pose) -> Floats:
+    """Return the frames of a path (n, 3 axes, 3), a time STEP apart."""
+    poses = compose_rows(reference.poses, T_tcp_controlled)
+    edges = np.diff(poses[:, :3], axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    x, y, z, w = (0.5 * (poses[1:, 3:] + poses[:-1, 3:])).T
+    tool_z = np.stack(
+        [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), w * w + z * z - x * x - y * y], axis=1
+    )
+    across = np.cross(edges, tool_z)
+    has_frame = np.linalg.norm(across, axis=1) > np.maximum(
+        _MIN_ANGLE_SINE * lengths * np.linalg.norm(tool_z, axis=1), _MIN_EDGE
+    )
+    if not has_frame.any():
+        raise InvalidGoal(
+            'path_offset',
+            'is set, but the path has no direction across the z axis of the tool, and so no frame',
+            'lead the tool across its z axis',
+        )
+    along, across = _units(edges[has_frame]), _units(across[has_frame])
+    times = (0.5 * (reference.time[1:] + reference.time[:-1]))[has_frame]
+    every = STEP * np.arange(int(np.ceil(reference.time[-1] / STEP)) + 2)
+    vectors = np.concatenate([along, across], axis=1)
+    vectors = np.stack([np.interp(every, times, column) for column in vectors.T], axis=1)
+    vectors = _smoothed(_smoothed(vectors))
+    along = _units(vectors[:, :3])
+    across = vectors[:, 3:]
+    across = _units(across - np.sum(across * along, axis=1)[:, None] * along)
+    return np.stack([along, across, np.cross(along, across)], axis=1)
+
+
+def _units(vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=1)
+    units: Floats = vectors / np.maximum(lengths, 1e-9)[:, None]
+    return units
+
+
+def _smoothed(vectors: Floats) -> Floats:
+    """Return moving averages of columns."""
+    half = round(0.5 * SMOOTHING / STEP)
+    sums = np.cumsum(np.pad(vectors, ((half + 1, half), (0, 0)), mode='edge'), axis=0)
+    width = 2 * half + 1
+    means: Floats = (sums[width:] - sums[:-width]) / width
+    return means
+
+
+def _turns_too_fast(
+    frames: Floats, reach: float, speed: float, acceleration: float
+) -> NDArray[np.bool_]:
+    """Tell where a tool at a distance from the path is moved too much by its turning (n,)."""
+    change = np.diff(frames, axis=0)
+    rates = _sizes(change) / STEP
+    bends = _sizes(np.diff(change, axis=0)) / STEP**2
+    too_fast = np.zeros(len(frames), dtype=np.bool_)
+    for excess in (
+        np.pad(rates * reach > speed, (0, 1)),
+        np.pad(rates * reach > speed, (1, 0)),
+        np.pad(bends * reach > acceleration, 1),
+    ):
+        too_fast |= excess
+    return too_fast
+
+
+def _sizes(changes: Floats) -> Floats:
+    """Return by how much each of some frames changes (n,): for small turns, the angle."""
+    sizes: Floats = np.linalg.norm(changes, axis=(1, 2)) / np.sqrt(2.0)
+    return sizes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OffsetBandCheck:
+    """
+    The checks of a band along a path.
+
+    :param spline: the joints over the times of the path.
+    """
+
+    kinematics: TcpKinematics
+    options: PlanningOptions
+    band: OffsetBand
+    reference: ReferencePath
+    spline: JointSpline
+    tool_tips: Sequence[Pose]
+
+    def check(self) -> None:
+        """
+        Check all corners of the band.
+
+        :raises GoalRefused: the arm cannot be there; the text names corner, point and bound.
+        """
+        path, band = self.reference, self.band
+        q, qd, _ = self.spline.rows(path.time)
+        rows = np.clip(np.rint(path.time / band.step).astype(np.intp), 0, len(band.axes) - 1)
+        axes = band.axes[rows]
+        joint_speeds = np.abs(qd) + self._joint_speeds_of_offsets(q, axes)
+        sides = ((-limit, limit) if limit else (0.0,) for limit in band.limits)
+        for corner in map(vector3, product(*sides)):
+            try:
+                self._check_corner(corner, axes, q, joint_speeds)
+            except GoalRefused as refusal:
+                where = ', '.join(
+                    f'{name} {1e3 * value:+g} mm'
+                    for name, value in zip(OFFSET_AXES, corner, strict=True)
+                    if value
+                )
+                raise refusal.reworded(f'With a path offset of {where}: {refusal}') from None
+
+    def _joint_speeds_of_offsets(self, q: Floats, axes: Floats) -> Floats:
+        """Return how fast joints have to be for offsets that change as fast as they may (n, 6)."""
+        arm, T_flange_tcp = self.kinematics.arm, self.kinematics.T_flange_tcp
+        speeds = np.zeros_like(q)
+        for k in np.flatnonzero(self.band.limits).tolist():
+            # What the turning of the frame adds is as fast at most.
+            twist = np.zeros_like(q)
+            twist[:, :3] = 2.0 * self.band.speed * axes[:, k]
+            speeds += np.abs(joint_rates(arm, T_flange_tcp, q, twist, np.zeros_like(q))[0])
+        return speeds
+
+    def _check_corner(
+        self, corner: Vector3, axes: Floats, q: Floats, joint_speeds: Floats
+    ) -> None:
+        arm, path = self.kinematics.arm, self.reference
+        there = self._joints_at(corner, axes, q)
+        self._check_singularities(q, there)
+        self._check_joint_speeds(q, there, joint_speeds)
+        clearance_lines(
+            arm,
+            self.tool_tips,
+            self.options,
+            there,
+            vector6(q[0].tolist()),
+            path.point,
+            path.fraction,
+        )
+
+    def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:
+        """Return the joints along a corner, as they are reached from those on the path (n, 6)."""
+        kinematics, path = self.kinematics, self.reference
+        steps = max(1, ceil(norm(corner) / _STRIDE))
+        shift, before = np.einsum('k,nkx->nx', np.array(corner), axes), q
+        for step in range(1, steps + 1):
+            poses = path.poses.copy()
+            poses[:, :3] += step / steps * shift
+            there = nearest_rows(
+                kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), before
+            )
+            lost = ~(np.abs(there - before).max(axis=1) < _MAX_CHANGE)  # NaN is lost
+            if lost.any():
+                row = int(np.argmax(lost))
+                pose, where = pose_from_row(poses[row].tolist()), self._where(row)
+                if np.isnan(there[row]).any():
+                    raise kinematics.no_solution_error(pose, where)
+                here, other = (vector6(rows[row].tolist()) for rows in (before, there))
+                raise kinematics.discontinuity_error(pose, here, other, where)
+            before = there
+        return before
+
+    def _check_singularities(self, q: Floats, there: Floats) -> None:
+        arm = self.kinematics.arm
+        on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
+        for k, measure in enumerate(SINGULARITY_MEASURES):
+            bound = float(getattr(self.options, measure.option))
+            # Where the path itself is nearer, it may be: at its begin.
+            near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
+            if near.any():
+                row = int(np.argmax(near))
+                raise NearSingularity(
+                    f'{self._where(row)} comes within {displaced[row, k]:.3g} {measure.unit} of '
+                    f'the {measure.name} singularity ({measure.meaning}), less than '
+                    f'{measure.option} = {bound:g} {measure.unit}; allow smaller offsets, or keep '
+                    'the path away from it.'
+                )
+
+    def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
+        times = self.reference.time
+        steps = np.maximum(np.diff(times), 1e-6)[:, None]
+        # Beside its path the arm may have to turn faster.
+        extra = np.abs(np.diff(there - q, axis=0) / steps)
+        speeds = joint_speeds.copy()
+        speeds[1:] += extra
+        limits = np.array(self.kinematics.arm.model.max_joint_speed)
+        parts = speeds / limits
+        row, joint = divmod(int(np.argmax(parts)), 6)
+        if parts[row, joint] > 1.0:
+            raise TooFast(
+                self._where(row),
+                f'would need {speeds[row, joint]:.3f} rad/s of {JOINT_NAMES[joint]}, more than '
+                f'its {limits[joint]:.3f} rad/s',
+                'allow smaller or slower offsets, or give the motion more time',
+            )
+
+    def _where(self, row: int) -> str:
+        return describe_location(
+            int(self.reference.point[row]), float(self.reference.fraction[row])
+        )
+
+
+def offset_remarks(band: OffsetBand, duration: float) -> list[str]:
+    """Return the line of the report on a band of a motion that takes a time [s]."""
+    limits = ', '.join(
+        f'{1e3 * limit:g} mm {name}'
+        for name, limit in zip(OFFSET_AXES, band.limits, strict=True)
+        if limit
+    )
+    edges = np.flatnonzero(np.diff(np.pad(~band.is_open, 1)))
+    gaps = [
+        f'{band.step * begin:.2f} to {min(band.step * end, duration):.2f} s'
+        for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    ]
+    return [
+        f'path_offset: the path gives way by up to {limits}, at {band.speed:g} m/s and '
+        f'{band.acceleration:g} m/s^2 along each, but not from {", ".join(gaps)}, where it fades '
+        'out or the path turns too fast'
+    ]

@@ -1,0 +1,79 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+``~/path_offset``: offsets for the goal that runs, if its path may give way (``path_offset``).
+
+One that cannot be followed is ignored with a warning that says why; the one before it counts until
+it is stale.
+"""
+
+from __future__ import annotations
+
+from geometry_msgs.msg import Vector3Stamped
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.message_fields import nanoseconds
+
+#: Only the newest offset counts, and a lost one is not sent again.
+OFFSET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+#: The names of the frame of the path.
+FRAMES = ('', 'path')
+#: How far a stamp may lie in the future: clocks differ [s].
+MAX_STAMP_AHEAD = 0.1
+#: How often the same warning is logged at most [s].
+WARNING_PERIOD = 2.0
+
+
+class PathOffsetSubscriber:
+    """Gives offsets to the motion that runs; the subscription goes with the node."""
+
+    def __init__(self, node: Node, server: CartesianActionServer) -> None:
+        """Subscribe."""
+        self._clock, self._logger, self._server = node.get_clock(), node.get_logger(), server
+        self._subscription = node.create_subscription(
+            Vector3Stamped,
+            '~/path_offset',
+            self._take,
+            OFFSET_QOS,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+
+    def _take(self, message: Vector3Stamped) -> None:
+        try:
+            self.give(message)
+        except DriverError as error:
+            self._logger.warning(
+                f'A message on ~/path_offset is ignored: {error}',
+                throttle_duration_sec=WARNING_PERIOD,
+            )
+
+    def give(self, message: Vector3Stamped) -> None:
+        """
+        Give an offset to the motion that runs.
+
+        :raises DriverError: it cannot be followed, or no goal runs.
+        """
+        header, vector = message.header, message.vector
+        if header.frame_id not in FRAMES:
+            raise InvalidGoal(
+                'header.frame_id',
+                f"is '{header.frame_id}', but offsets are in the frame of the path",
+                "leave it empty, or set it to 'path'",
+            )
+        stamp = nanoseconds(header.stamp)
+        age = (self._clock.now().nanoseconds - stamp) / 1_000_000_000 if stamp else 0.0
+        if age < -MAX_STAMP_AHEAD:
+            raise InvalidGoal(
+                'header.stamp',
+                f'is {-age:.3f} s in the future',
+                'compare the clocks of both computers, or leave the stamp 0: then the age counts '
+                'from the receipt',
+            )
+        motion = self._server.running_motion
+        if motion is None:
+            raise RobotNotReady('No goal moves the arm.')
+        motion.set_path_offset(along=vector.x, across=vector.y, normal=vector.z, age=max(0.0, age))
