@@ -109,7 +109,7 @@ def cmake_install() -> Path:
         f'-DCMAKE_INSTALL_PREFIX={stage}',
         f'-DCMAKE_PROJECT_INCLUDE={ROOT / "cmake" / "ros_wheels.cmake"}',
         f'-DPython3_EXECUTABLE={sys.executable}',
-        '-DCMAKE_BUILD_TYPE=Release',
+        f'-DCMAKE_BUILD_TYPE={os.environ.get("CMAKE_BUILD_TYPE", "Release")}',
         '-DBUILD_TESTING=OFF',
     ]
     for command in (
