@@ -25,7 +25,6 @@ def test_every_mode_has_a_planner_and_a_feeder(mode: ExecutionMode) -> None:
     assert list(inspect.signature(feeder).parameters) == ['request', 'config']
 
 
-def test_points_can_be_appended_only_where_the_robot_program_gets_points() -> None:
+def test_outputs_are_switched_only_where_the_robot_program_gets_points() -> None:
     for mode, traits in EXECUTION_MODES.items():
-        assert not (traits.can_keep_open and traits.streams_setpoints), mode.name
         assert not (traits.switches_outputs and traits.streams_setpoints), mode.name

@@ -7,6 +7,7 @@ from dataclasses import replace
 from goal_machines import append_machine
 import numpy as np
 
+from ur_cartesian_driver.execution.goal.appended_records import CLOSED_BY_CLIENT
 from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
     Finish,
@@ -19,7 +20,6 @@ from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.points.append_feeder import (
     AppendSettings,
-    CLOSED_BY_CLIENT,
     FIRST_POINTS_TIMEOUT,
 )
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult

@@ -248,6 +248,17 @@ REFUSALS = [
         InvalidGoal,
         'the points of a goal with keep_open are not all known',
     ),
+    (replace(PLAIN, replace_horizon=nan), InvalidGoal, 'replace_horizon contains nan'),
+    (
+        replace(PLAIN, replace_horizon=0.01),
+        InvalidGoal,
+        'replace_horizon is 0.01 s, but must be 0',
+    ),
+    (
+        replace(PLAIN, replace_horizon=0.15),
+        InvalidGoal,
+        'only points of a goal with keep_open can',
+    ),
     (replace(PLAIN, age=nan), InvalidGoal, 'trajectory.header.stamp contains nan'),
     # quaternions
     (
@@ -276,9 +287,9 @@ REFUSALS = [
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp is 61.0 s in the future'),
     # not there yet
     (
-        replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO),
+        replace(TIMED, keep_open=True, replace_horizon=0.15, execution=ExecutionMode.PRIMITIVES),
         NotAvailable,
-        'keep_open is set, but a SERVO goal needs all its points at the start',
+        'replace_horizon is 0.15 s, but motions of the robot, which PRIMITIVES sends, cannot be',
     ),
     (
         replace(

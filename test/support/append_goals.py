@@ -116,8 +116,7 @@ class AppendMotion:
         waypoints: Iterable[Waypoint] = (),
         segments: Iterable[Segment] = (),
         io_commands: Iterable[IOCommand] = (),
-        *,
-        last: bool = False,
+        **more: Any,
     ) -> Any:
         """Append as the Python API does, but wait as a coroutine."""
         offers = self.appender.offers(
@@ -125,7 +124,7 @@ class AppendMotion:
                 waypoints=tuple(waypoints),
                 segments=tuple(segments),
                 io_commands=tuple(io_commands),
-                last=last,
+                **more,
             )
         )
         try:

@@ -30,6 +30,7 @@ COMPUTING = (
     'test/acceptance/test_live_sessions.py',
     'test/acceptance/test_path_offsets.py',
     'test/acceptance/test_proportional_outputs.py',
+    'test/acceptance/test_replaced_tails.py',
     'test/acceptance/test_safe_outputs.py',
     'test/acceptance/test_servo_drives_the_guide.py',
     'test/acceptance/test_servo_experiments.py',

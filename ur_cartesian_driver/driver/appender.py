@@ -14,20 +14,26 @@ from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 import itertools
+from math import isnan
 import threading
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import AppendToMotion
+from ur_cartesian_driver.execution.goal.appended_records import CLOSED_BY_CLIENT
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
-from ur_cartesian_driver.execution.points.append_feeder import CLOSED_BY_CLIENT
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
-from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import AlreadySent, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_append
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
+from ur_cartesian_driver.planning.append.replaced_tail import (
+    cut_time,
+    first_replaceable,
+    without_passed,
+)
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
@@ -41,8 +47,9 @@ MESSAGES_AHEAD = 2
 class AppendResult:
     """The result of an append."""
 
-    #: How many points the goal has now.
+    #: How many points the goal has now, and the number of the first of the new ones.
     points: int
+    first: int
     #: A sentence for people.
     text: str
 
@@ -54,9 +61,15 @@ def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
     """Return the records of an append plan, encoded, and its job."""
     plan = part.plan
     job = job_from_plan(
-        plan, dialect, start_time=part.start_time, ending_records=part.ending_records
+        plan,
+        dialect,
+        start_time=part.start_time,
+        ending_records=part.ending_records,
+        spline=part.spline,
     )
-    return (encode_rows(plan.rows, dialect), replace(job, due=part.end_time))
+    # Set-points are made by the robot loop: no records go to the robot.
+    points = b'' if plan.execution.traits.streams_setpoints else encode_rows(plan.rows, dialect)
+    return points, replace(job, due=part.end_time)
 
 
 class Appender:
@@ -136,33 +149,53 @@ class Appender:
         return appended
 
     def _close(self, new_points: AppendedPoints) -> Offers:
-        if not new_points.last:
+        if not new_points.last or new_points.replaces:
             raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
         answer = yield self._offer(None, b'', 0)
         if answer.refusal:
             raise RobotNotReady(answer.refusal)
         return AppendResult(
-            points=self.points, text=(f'The goal ends with the {self.points} points that it has.')
+            points=self.points,
+            first=self.points,
+            text=(f'The goal ends with the {self.points} points that it has.'),
         )
 
     def _append(self, new_points: AppendedPoints) -> Offers:
         arm, options = self._arm_and_options()
-        self._check_ahead(len(new_points.waypoints), options)
-        before = self._goal
+        before = self._forget_passed(new_points)
+        self._check_ahead(before, new_points, options)
         for from_rest in (False, True) if not self._is_at_rest() else (True,):
             part = plan_append(before, new_points, arm, options, from_rest=from_rest)
             points, job = encode_plan(part, self._dialect)
-            answer = yield self._offer(job, points, part.records_before)
+            answer = yield self._offer(job, points, part.records_before, part.cut_time)
             if not answer.refusal:
                 self._goal = part.next_goal
                 return AppendResult(
                     points=part.next_goal.points,
+                    first=part.next_goal.points - len(new_points.waypoints),
                     text=part.text
                     + (_from_rest(part.next_goal.last_client_time > 0.0) if from_rest else ''),
                 )
+            if answer.earliest_cut is not None:
+                raise AlreadySent(*first_replaceable(before, answer.earliest_cut))
             if not answer.replan_from_rest:
                 break
         raise RobotNotReady(answer.refusal)
+
+    def _forget_passed(self, new_points: AppendedPoints) -> AppendableGoal:
+        """
+        Return the goal without what the arm has passed.
+
+        :raises GoalRefused: that is what is to be replaced, or there is no such point or time.
+        """
+        progress = self._progress()
+        if progress is not None:
+            self._goal = without_passed(self._goal, progress.time)
+            if cut_time(self._goal, new_points) < progress.time:
+                # What is under way to the arm is final too.
+                ahead = progress.buffered if isnan(progress.lag) else progress.lag
+                raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
+        return self._goal
 
     def _is_at_rest(self) -> bool:
         """Tell whether the arm surely rests behind all points of the goal."""
@@ -173,9 +206,11 @@ class Appender:
             and progress.points_received == self.points
         )
 
-    def _check_ahead(self, count: int, options: PlanningOptions) -> None:
-        progress = self._progress()
-        ahead = self.points - (progress.waypoint if progress is not None else 0)
+    def _check_ahead(
+        self, before: AppendableGoal, new_points: AppendedPoints, options: PlanningOptions
+    ) -> None:
+        progress, count = self._progress(), len(new_points.waypoints)
+        ahead = before.points - (progress.waypoint if progress is not None else 0)
         max_ahead = MESSAGES_AHEAD * options.max_points
         if ahead + count > max_ahead:
             raise InvalidGoal(
@@ -185,12 +220,20 @@ class Appender:
                 'append them when it has come further (feedback: point_index)',
             )
 
-    def _offer(self, job: MotionJob | None, points: bytes, behind: int) -> AppendToMotion:
-        return AppendToMotion(
-            motion=self._motion,
-            points=points,
-            append_job=AppendJob(number=next(self._numbers), records_before=behind, job=job),
+    def _offer(
+        self,
+        job: MotionJob | None,
+        points: bytes,
+        records_before: int,
+        cut_time: float | None = None,
+    ) -> AppendToMotion:
+        append_job = AppendJob(
+            number=next(self._numbers),
+            records_before=records_before,
+            job=job,
+            cut_time=cut_time,
         )
+        return AppendToMotion(motion=self._motion, points=points, append_job=append_job)
 
     def _send_offer(self, offer: AppendToMotion) -> AnswerAppend:
         """Send an offer and wait for its answer."""

@@ -68,9 +68,11 @@ class MotionHandle:
         io_commands: Sequence[IOCommand] = (),
         *,
         last: bool = False,
+        replace_from_point: int | None = None,
+        replace_from_time: float | None = None,
     ) -> AppendResult:
         """
-        Append points to a running goal with ``keep_open``.
+        Append points to a running goal with ``keep_open``, or replace its tail.
 
         Checks and plans them here, which takes a while: do not call it from callbacks.
 
@@ -78,6 +80,11 @@ class MotionHandle:
         :param segments: none, or one for each point.
         :param io_commands: their waypoints are numbered from the start of the goal.
         :param last: nothing follows; without points: the goal ends at its last point.
+        :param replace_from_point: the first point whose place the new ones take, and that of all
+            points behind it (SPLINE and SERVO).
+        :param replace_from_time: or the time from which on they do, as those of points [s]; the
+            motion goes on from there to the first of them.
+        :raises AlreadySent: what is to be replaced is final; the error names what can be.
         :raises GoalRefused: none of the points was taken, and the goal goes on; the text says why.
         """
         if self.appender is None:
@@ -88,6 +95,8 @@ class MotionHandle:
                 segments=tuple(segments),
                 io_commands=tuple(io_commands),
                 last=last,
+                replace_from_point=replace_from_point,
+                replace_from_time=replace_from_time,
             )
         )
 

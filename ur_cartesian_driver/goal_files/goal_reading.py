@@ -117,6 +117,7 @@ def goal_from_fields(message: Message) -> GoalTable:
         execution=_member(ExecutionMode, message.execution, 'execution'),
         io_commands=io_commands(message),
         keep_open=message.keep_open,
+        replace_horizon=message.replace_horizon,
         safe_outputs=tuple(
             _safe_output(output, f'safe_outputs[{i}]')
             for i, output in enumerate(message.safe_outputs)

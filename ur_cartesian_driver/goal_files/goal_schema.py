@@ -141,6 +141,7 @@ GOAL: Mapping[str, Any] = {
     'execution': UINT8,
     'validate_only': False,
     'keep_open': False,
+    'replace_horizon': 0.0,
     'safe_outputs': [{**OUTPUT, 'restore': False}],
     'packed': PACKED,
     'min_speed_fraction': 0.0,

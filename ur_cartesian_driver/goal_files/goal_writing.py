@@ -105,6 +105,7 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
             ],
             'execution': int(table.execution),
             'keep_open': table.keep_open,
+            'replace_horizon': table.replace_horizon,
             'safe_outputs': [
                 {**_output(output), **_given({'restore': output.restore})}
                 for output in table.safe_outputs

@@ -107,6 +107,23 @@ class NotAvailable(InvalidGoal):
     """The goal needs something that this version of the driver does not do."""
 
 
+class AlreadySent(InvalidGoal):
+    """Points that are to be replaced have been sent; the text says which ones can be."""
+
+    #: The first point that can be replaced, and the earliest time [s].
+    first_point = 0
+    first_time = 0.0
+
+    def __init__(self, first_point: int, first_time: float) -> None:
+        """Take what can be replaced; the time counts as those of points [s]."""
+        DriverError.__init__(
+            self,
+            'What is to be replaced has been sent to the robot; replace from point '
+            f'{first_point} on, from {first_time:.3f} s on, or later.',
+        )
+        self.first_point, self.first_time = first_point, first_time
+
+
 class TooFast(InvalidGoal):
     """A segment needs more speed than the limits allow."""
 

@@ -49,8 +49,6 @@ class ModeTraits:
     streams_setpoints: bool
     #: Whether ``io_commands`` are carried out.
     switches_outputs: bool
-    #: Whether points may be appended (``keep_open``).
-    can_keep_open: bool
 
 
 #: All modes but AUTO.
@@ -61,7 +59,6 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=False,
         streams_setpoints=False,
         switches_outputs=True,
-        can_keep_open=True,
     ),
     ExecutionMode.SPLINE: ModeTraits(
         planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
@@ -69,7 +66,6 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=True,
         streams_setpoints=False,
         switches_outputs=True,
-        can_keep_open=True,
     ),
     ExecutionMode.SERVO: ModeTraits(
         planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
@@ -77,6 +73,5 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=True,
         streams_setpoints=True,
         switches_outputs=False,
-        can_keep_open=False,
     ),
 }

@@ -353,6 +353,9 @@ class Goal:
     execution: ExecutionMode = ExecutionMode.AUTO
     io_commands: tuple[IOCommand, ...] = ()
     keep_open: bool = False
+    #: How far ahead of the arm points are final, so that later ones can be replaced [s]; 0 = not
+    #: asked for.
+    replace_horizon: float = 0.0
     safe_outputs: tuple[SafeOutput, ...] = ()
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
     #: How long the arm may stay off its path with STALL [s]; 0 = the default.

@@ -22,6 +22,8 @@ from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.motion.vectors import Joints, Vector6, ZERO6
 
 Floats = NDArray[np.float64]
+#: Times that differ by less are the same [s]; the wire counts in microseconds.
+SAME_TIME = 5e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,11 +43,13 @@ class JointSpline:
         *,
         velocities: Vector6 | None = None,
         accelerations: Vector6 | None = None,
+        start_time: float = 0.0,
     ) -> JointSpline:
         """
         Return the curve through pieces, from joint positions [rad].
 
         :param velocities: those at the start [rad/s]; None = at rest. So ``accelerations``.
+        :param start_time: when the first piece begins [s].
         """
         pieces = tuple(pieces)
         ends = [
@@ -61,7 +65,8 @@ class JointSpline:
             cubic_rows(durations, before, after),
             quintic_rows(durations, before, after),
         )
-        return cls(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=coefficients)
+        times = start_time + np.concatenate([[0.0], np.cumsum(durations)])
+        return cls(times=times, coefficients=coefficients)
 
     @classmethod
     def through(cls, times: Floats, rows: MotionRows, *, quintic: bool) -> JointSpline:
@@ -76,6 +81,19 @@ class JointSpline:
     def duration(self) -> float:
         """The time of its end [s]."""
         return float(self.times[-1])
+
+    def followed_by(self, other: JointSpline, since: float) -> JointSpline:
+        """
+        Return this curve up to the start of another, and that one.
+
+        :param since: what ends before this time is left out [s].
+        """
+        end = int(np.searchsorted(self.times, other.times[0] - SAME_TIME))
+        first = min(self.piece(since), end)
+        return JointSpline(
+            times=np.concatenate([self.times[first:end], other.times]),
+            coefficients=np.concatenate([self.coefficients[first:end], other.coefficients]),
+        )
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
         """Return position [rad], velocity [rad/s], acceleration [rad/s^2] (6,) at a time."""

@@ -153,9 +153,16 @@ class Path(PathWithEvents):
         )
         return self._with(_settings=replace(self._settings, path_offset=offset))
 
-    def keep_open(self) -> Path:
-        """Let points be appended while the arm moves."""
-        return self._with(_settings=replace(self._settings, keep_open=True))
+    def keep_open(self, replace_horizon: float = 0.0) -> Path:
+        """
+        Let points be appended while the arm moves.
+
+        :param replace_horizon: how far ahead of the arm points are final, so that later ones can
+            be replaced [s]; 0 = they will not be.
+        """
+        return self._with(
+            _settings=replace(self._settings, keep_open=True, replace_horizon=replace_horizon)
+        )
 
     def safe(self, output: Output, value: float, *, restore: bool = False) -> Path:
         """

@@ -94,6 +94,7 @@ class PathSettings:
     goal_time_tolerance: float = 0.0
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
+    replace_horizon: float = 0.0
     safe_outputs: tuple[SafeOutput, ...] = ()
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
     stall_timeout: float = 0.0

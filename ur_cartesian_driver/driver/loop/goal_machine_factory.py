@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
+from math import inf
 from pkgutil import resolve_name
 from typing import TypeAlias
 
@@ -21,6 +23,7 @@ from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoFeeder
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
@@ -74,6 +77,14 @@ def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     if request.freedrive:
         return FreedriveFeeder(GoalMonitor(job, ANY_DEVIATION), settings)
     assert job.spline is not None
+    if job.keep_open:
+        horizon = job.replace_horizon or inf
+        settings = replace(
+            settings,
+            target_lag=min(settings.target_lag, horizon),
+            max_lag=min(settings.max_lag, horizon),
+        )
+        return AppendServoFeeder(_monitor(request, config), settings, config.keep_open_timeout)
     setpoints = SplineSetpoints(job.spline)
     if job.offset_band is None or request.arm is None:
         return ServoFeeder(_monitor(request, config), ServoStream(setpoints, settings))

@@ -291,13 +291,12 @@ class MotionRunner:
         """Keep the points that the machine has taken, and tell their owner."""
         pending, self._pending_append = self._pending_append, None
         assert pending is not None
-        if not answer.refusal and pending.points:
-            self._points.put(pending.append_job.records_before, pending.points)
-            if pending.append_job.job is not None and self._machine is not None:
-                self._recorder.add_plan(
-                    pending.append_job.job.reference,
-                    self._machine.end_time_of(pending.append_job.records_before),
-                )
+        job, before = pending.append_job.job, pending.append_job.records_before
+        if not answer.refusal and job is not None:
+            if pending.points:
+                self._points.put(before, pending.points)
+            if self._machine is not None:
+                self._recorder.add_plan(job.reference, self._machine.end_time_of(before))
         self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
 
     def _open_servo(self) -> None:

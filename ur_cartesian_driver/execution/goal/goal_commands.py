@@ -91,6 +91,8 @@ class AnswerAppend:
     refusal: str = ''
     #: They would be taken if they were planned from rest: the ending has been sent.
     replan_from_rest: bool = False
+    #: A new tail would be taken if it began at this time or later [s].
+    earliest_cut: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

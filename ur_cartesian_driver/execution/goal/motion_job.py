@@ -81,6 +81,8 @@ class MotionJob:
     request_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     #: Whether points may be appended (keep_open).
     keep_open: bool = False
+    #: How far ahead of the arm its motion may be final [s]; 0 = not limited.
+    replace_horizon: float = 0.0
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
     #: Whether the robot program does something where the arm stands.
@@ -141,6 +143,8 @@ class AppendJob:
     #: Times count from the start of the goal; the reference path follows the records that stay.
     #: None = the client closes the goal, which ends with the points that it has.
     job: MotionJob | None
+    #: Where it leaves the plan of the records that stay [s]; None = behind their end.
+    cut_time: float | None = None
 
 
 def job_from_plan(
@@ -149,12 +153,14 @@ def job_from_plan(
     *,
     start_time: float = 0.0,
     ending_records: int = 0,
+    spline: JointSpline | None = None,
 ) -> MotionJob:
     """
     Return the job of a plan, for a robot program of a dialect.
 
     :param start_time: when its first segment begins [s]; not 0 for appended points.
     :param ending_records: see :class:`MotionJob`.
+    :param spline: the joints of a part that does not begin at rest.
     """
     goal = plan.goal
     rows = plan.rows
@@ -186,6 +192,7 @@ def job_from_plan(
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
+        replace_horizon=goal.replace_horizon,
         presses=tuple(_press_windows(plan)),
         safe_outputs=goal.safe_outputs,
         following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
@@ -223,7 +230,7 @@ def job_from_plan(
         is_motion=is_motion,
         end_times=np.repeat(end_times, records),
         request_times=np.repeat(request_times, records),
-        spline=plan.joint_spline if plan.execution.traits.streams_setpoints else None,
+        spline=(spline or plan.joint_spline) if plan.execution.traits.streams_setpoints else None,
     )
 
 

@@ -73,7 +73,7 @@ class WireRecords:
 
     def motions_before(self, record: int) -> int:
         """Return how many motions come before a record."""
-        return self._first_motion + bisect_left(self._motions, record)
+        return self._first_motion + bisect_left(self._motions, record) if record else 0
 
     def end_time(self, records: int) -> float:
         """Return when the last of so many records is planned to end [s]."""

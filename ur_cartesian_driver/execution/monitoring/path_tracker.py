@@ -269,12 +269,13 @@ class PathTracker:
         """
         Append a path from a time on [s], and forget what lies far behind.
 
-        At that time both paths have the same pose, and the arm has not reached it yet.
+        From that time up to where the arm is, if it is farther on, both paths are the same.
         """
-        old, row = self.path, self.path_position.row
+        old, row, now = self.path, self.path_position.row, self.time()
         first = max(0, min(bisect_left(self._time, self._time[row] - HISTORY_TIME), row))
         end = max(bisect_right(self._time, since + SAME_TIME), row + 1)
-        new = bisect_right(path.time, since + SAME_TIME)
+        known = max(self._time[end - 1], now, since - 2.0 * SAME_TIME)
+        new = bisect_right(path.time, known + SAME_TIME)
         self._load(
             ReferencePath(
                 **{
@@ -285,8 +286,10 @@ class PathTracker:
                 }
             )
         )
+        row -= first
+        time = self._time[row + 1] - self._time[row]
         self.path_position = PathPosition(
-            row - first, self.path_position.fraction if row + 1 < end else 0.0
+            row, (now - self._time[row]) / time if time > 0.0 else 0.0
         )
 
     def pose(self, path_position: PathPosition | None = None) -> Pose:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ur_cartesian_driver.execution.goal.appended_records import AppendedRecords
 from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
@@ -45,13 +46,6 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 #: How long a motion that is only its ending so far waits for more before it begins [s]: the robot
 #: program waits half a second for its first point.
 FIRST_POINTS_TIMEOUT = 0.25
-#: The answer to points that come after a request with ``last: true``.
-CLOSED_BY_CLIENT = 'The goal was closed by an earlier request with last: true.'
-
-#: In these a goal takes more points.
-_ACCEPTS_POINTS = frozenset(
-    {GoalState.ARMING, GoalState.MOVING, GoalState.RUNNING_OUT, GoalState.AWAITING_POINTS}
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,17 +70,12 @@ class AppendFeeder(Feeder):
         self._settings = settings if settings is not None else AppendSettings()
         self.append_timeout = self._settings.timeout
         self._window = SendWindow()
-        #: Whether more points may come.
-        self._is_open = True
-        #: How many records will be sent whatever comes: all but the ending.
-        self._committed = monitor.job.points - monitor.job.ending_records
+        self._appended = AppendedRecords(monitor)
         #: How many were sent before this stream, and whether its number was sent.
         self._stream_first_record = 0
         self._is_stream_end_sent = False
         #: When it was begun, by the robot's clock [s].
         self._stream_start_time = 0.0
-        #: How often the motion was brought to rest, and behind which point the last time.
-        self._stop_count = self._last_stop_point = 0
         #: Whether the arm has come to rest there and has not gone on.
         self._is_resting = False
 
@@ -94,31 +83,9 @@ class AppendFeeder(Feeder):
 
     def append(self, append_job: AppendJob, state: GoalState) -> AnswerAppend:
         """Take all points or none."""
-        answer = self._refuse(append_job, state)
-        if answer is not None:
-            return answer
-        job = append_job.job
-        if job is not None:
-            self.monitor.append(job, append_job.records_before)
-        self._is_open = job is not None and job.keep_open
-        self._committed = self.monitor.records.total
-        if job is not None and job.keep_open:
-            self._committed -= job.ending_records
-        return AnswerAppend(number=append_job.number)
-
-    def _refuse(self, append_job: AppendJob, state: GoalState) -> AnswerAppend | None:
-        number = append_job.number
-        if not self._is_open:
-            return AnswerAppend(number=number, refusal=CLOSED_BY_CLIENT)
-        if state not in _ACCEPTS_POINTS:
-            return AnswerAppend(number=number, refusal='The goal is ending.')
-        if append_job.job is not None and append_job.records_before != self._committed:
-            return AnswerAppend(
-                number=number,
-                replan_from_rest=True,
-                refusal='The motion was closed before these points came.',
-            )
-        return None
+        sent = self._window.sent
+        sent_until = self.monitor.records.end_time(sent)
+        return self._appended.append(append_job, state, sent=sent, sent_until=sent_until)
 
     def supply(self, state: GoalState) -> Meaning:
         """Return whether points run out, or whether a goal that waits at rest goes on."""
@@ -127,7 +94,7 @@ class AppendFeeder(Feeder):
         if state is not GoalState.AWAITING_POINTS:
             return NO_MEANING
         if self.monitor.records.total == self._window.sent:
-            return NO_MEANING if self._is_open else (GoalSignal.NO_MORE_POINTS, '')
+            return NO_MEANING if self._appended.is_open else (GoalSignal.NO_MORE_POINTS, '')
         packet = self.monitor.latest
         # Packets may be late: one that shows the arm at rest says from where it goes on.
         if packet is None or not is_at_rest(packet):
@@ -138,7 +105,7 @@ class AppendFeeder(Feeder):
     def _is_running_out(self) -> bool:
         """Tell whether the program is about to ask for a point that is not there."""
         sent = self._window.sent
-        if not self._is_open or sent != self._committed:
+        if not self._appended.is_open or sent != self._appended.committed:
             return False
         if sent == self._stream_first_record:
             return self._robot_time() - self._stream_start_time >= FIRST_POINTS_TIMEOUT
@@ -176,17 +143,14 @@ class AppendFeeder(Feeder):
         """Return the records up to the horizon, without the ending."""
         ahead = self.monitor.records.count_until(self.monitor.time() + self._settings.horizon)
         first, end = self._window.release(
-            self.monitor.records_begun(), min(ahead, self._committed)
+            self.monitor.records_begun(), min(ahead, self._appended.committed)
         )
         commands: list[GoalCommand] = [SendPoints(first=first, end=end)] if end > first else []
-        return commands if self._is_open else commands + self._end_stream()
+        return commands if self._appended.is_open else commands + self._end_stream()
 
     def _send_ending(self) -> list[GoalCommand]:
-        records = self.monitor.records
-        self._stop_count += 1
-        self._last_stop_point = records.points - 1
-        first, end = self._window.sent, records.total
-        self._window.sent = self._committed = end
+        first, end = self._window.sent, self._appended.run_out()
+        self._window.sent = end
         commands: list[GoalCommand] = [SendPoints(first=first, end=end)] if end > first else []
         return commands + self._end_stream()
 
@@ -209,16 +173,9 @@ class AppendFeeder(Feeder):
     def location(self, *, started: bool) -> str:
         """Return where the goal ended, as a clause."""
         if self._is_resting:
-            return f'at rest behind point {self._last_stop_point}, waiting for more'
+            return f'at rest behind point {self._appended.last_stop_point}, waiting for more'
         return super().location(started=started)
 
     def report_lines(self) -> tuple[str, ...]:
         """Return how often the arm had to wait for points."""
-        if not self._stop_count:
-            return ()
-        times = 'once' if self._stop_count == 1 else f'{self._stop_count} times'
-        return (
-            f'the motion was brought to rest {times}, the last time behind point '
-            f'{self._last_stop_point}, because no more points came in time; what was appended '
-            'later is later by as much as that took',
-        )
+        return self._appended.report_lines

@@ -39,6 +39,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
     Fault,
     GoalSignal,
     GoalState,
+    INTERRUPTIBLE_STATES,
     Meaning,
     NO_MEANING,
 )
@@ -131,6 +132,7 @@ class ServoFeeder(Feeder):
         match state:
             case GoalState.MOVING:
                 self.monitor.start(0)
+                self._has_filled = False
                 self.stream.begin()  # the next packet is answered with the first set-point
             case GoalState.RESTORING:
                 # Nothing is written while this lasts, and the program must not wait for that.
@@ -179,7 +181,7 @@ class ServoFeeder(Feeder):
         if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
             # The time of the goal begins with its motion: not with the filling of the buffer.
             self._has_filled = True
-            self.start_delay = self.monitor.scaled_time + self.stream.lag
+            self.start_delay = self.monitor.scaled_time - self.stream.source_time + self.stream.lag
         commands: list[GoalCommand] = [] if row is None else [WriteServo(values=row)]
         if before is ServoPhase.OPENING and self.stream.phase is ServoPhase.ENTERING:
             commands.append(EnterServo())
@@ -207,7 +209,7 @@ class ServoFeeder(Feeder):
             return NO_MEANING
         if state is GoalState.CANCELLING:
             return GoalSignal.CANCELED, ''
-        if state in (GoalState.MOVING, GoalState.SETTLING):
+        if state in INTERRUPTIBLE_STATES:
             # It does so where it is about to end, for a reason that we may hear of in a moment.
             return GoalSignal.PROGRAM_STOPPED, (
                 'the robot program left the servo by itself; its log on the pendant says why'
@@ -223,7 +225,9 @@ class ServoFeeder(Feeder):
 
     def _pieces_begun(self, time: float) -> int:
         """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
-        return 0 if self._spline is None or time <= 0.0 else self._spline.piece(time) + 1
+        if self._spline is None or time <= 0.0:
+            return 0
+        return self.monitor.records.count_until(time)
 
     def applied_offset(self, packet: RobotState) -> AppliedOffset:
         """Return how far the path has given way where the controller's target is."""

@@ -20,7 +20,8 @@ in :data:`TRANSITIONS`:
   The arm stops at the last set-point; it is repeated until the buffer is full again, then the
   motion continues slowly and speeds up.
 * **DRAINING**: the source is at its end; the last set-point is repeated.
-* **ARRIVED**: all set-points were carried out.
+* **ARRIVED**: all set-points were carried out. Where the source goes on, it begins again as after
+  READY.
 * **LEAVING**: mode IDLE is written; the arm brakes.
 * **LEFT**: the robot program has confirmed that, or has left by itself.
 
@@ -119,7 +120,7 @@ TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = {
     },
     ServoPhase.HOLDING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
     ServoPhase.DRAINING: {ServoEvent.DONE: ServoPhase.ARRIVED, **_STOPS},
-    ServoPhase.ARRIVED: {**_STOPS},
+    ServoPhase.ARRIVED: {ServoEvent.BEGUN: ServoPhase.FILLING, **_STOPS},
     ServoPhase.LEAVING: {ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT},
     ServoPhase.LEFT: {},
 }
@@ -220,6 +221,11 @@ class ServoStream:
         )
 
     # ---- state --------------------------------------------------------------------------------
+
+    @property
+    def source_time(self) -> float:
+        """Time of the source at the set-point that was made last [s]."""
+        return self._source_time
 
     @property
     def in_flight(self) -> float:

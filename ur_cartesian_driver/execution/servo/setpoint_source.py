@@ -49,6 +49,22 @@ class SplineSetpoints:
         """Whether the end of the spline is reached."""
         return self._time >= self._end - _TIME_TOLERANCE
 
+    @property
+    def time(self) -> float:
+        """The time of the set-point that was returned last [s]."""
+        return self._time
+
+    @property
+    def spline(self) -> JointSpline:
+        """The curve, without what lies behind."""
+        return self._spline
+
+    def replace_tail(self, spline: JointSpline) -> None:
+        """Go on along another spline from where it begins, or from here if that is later."""
+        self._spline = self._spline.followed_by(spline, self._time)
+        self._end = float(spline.times[-1])
+        self._rows, self._row = [], 0
+
     def next(self, dt: float) -> Vector6:
         """Return the joint positions so much later."""
         if dt <= 0.0:

@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, Waypoin
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
-from ur_cartesian_driver.motion.primitive import OutputRecord, SpeedLaw, SwitchOutput
+from ur_cartesian_driver.motion.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.planning.append.appendable_goal import (
@@ -40,6 +40,8 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
     numbered,
     ReplannablePoint,
 )
+from ur_cartesian_driver.planning.append.planned_part import PlannedPart
+from ur_cartesian_driver.planning.append.replaced_tail import cut_tail, cut_time, state_at
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
@@ -84,6 +86,10 @@ class AppendPlan:
     ending_records: int
     #: When it ends, if the goal has times [s].
     end_time: float | None
+    #: The joints in motion time, of a spline; and where it leaves the plan before it, if that is
+    #: not behind its last point [s].
+    spline: JointSpline | None = None
+    cut_time: float | None = None
     #: The answer to the client.
     text: str
     #: The goal to which the next points are appended.
@@ -106,7 +112,7 @@ def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPla
     )
     planner = _PartPlanner(base, appended, arm, options)
     if plan.execution.traits.is_spline:
-        return planner.spline_part(plan, end_state(plan), 0, 0.0)
+        return planner.spline_part(plan, SplineState(q=plan.start), end_state(plan), 0)
     return planner.moves_part(plan, 0, 0.0)
 
 
@@ -124,6 +130,23 @@ def plan_append(
     :param from_rest: whether the ending was sent, so that the arm rests, or is about to.
     :raises GoalRefused: points are numbered from the start of the goal.
     """
+    cut = cut_tail(appendable, cut_time(appendable, appended), arm)
+    if cut is appendable:
+        return _plan_behind(appendable, appended, arm, options, from_rest=from_rest)
+    assert cut.state is not None
+    part = _plan_behind(cut, appended, arm, options, from_rest=False)
+    return replace(part, cut_time=cut.state.time)
+
+
+def _plan_behind(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    arm: Arm,
+    options: PlanningOptions,
+    *,
+    from_rest: bool,
+) -> AppendPlan:
+    """Return the plan of points behind the last one of a goal."""
     check_appended_points(appendable, appended, options)
     options = replace(
         options, max_approach_distance=0.0, max_points=options.max_points + REPLANNED_POINTS
@@ -131,7 +154,7 @@ def plan_append(
     time, records_before = appendable.time, appendable.committed_records
     if from_rest:
         time, records_before = appendable.rest_time, appendable.records
-        appendable = replace(appendable, replannable=(), replanned_piece=None, outputs=())
+        appendable = replace(appendable, replannable=(), replanned=None, outputs=())
     planner = _PartPlanner(appendable, appended, arm, options)
     if not appendable.goal.execution.traits.is_spline:
         return planner.append_moves(records_before, time)
@@ -301,11 +324,11 @@ class _PartPlanner:
             first=before.points,
             tool_tips=tool_tips(goal, before.T_flange_active),
         )
-        segments, reference, start_time = found.segments, found.reference, start.time
-        if before.replanned_piece is not None:
-            piece, path = before.replanned_piece
-            segments = PlannedRows.of((piece, *segments))
-            start_time = start.time - piece.duration
+        segments, reference, begin = found.segments, found.reference, start
+        if before.replanned is not None:
+            pieces, path = before.replanned
+            segments = PlannedRows.of((*pieces, *segments))
+            begin = state_at(before, before.time)
             reference = _join_paths(path, reference)
         plan = Plan(
             goal=goal,
@@ -317,7 +340,7 @@ class _PartPlanner:
             execution=goal.execution,
             remarks=found.remarks,
         )
-        return self.spline_part(plan, found.end, records_before, start_time)
+        return self.spline_part(plan, begin, found.end, records_before)
 
     def _spline_goal(self, start: SplineState) -> GoalTable:
         """Return the checked goal of the appended points for the TCP, in motion time."""
@@ -332,6 +355,7 @@ class _PartPlanner:
             segments=appended.segments,
             io_commands=numbered(appended, before.points),
             keep_open=not appended.last,
+            replace_horizon=0.0,  # it counts for the goal, of which this may be the end
         )
         try:
             table = check(goal, self._options)
@@ -340,10 +364,14 @@ class _PartPlanner:
             raise refusal.reworded(_renumber_text(str(refusal), before.points)) from None
         points = table.waypoints
         shift = before.last_client_time + before.time_offset
-        return replace(table, waypoints=replace(points, times=points.times + shift))
+        return replace(
+            table,
+            waypoints=replace(points, times=points.times + shift),
+            replace_horizon=before.goal.replace_horizon,
+        )
 
     def spline_part(
-        self, plan: Plan, end: SplineState, records_before: int, start_time: float
+        self, plan: Plan, begin: SplineState, end: SplineState, records_before: int
     ) -> AppendPlan:
         """
         Return a part whose ending is a stopping piece, if the arm moves at its last point.
@@ -351,6 +379,7 @@ class _PartPlanner:
         If outputs are due at the last point or later, the piece to that point belongs to the
         ending too: they follow it on the wire, and their trigger poses depend on the next points.
         """
+        start_time = begin.time
         closing = self._stop(end) if end.is_moving and not self._appended.last else None
         complete, due_commands = self._place_outputs(plan, closing, start_time)
         pending = tuple(
@@ -359,12 +388,25 @@ class _PartPlanner:
             if time >= end.time - SAME_TIME and not self._appended.last
         )
         ending = complete.segments[len(plan.segments) - bool(pending) :]
-        time, replanned_piece = end.time, None
+        time, replanned = end.time, None
         if pending:
             piece = plan.segments[-1]
             time -= piece.duration
-            replanned_piece = piece, _path_from(plan.reference, time)
+            replanned = (piece,), _path_from(plan.reference, time)
         last = complete.segments[-1]
+        spline = JointSpline.of(
+            begin.q,
+            (piece for piece in complete.rows.primitives if isinstance(piece, Spline)),
+            velocities=begin.qd,
+            accelerations=begin.qdd,
+            start_time=start_time,
+        )
+        records = np.cumsum([1 + len(segment.outputs) for segment in complete.segments])
+        part = PlannedPart(
+            spline=spline,
+            waypoints=plan.rows.waypoints,
+            records_before=records_before + np.append(0, records)[: len(plan.segments)],
+        )
         next_goal = replace(
             self._before,
             time=time,
@@ -372,9 +414,12 @@ class _PartPlanner:
             q_rest=last.joints if closing else end.q,
             state=end,
             outputs=pending,
-            replanned_piece=replanned_piece,
+            replanned=replanned,
+            parts=(*self._before.parts, part),
+            commands=(*self._before.commands, *due_commands[len(self._before.outputs) :]),
         )
-        return self._part(complete, records_before, start_time, ending, next_goal, timed=True)
+        appended = self._part(complete, records_before, start_time, ending, next_goal, timed=True)
+        return replace(appended, spline=spline)
 
     def _stop(self, end: SplineState) -> tuple[PlannedSegment, ReferencePath]:
         """Return the piece that brings the arm to rest after the last point, and its path."""

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal_table import (
 from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -40,6 +41,15 @@ class AppendedPoints:
     io_commands: tuple[IOCommand, ...] = ()
     #: Whether they are the last.
     last: bool = False
+    #: What they replace: the points from this one on, or the motion from this time on, which
+    #: counts as the times of points [s]. Without either they follow the last point.
+    replace_from_point: int | None = None
+    replace_from_time: float | None = None
+
+    @property
+    def replaces(self) -> bool:
+        """Whether they take the place of others."""
+        return self.replace_from_point is not None or self.replace_from_time is not None
 
     def in_rows(self) -> AppendedPoints:
         """
@@ -90,10 +100,15 @@ class AppendableGoal:
     replannable: tuple[ReplannablePoint, ...] = ()
     #: Of a spline: the state at its last point.
     state: SplineState | None = None
-    #: Its last piece and path, if outputs keep them from being committed.
-    replanned_piece: tuple[PlannedSegment, ReferencePath] | None = None
+    #: Pieces before that and their path that are sent (again) with the next ones: outputs follow
+    #: them, or a new tail begins in the middle of one.
+    replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
     #: Commands that may not have switched yet, with the time at which they are due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
+    #: Of a spline: what is planned and not passed, in the order in which it was planned; each part
+    #: holds until the next one begins. And all commands on it.
+    parts: tuple[PlannedPart, ...] = ()
+    commands: tuple[tuple[float, IOCommand], ...] = ()
 
 
 def check_appended_points(
@@ -147,6 +162,7 @@ def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
 
 def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
     """Refuse points that are not later than those before them, in client time."""
+    is_tail = appended.replace_from_time is not None
     times, first = WaypointRows.of(appended.waypoints).times, appendable.points
     if appendable.last_client_time == 0.0 and not times.any():
         return
@@ -160,6 +176,7 @@ def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
     for i in rows_where(times <= before)[:1]:
         raise InvalidGoal(
             point_field(first + i, 'time_from_start'),
-            f'is {times[i]:g} s, not later than the {before[i]:g} s of the point before',
+            f'is {times[i]:g} s, not later than the {before[i]:g} s '
+            + ('where the new tail begins' if not i and is_tail else 'of the point before'),
             'count times from the start of the goal',
         )

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
@@ -26,10 +26,17 @@ from ur_cartesian_driver.motion.pose import Quaternion
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.default_tolerances import named_tolerances
-from ur_cartesian_driver.planning.request.goal_fields import is_spline, point_field, segment_field
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_spline,
+    point_field,
+    resolve_execution_mode,
+    segment_field,
+)
 
 #: How far the length of a quaternion may differ from 1.
 QUATERNION_TOLERANCE = 1e-3
+#: The shortest and the longest horizon behind which points can be replaced [s].
+REPLACE_HORIZONS = 0.05, 1.0
 
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
@@ -113,6 +120,35 @@ def check_tolerance_numbers(goal: GoalTable, options: PlanningOptions) -> None:
             'stall_timeout',
             f'is {goal.stall_timeout:g} s; it must not be negative',
             f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s',
+        )
+
+
+def check_replace_horizon(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse a horizon that is none, or in a goal whose points cannot be replaced."""
+    field, horizon = 'replace_horizon', goal.replace_horizon
+    check_finite(field, (horizon,))
+    if not horizon:
+        return
+    low, high = REPLACE_HORIZONS
+    if not low <= horizon <= high:
+        raise InvalidGoal(
+            field,
+            f'is {horizon:g} s, but must be 0 (nothing is replaced) or from {low:g} to {high:g} s',
+            'set it to 0.15',
+        )
+    if not goal.keep_open:
+        raise InvalidGoal(
+            field,
+            f'is {horizon:g} s, but only points of a goal with keep_open can be replaced',
+            'set keep_open',
+        )
+    mode = resolve_execution_mode(goal)
+    if not mode.traits.is_spline:
+        raise NotAvailable(
+            field,
+            f'is {horizon:g} s, but motions of the robot, which {mode.name} sends, cannot be '
+            'planned from the middle of a motion',
+            'set execution to SPLINE or SERVO',
         )
 
 

@@ -61,6 +61,7 @@ from ur_cartesian_driver.planning.request.number_rules import (
     check_frame_numbers,
     check_min_speed_fraction,
     check_point_numbers,
+    check_replace_horizon,
     check_segment_numbers,
     check_tolerance_numbers,
 )
@@ -138,19 +139,17 @@ def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
-    if goal.keep_open and not options.dialect.supports_append:
+    mode = resolve_execution_mode(goal)
+    if (
+        goal.keep_open
+        and not mode.traits.streams_setpoints
+        and not options.dialect.supports_append
+    ):
         raise NotAvailable(
             'keep_open',
             f'is set, but a robot program of wire dialect {options.dialect.name} needs the '
             'number of points at the start',
             'send all points at once, or use a robot program of wire dialect 2.14',
-        )
-    mode = resolve_execution_mode(goal)
-    if goal.keep_open and not mode.traits.can_keep_open:
-        raise NotAvailable(
-            'keep_open',
-            f'is set, but a {mode.name} goal needs all its points at the start',
-            'set execution to SPLINE or PRIMITIVES',
         )
     _can_stall(goal, options)
     check_outputs(goal, options)
@@ -269,6 +268,7 @@ RULES: tuple[Rule, ...] = (
     check_segment_numbers,
     check_tolerance_numbers,
     check_min_speed_fraction,
+    check_replace_horizon,
     _tolerances_are_measurable,
     _stamp,
     _supported,

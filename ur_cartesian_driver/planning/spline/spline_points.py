@@ -39,6 +39,9 @@ def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     :param start: the tool at the start in base, one row.
     """
     given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
+    if goal.replace_horizon and not given.accelerations.any():
+        # A tail begins anywhere: the acceleration goes on there, and at every point.
+        given = replace(given, accelerations=np.full_like(given.accelerations, np.nan))
     poses = np.concatenate([start.poses, given.poses])
     poses[:, 3:] = normalized_rows(poses[:, 3:])
     points = ToolPoints(

@@ -17,10 +17,18 @@ from ur_cartesian_driver.goal_files.goal_reading import (
     nanoseconds,
     rows_of_points,
 )
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.srv import AppendPoints
+
+_APPEND, _FROM_POINT, _FROM_TIME = REPLACE_CHOICES = (
+    AppendPoints.Request.APPEND,
+    AppendPoints.Request.REPLACE_FROM_POINT,
+    AppendPoints.Request.REPLACE_FROM_TIME,
+)
 
 
 def goal_from_message(
@@ -63,11 +71,19 @@ def appended_points_from_message(message: Message) -> AppendedPoints:
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
     waypoints, segments = rows_of_points(message, message.points, 'points')
+    if message.replace not in REPLACE_CHOICES:
+        raise InvalidGoal(
+            'replace',
+            f'is {message.replace}; allowed are APPEND = {_APPEND}, REPLACE_FROM_POINT = '
+            f'{_FROM_POINT}, REPLACE_FROM_TIME = {_FROM_TIME}',
+        )
     return AppendedPoints(
         waypoints=waypoints,
         segments=segments,
         io_commands=io_commands(message),
         last=message.last,
+        replace_from_point=message.first_index if message.replace == _FROM_POINT else None,
+        replace_from_time=message.replace_from_time if message.replace == _FROM_TIME else None,
     )
 
 

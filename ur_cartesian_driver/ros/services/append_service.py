@@ -17,7 +17,12 @@ from typing import Any
 
 from rclpy.node import Node
 
-from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import (
+    AlreadySent,
+    DriverError,
+    InvalidGoal,
+    RobotNotReady,
+)
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
 from ur_cartesian_driver.ros.goals.goal_run import GoalRun
@@ -76,6 +81,13 @@ class AppendService:
             )
         try:
             return self._append_to_run(run, request)
+        except AlreadySent as error:
+            return _refusal(
+                str(error),
+                run.points,
+                first_index=error.first_point,
+                first_time=error.first_time,
+            )
         except DriverError as error:
             return _refusal(str(error), run.points)
         except Exception as error:
@@ -102,7 +114,7 @@ class AppendService:
         if run.last_append is not None and run.last_append[0] == request_key:
             return run.last_append[1]  # the same request again
         points = motion.appender.points
-        if request.first_index != points:
+        if not new_points.replaces and request.first_index != points:
             raise InvalidGoal(
                 'first_index',
                 f'is {request.first_index}, but the goal has {points} points',
@@ -112,7 +124,10 @@ class AppendService:
             )
         appended = motion.appender.append(new_points)
         response = AppendPoints.Response(
-            accepted=True, message=appended.text, points_received=appended.points
+            accepted=True,
+            message=appended.text,
+            points_received=appended.points,
+            first_index=appended.first,
         )
         run.last_append = (request_key, response)
         return response
@@ -123,5 +138,5 @@ def _digest(new_points: AppendedPoints) -> bytes:
     return sha256(pickle.dumps(new_points)).digest()
 
 
-def _refusal(text: str, points: int = 0) -> Any:
-    return AppendPoints.Response(accepted=False, message=text, points_received=points)
+def _refusal(text: str, points: int = 0, **first: float) -> Any:
+    return AppendPoints.Response(accepted=False, message=text, points_received=points, **first)

@@ -1,0 +1,130 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A planner that looks ahead again and again, as a learned policy does; and its readings."""
+
+from collections.abc import Callable
+from math import ceil, cos, nan, pi, sin
+from typing import Any
+
+from append_goals import AppendMotion, clear_network_log, moved
+import numpy as np
+from numpy.typing import NDArray
+from plain_clients import RtdeRecorder
+from robot_cell import HOST, RobotCell, RTDE
+
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+
+#: Time between two points of a chunk, and how far it looks ahead [s].
+STEP, AHEAD = 0.05, 0.8
+#: How long after what the planner has seen of the arm a new tail begins, and how long after that
+#: its first point is, at least [s].
+LEAD, GAP = 0.2, 0.08
+#: Radius of the circle [m], and its period [s].
+RADIUS, PERIOD = 0.06, 4.0
+#: By how much the place of the circle wanders [m], and how fast [rad/s].
+WANDER, WANDER_RATE = 0.01, 2.0
+
+
+class Replanner:
+    """
+    Plans the next piece of a circle whose centre wanders.
+
+    Each chunk takes the centre to be where it is seen, so chunks contradict each other.
+    """
+
+    def __init__(self, home: Pose) -> None:
+        self.home = home
+
+    def chunk(self, time: float, *, last: bool = False) -> list[Waypoint]:
+        """Return points behind a time of the motion [s]; with ``last`` they end at rest."""
+        shift = WANDER * sin(WANDER_RATE * time)
+        first = ceil((time + GAP) / STEP - 1e-9)
+        points = [self._point(k * STEP, shift) for k in range(first, first + round(AHEAD / STEP))]
+        if last:
+            points[-1] = Waypoint(time=points[-1].time + 0.5, pose=points[-1].pose, twist=ZERO6)
+        return points
+
+    def _point(self, time: float, shift: float) -> Waypoint:
+        # The first round begins with a ramp of a second.
+        angle = 2.0 * pi / PERIOD * (0.5 * time * time if time < 1.0 else time - 0.5)
+        pose = moved(
+            self.home, RADIUS * sin(angle), RADIUS * (1.0 - cos(angle)), shift * min(1.0, time)
+        )
+        return Waypoint(time=round(time, 6), pose=pose, twist=vector6([nan] * 6))
+
+    def goal(self, execution: ExecutionMode, **changes: Any) -> Goal:
+        """Return the goal with the first chunk."""
+        fields: dict[str, Any] = {'keep_open': True, 'replace_horizon': 0.15}
+        return Goal(waypoints=tuple(self.chunk(0.0)), execution=execution, **{**fields, **changes})
+
+
+class Readings:
+    """What another RTDE client reads of the joints: time, targets and their rates, in rows."""
+
+    def __init__(self, cell: RobotCell, seconds: float) -> None:
+        self._cell, self._recorder = cell, RtdeRecorder()
+        self._rows, self._count = np.empty((int(seconds / cell.robot.config.cycle), 13)), 0
+
+    async def connect(self) -> None:
+        """Begin to read."""
+        cycle = self._cell.robot.config.cycle
+        connection, _ = await self._cell.loop.create_connection(lambda: self._recorder, HOST, RTDE)
+        connection.write(self._recorder.codec.requests(1.0 / cycle))
+
+    def take(self) -> None:
+        """Take what has come in, into memory that does not grow."""
+        for row in self._recorder.rows:
+            self._rows[self._count] = (row.time, *row.target_q, *row.target_qd)
+            self._count += 1
+        self._recorder.rows.clear()
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """All rows (n, 13): time [s], target_q [rad], target_qd [rad/s]."""
+        self.take()
+        return self._rows[: self._count]
+
+    @property
+    def moving(self) -> NDArray[np.float64]:
+        """Those from the first in which the arm moves to the last."""
+        rows = self.rows
+        moves = np.flatnonzero((np.abs(rows[:, 7:]) > 1e-4).any(axis=1))
+        return rows[moves[0] : moves[-1] + 1]
+
+    @property
+    def accelerations(self) -> NDArray[np.float64]:
+        """Of the moving arm, by differences (n, 6) [rad/s^2]."""
+        rows = self.moving
+        steps: NDArray[np.float64] = np.diff(rows[:, 7:], axis=0) / np.diff(rows[:, :1], axis=0)
+        return steps
+
+
+async def replan(
+    cell: RobotCell,
+    motion: AppendMotion,
+    readings: Readings,
+    rate: float,
+    seconds: float,
+    measure: Callable[[], object] = bool,
+) -> None:
+    """Replace the tail so many times a second, measure once a second, then end at rest."""
+    planner, count = Replanner(motion.home), 0
+    assert await motion.until(lambda: motion.motion.progress)
+    begin = cell.loop.time()
+    while count < seconds * rate:
+        time = motion.progress.time + LEAD
+        await motion.append(planner.chunk(time), replace_from_time=time)
+        count += 1
+        readings.take()
+        clear_network_log(cell)
+        del motion.motion.progress[:-1]
+        if count % rate == 0:
+            measure()
+        due = begin + count / rate
+        assert await motion.until(lambda due=due: cell.loop.time() >= due), motion.outcome.text
+    time = motion.progress.time + LEAD
+    await motion.append(planner.chunk(time, last=True), replace_from_time=time, last=True)
+    await motion.ended()

@@ -1,0 +1,70 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The pieces of a spline as they were planned in one go, with the state of the joints on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.joint_spline import JointSpline, SAME_TIME
+from ur_cartesian_driver.motion.plan import PlannedSegment
+from ur_cartesian_driver.motion.polynomials import evaluate
+from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.planning.spline.spline_planner import SplineState
+
+# Digits of joint rates that are more than rounding, and of times: microseconds.
+_DIGITS, _TIME_DIGITS = 12, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlannedPart:
+    """The pieces of one append plan; a new tail may begin on them."""
+
+    #: The joints in motion time, with the ending.
+    spline: JointSpline
+    #: Of each piece up to its last point: the point to which it leads, and how many records of
+    #: the goal are before it.
+    waypoints: NDArray[np.int32]
+    records_before: NDArray[np.intp]
+
+    def begin(self, row: int) -> float:
+        """Return when a piece begins [s]; the one behind the last: when that ends."""
+        return float(self.spline.times[row])
+
+    def row_at(self, time: float) -> int:
+        """Return the piece that runs at a time [s]."""
+        times = self.spline.times[: len(self.waypoints)]
+        return max(int(np.searchsorted(times, time + SAME_TIME, side='right')) - 1, 0)
+
+    def state(self, row: int, time: float) -> SplineState:
+        """Return the state in a piece, as the robot program goes on from it."""
+        coefficients = self.spline.coefficients[row : row + 1]
+        rows = evaluate(coefficients, np.array([time - self.begin(row)]))
+        q, qd, qdd = (vector6(values[0].tolist()) for values in rows)
+        qd, qdd = (vector6(round(rate, _DIGITS) + 0.0 for rate in rates) for rates in (qd, qdd))
+        return SplineState(time=time, q=q, qd=qd, qdd=ZERO6 if self._is_cubic(row) else qdd)
+
+    def piece(self, row: int, end_time: float) -> PlannedSegment:
+        """Return a piece up to a time [s]."""
+        end, duration = self.state(row, end_time), end_time - self.begin(row)
+        return PlannedSegment(
+            primitive=Spline(
+                target=end.q,
+                velocities=end.qd,
+                accelerations=None if self._is_cubic(row) else end.qdd,
+                duration=round(duration, _TIME_DIGITS),
+            ),
+            waypoint=int(self.waypoints[row]),
+            length=0.0,
+            angle=0.0,
+            duration=round(duration, _TIME_DIGITS),
+            joints=end.q,
+            report_line='',
+        )
+
+    def _is_cubic(self, row: int) -> bool:
+        return not self.spline.coefficients[row, 4:].any()

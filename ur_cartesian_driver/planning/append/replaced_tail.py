@@ -1,0 +1,190 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Replace the tail of a spline: the goal as it was up to a cut, behind which a new tail is appended.
+
+The new tail begins with the position, velocity and acceleration that the joints have at the cut.
+A piece in whose middle the cut is becomes a shorter piece, which is sent in its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil, inf
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.errors import AlreadySent, InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
+from ur_cartesian_driver.planning.append.planned_part import PlannedPart
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.request.number_rules import check_finite
+from ur_cartesian_driver.planning.spline.spline_planner import SplineState
+
+#: Pieces are not cut into shorter ones [s]: a cycle of the slowest controllers.
+MIN_PIECE_TIME = 0.008
+#: Passed pieces are kept for so long [s]: what is known of the arm may be old.
+HISTORY_TIME = 0.5
+# Time between the rows of the path of pieces that are sent again [s].
+_ROW_PERIOD = 0.004
+_TIME_DIGITS = 6
+
+
+def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
+    """
+    Return when a new tail is to begin, in motion time [s]; infinite = behind the last point.
+
+    :raises GoalRefused: there is no such point or time, or the goal has no tail to replace.
+    """
+    if not new_points.replaces:
+        return inf
+    point, time = new_points.replace_from_point, new_points.replace_from_time
+    mode = before.goal.execution
+    field = 'replace_from_time' if point is None else 'replace_from_point'
+    if point is not None and time is not None:
+        raise InvalidGoal(field, 'is given, and replace_from_time too', 'give one of them')
+    if not mode.traits.is_spline:
+        raise NotAvailable(
+            field,
+            f'is given, but motions of the robot, which {mode.name} sends, cannot be planned from '
+            'the middle of a motion',
+            'append behind the last point, or send the goal with execution SPLINE or SERVO',
+        )
+    if time is not None:
+        check_finite(field, (time,))
+        time = round(time + before.time_offset, _TIME_DIGITS)
+    else:
+        assert point is not None
+        if not 0 <= point <= before.points:
+            raise InvalidGoal(
+                field,
+                f'is {point}, but the goal has {before.points} points',
+                f'give at most {before.points}, which appends',
+            )
+        time = inf if point == before.points else _end_time(before, point - 1)
+    assert before.state is not None
+    return time if time < before.state.time - SAME_TIME else inf
+
+
+def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
+    """
+    Return the first point that can be replaced, and the earliest time.
+
+    :param time: until which everything is final, in motion time [s].
+    :returns: its number, and a time as the client counts [s], in whole milliseconds.
+    """
+    client_time = ceil(1e3 * (time - before.time_offset) - 1e-6) * 1e-3
+    part = _part_at(before, time)
+    if before.state is None or part is None or time >= before.state.time - SAME_TIME:
+        return before.points, round(max(client_time, before.last_client_time), _TIME_DIGITS)
+    point = int(part.waypoints[part.row_at(time)])
+    passed = _end_time(before, point - 1) < time - SAME_TIME
+    return point + passed, round(client_time, _TIME_DIGITS)
+
+
+def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
+    """
+    Return a goal without what is planned from a time on [s]; the same one if that is nothing.
+
+    :raises AlreadySent: the plan of that time is not known any more.
+    """
+    if time == inf:
+        return before
+    found = _part_at(before, time)
+    if found is not None:
+        time = _away_from_ends(found, time)
+        if before.state is None or time >= before.state.time - SAME_TIME:
+            return before
+        found = _part_at(before, time)
+    if found is None:
+        raise AlreadySent(*first_replaceable(before, before.parts[0].begin(0)))
+    part, row = found, found.row_at(time)
+    # Outputs that are due behind the cut follow the piece before it on the wire.
+    first = row - any(
+        time - SAME_TIME <= due < part.begin(row + 1) - SAME_TIME for due, _ in before.commands
+    )
+    if first < 0:
+        raise AlreadySent(*first_replaceable(before, part.begin(1)))
+    last = row if part.begin(row) < time - SAME_TIME else row - 1
+    pieces = tuple(part.piece(k, min(part.begin(k + 1), time)) for k in range(first, last + 1))
+    point, due_again = int(part.waypoints[row]), part.begin(first + 1) - SAME_TIME
+    commands = tuple(one for one in before.commands if one[1].waypoint < point)
+    return replace(
+        before,
+        points=point,
+        committed_records=int(part.records_before[first]),
+        time=part.begin(first),
+        state=part.state(row, time),
+        last_client_time=round(time - before.time_offset, _TIME_DIGITS),
+        replanned=(pieces, _path(before, part, first, time, arm)) if pieces else None,
+        commands=commands,
+        outputs=tuple(one for one in commands if one[0] >= due_again),
+        parts=tuple(each for each in before.parts if each.begin(0) < time),
+    )
+
+
+def without_passed(before: AppendableGoal, time: float) -> AppendableGoal:
+    """Return a goal without the pieces that the arm has passed at a time [s]."""
+    first = _part_at(before, time - HISTORY_TIME)
+    if first is None or first is before.parts[0]:
+        return before
+    return replace(
+        before,
+        parts=before.parts[before.parts.index(first) :],
+        commands=tuple(one for one in before.commands if one[0] >= first.begin(0)),
+    )
+
+
+def state_at(before: AppendableGoal, time: float) -> SplineState:
+    """Return the state at the begin of a piece [s]."""
+    part = _part_at(before, time)
+    assert part is not None
+    return part.state(part.row_at(time), time)
+
+
+def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
+    """Return the part that counts at a time [s]: the last one that has begun."""
+    for part in reversed(before.parts):
+        if part.begin(0) <= time + SAME_TIME:
+            return part
+    return None
+
+
+def _end_time(before: AppendableGoal, point: int) -> float:
+    """Return when a point is reached [s]; -inf = long ago."""
+    for part in reversed(before.parts):
+        if part.waypoints[0] <= point:
+            row = int(np.searchsorted(part.waypoints, point, side='right'))
+            return part.begin(row)
+    return -inf
+
+
+def _away_from_ends(part: PlannedPart, time: float) -> float:
+    """Return a time at which no piece becomes too short, not earlier [s]."""
+    row = part.row_at(time)
+    begin, end = part.begin(row), part.begin(row + 1)
+    if time - begin < SAME_TIME:
+        return begin
+    later = max(time, begin + MIN_PIECE_TIME)
+    return later if end - later >= MIN_PIECE_TIME else end
+
+
+def _path(
+    before: AppendableGoal, part: PlannedPart, first: int, time: float, arm: Arm
+) -> ReferencePath:
+    """Return the path of pieces that are sent again."""
+    begin = part.begin(first)
+    times = np.linspace(begin, time, ceil((time - begin) / _ROW_PERIOD) + 1)
+    rows = np.searchsorted(part.spline.times, times - SAME_TIME) - 1
+    poses = tcp_rows(
+        arm, before.T_flange_tcp or before.T_flange_active, part.spline.rows(times)[0]
+    )
+    return ReferencePath(
+        poses=poses,
+        time=times,
+        point=part.waypoints[np.clip(rows, 0, None)],
+        fraction=np.zeros(len(times)),
+    )
