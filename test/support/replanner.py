@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A planner that looks ahead again and again, as a learned policy does; and its readings."""
 
+import asyncio
 from collections.abc import Callable
 from math import ceil, cos, nan, pi, sin
 from typing import Any
@@ -10,7 +11,8 @@ from append_goals import AppendMotion, clear_network_log, moved
 import numpy as np
 from numpy.typing import NDArray
 from plain_clients import RtdeRecorder
-from robot_cell import HOST, RobotCell, RTDE
+from robot_cell import RobotCell, RTDE
+from virtual_network import HOST
 
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
@@ -66,13 +68,13 @@ class Readings:
 
     def __init__(self, cell: RobotCell, seconds: float) -> None:
         self._cell, self._recorder = cell, RtdeRecorder()
-        self._rows, self._count = np.empty((int(seconds / cell.robot.config.cycle), 13)), 0
+        self._cycle: float = cell.robot.config.cycle  # type: ignore[union-attr]
+        self._rows, self._count = np.empty((int(seconds / self._cycle), 13)), 0
 
     async def connect(self) -> None:
         """Begin to read."""
-        cycle = self._cell.robot.config.cycle
         connection, _ = await self._cell.loop.create_connection(lambda: self._recorder, HOST, RTDE)
-        connection.write(self._recorder.codec.requests(1.0 / cycle))
+        connection.write(self._recorder.codec.requests(1.0 / self._cycle))
 
     def take(self) -> None:
         """Take what has come in, into memory that does not grow."""
@@ -123,8 +125,8 @@ async def replan(
         del motion.motion.progress[:-1]
         if count % rate == 0:
             measure()
-        due = begin + count / rate
-        assert await motion.until(lambda due=due: cell.loop.time() >= due), motion.outcome.text
+        await asyncio.sleep(max(0.0, begin + count / rate - cell.loop.time()))
+        assert motion.outcome is None, motion.outcome
     time = motion.progress.time + LEAD
     await motion.append(planner.chunk(time, last=True), replace_from_time=time, last=True)
     await motion.ended()
