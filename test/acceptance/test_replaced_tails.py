@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 SECONDS = float(os.environ.get('REPLACED_TAIL_SECONDS', '2'))
 RATES = [float(rate) for rate in os.environ.get('REPLACED_TAIL_RATES', '30').split()]
-MODES = (ExecutionMode.SERVO,)
+MODES = (ExecutionMode.SERVO, ExecutionMode.SPLINE)
 #: Largest change of a joint's acceleration from one packet of 8 ms to the next [rad/s^2].
 MAX_JUMP = 1.0
 #: Of the tool on the circle [m/s].

@@ -63,6 +63,8 @@ class OnPathTolerance(IntEnum):
     STALL = 1
 
 
+#: How many pieces of a spline there are in the horizon behind which it can be replaced, at least.
+PIECES_PER_HORIZON = 3
 #: How long the motion waits for an arm that is off its path where the goal does not say it [s].
 DEFAULT_STALL_TIMEOUT = 10.0
 

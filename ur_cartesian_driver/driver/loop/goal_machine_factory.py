@@ -30,6 +30,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, Serv
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
+from ur_cartesian_driver.motion.goal import PIECES_PER_HORIZON
 
 #: What the registry of execution modes names as feeder.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
@@ -51,11 +52,14 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     monitor = _monitor(request, config)
     if not request.job.keep_open:
         return PointFeeder(monitor)
+    # The last piece on the wire begins within the horizon of the feeder, and ends within that of
+    # the goal. Where nothing can come in time any more, the ending is sent.
+    horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
         AppendSettings(
-            horizon=config.keep_open_horizon,
-            margin=config.keep_open_margin,
+            horizon=min(config.keep_open_horizon, horizon),
+            margin=min(config.keep_open_margin, horizon),
             timeout=config.keep_open_timeout,
         ),
     )

@@ -11,6 +11,7 @@ more than allowed is halved, until none does.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ def fit_joint_polynomials(
     start: MotionRows,
     quintic: bool,
     tolerance: float,
+    max_time: float = inf,
 ) -> JointPolynomials:
     """
     Return the pieces for a spline path.
@@ -66,10 +68,13 @@ def fit_joint_polynomials(
     :param start: the joints at its start (1, 6).
     :param tolerance: maximum deviation of the tool [m]; a turn counts as its arc at
         ANGLE_TOLERANCE_RADIUS.
+    :param max_time: of a piece [s].
     :raises TooFast: pieces as short as a controller cycle are not enough.
     """
     bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
-    return _PieceRefinement(kinematics, path, start, quintic).refine_within(bounds)
+    refinement = _PieceRefinement(kinematics, path, start, quintic)
+    refinement.halve_longer_than(max_time)
+    return refinement.refine_within(bounds)
 
 
 class _PieceRefinement:
@@ -91,6 +96,11 @@ class _PieceRefinement:
         )
         self.pending = np.ones(n, dtype=np.bool_)
         self.deviation = np.zeros((n, 2))
+
+    def halve_longer_than(self, time: float) -> None:
+        """Halve pieces until none takes longer [s]."""
+        while len(rows := np.flatnonzero(np.diff(self.times) > time + TICK)):
+            self._halve(rows)
 
     def refine_within(self, bounds: Floats) -> JointPolynomials:
         """Halve pieces until the tool keeps within (distance [m], angle [rad])."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import degrees
+from math import degrees, inf
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.goal import PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal_table import GoalTable, zeros
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.move_rows import SplineRows
@@ -44,7 +45,7 @@ from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field, resolve_execution_mode
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
@@ -152,7 +153,12 @@ def plan_spline(
     )
     path, stretch, limit = _fit_to_limits(kinematics, path, start, goal, options)
     polynomials = fit_joint_polynomials(
-        kinematics, path, start.rows(), points.quintic, options.spline_tolerance
+        kinematics,
+        path,
+        start.rows(),
+        points.quintic,
+        options.spline_tolerance,
+        _max_piece_time(goal),
     )
     segments = _segments(path, polynomials, goal)
     q, qd, qdd = (vector6(rows[-1].tolist()) for rows in polynomials.joints)
@@ -194,6 +200,18 @@ def plan_spline(
             )
         ),
     )
+
+
+def _max_piece_time(goal: GoalTable) -> float:
+    """
+    Return how long a piece may be [s].
+
+    The robot gets whole pieces, so those of a goal whose tail is replaced are a third of its
+    horizon; set-points have no such limit.
+    """
+    if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
+        return inf
+    return goal.replace_horizon / PIECES_PER_HORIZON
 
 
 def end_state(plan: Plan) -> SplineState:
