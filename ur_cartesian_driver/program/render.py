@@ -58,7 +58,6 @@ MARKERS = frozenset(
 )
 
 _DEFINITION = re.compile(r'(?:def|thread) (\w+)\(|(\w+) = ')
-_CALL, _FUNCTION = re.compile(r'(\w+)\('), re.compile(r'(?:def|thread) (\w+)\(')
 _STRING_OR_NAME = re.compile(r'"[^"]*"|\w+')
 
 #: The buffered servo repeats a set-point until each joint is within this tolerance [rad], but at
@@ -201,13 +200,16 @@ class _ForeignLine(str):
 
 
 @cache
-def calls_of_program() -> frozenset[str]:
-    """Return the functions of the controller that the program calls."""
+def taken_names() -> tuple[frozenset[str], frozenset[str]]:
+    """Return the controller's functions that the program calls, and the names of its locals."""
     text = ''.join(
         files('ur_cartesian_driver.program').joinpath(f'{name}.script').read_text('ascii')
         for name in ('driver', 'servo')
     )
-    return frozenset(_CALL.findall(text)) - set(_FUNCTION.findall(text))
+    parameters = ','.join(re.findall(r'def \w+\((.*)\):', text))
+    names = {*re.findall(r'local (\w+)', text), *re.findall(r'\w+', parameters)}
+    calls = frozenset(re.findall(r'(\w+)\(', text))
+    return calls - set(re.findall(r'(?:def|thread) (\w+)\(', text)), frozenset(names)
 
 
 def wrap_in_program(text: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
-from ur_cartesian_driver.program.render import calls_of_program, PREFIX, PROGRAM_NAME
+from ur_cartesian_driver.program.render import PREFIX, PROGRAM_NAME, taken_names
 from ur_cartesian_driver.urscript import CompileError, parse_line
 from ur_cartesian_driver.urscript.parsing.syntax_tree import (
     AssignStatement,
@@ -56,6 +56,7 @@ def compile_prelude(text: str, name: str) -> Prelude:
     except CompileError as error:
         reason = error.reason or error.text.rstrip(':').replace('_', ' ')
         raise ValueError(f'script_prelude: {name}, line {error.line}: {reason}.') from None
+    calls, local_names = taken_names()
     lines: dict[str, int] = {}
     variables: set[str] = set()
     functions: list[PreludeFunction] = []
@@ -73,8 +74,13 @@ def compile_prelude(text: str, name: str) -> Prelude:
         lines[defined] = statement.line
         if is_variable:
             variables.add(defined)
+            if defined in local_names:
+                raise ValueError(
+                    f"{where} {defined} is a local name of the driver's own program, and which of "
+                    'the two a controller reads is not documented; choose another name.'
+                )
         if isinstance(statement, FunctionDefinition):
-            if defined == PROGRAM_NAME or defined in calls_of_program():
+            if defined == PROGRAM_NAME or defined in calls:
                 raise ValueError(
                     f'{where} {defined} is a function of the controller that the driver uses; '
                     'choose another name.'
