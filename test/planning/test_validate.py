@@ -787,6 +787,16 @@ REFUSALS = [
             ({'speed': 0.01}, 'path_offset.limits are all 0'),
         )
     ),
+    (
+        replace(
+            TIMED,
+            execution=ExecutionMode.SERVO,
+            keep_open=True,
+            path_offset=PathOffset(limits=SIDEWAYS),
+        ),
+        NotAvailable,
+        'path_offset is set, but the end of a goal with keep_open, where an offset has to be gone',
+    ),
     *(
         (
             replace(TIMED, execution=mode, path_offset=PathOffset(limits=SIDEWAYS)),
