@@ -174,8 +174,7 @@ async def a_tracked_seam(cell: Any) -> list[tuple[float, ...]]:
 
     rows: list[tuple[float, ...]] = []
     x, y, _ = cell.memory.read().actual_tcp_pose.position
-    arm = Arm(robot_model(cell.robot.config.model))
-    setup = ArmSetup(model=arm.model, geometry=arm.geometry)
+    setup = ArmSetup.of(Arm(robot_model(cell.robot.config.model)))
     running = asyncio.ensure_future(a_goal('tracked_seam', arm=setup)(cell))
     asked = nan
     while not running.done():

@@ -8,7 +8,7 @@ from math import cos, hypot, sin
 import pytest
 from robot_cell import CellMotion, CYCLE, run_cell
 
-from ur_cartesian_driver.driver.ipc.channel import SetLiveTarget, StartMotion
+from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetLiveTarget, StartMotion
 from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, stationary_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -41,6 +41,7 @@ class Session:
                 motion=self.number,
                 points=b'',
                 job=stationary_job(plan),
+                arm=ArmSetup.of(ARM),
                 live=live_setup(
                     ARM, state.target_q, PlanningOptions(**{'live_target_timeout': 0.6} | options)
                 ),

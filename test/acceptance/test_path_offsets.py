@@ -20,7 +20,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 pytestmark = [pytest.mark.acceptance]
 
 ARM = Arm(robot_model('ur5e'))
-SETUP = ArmSetup(model=ARM.model, geometry=ARM.geometry)
+SETUP = ArmSetup.of(ARM)
 #: Of the planned seam [s], [m], and how far the real one is bent to the side [m].
 TIME, LENGTH, BEND = 4.0, 0.16, 0.005
 #: Time between two offsets [s].

@@ -11,6 +11,7 @@ import pytest
 from robot_cell import RTDE, run_cell
 from virtual_network import HOST
 
+from ur_cartesian_driver.driver.ipc.channel import ArmSetup
 from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, stationary_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -239,6 +240,7 @@ def test_a_live_session_has_the_outputs_of_the_parameter():
         motion = cell.owner.run(
             b'',
             stationary_job(stationary_plan(state, ALL_KINDS)),
+            arm=ArmSetup.of(ARM),
             live=live_setup(ARM, state.target_q, PlanningOptions()),
         )
         await cell.until(lambda: motion.progress)

@@ -80,7 +80,7 @@ def start(arm=ARM, **fields):
             motion=7,
             points=b'',
             job=stationary_job(stationary_plan(STATE)),
-            arm=ArmSetup(model=arm.model, geometry=arm.geometry),
+            arm=ArmSetup.of(arm),
             live=live_setup(arm, HOME, PlanningOptions()),
             **fields,
         )

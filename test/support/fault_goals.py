@@ -415,7 +415,7 @@ def displaced_half_circle(start):
 class OffsetGoal(ServoGoal):
     """The same half circle, beside which the tool moves because an offset came once."""
 
-    arm = ArmSetup(model=ARM.model, geometry=ARM.geometry)
+    arm = ArmSetup.of(ARM)
 
     def plan_from(self, start):
         return displaced_half_circle(start)

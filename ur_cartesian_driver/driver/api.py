@@ -478,9 +478,7 @@ class Driver(RobotServices, InteractiveMotions):
             points=points,
             job=job,
             live=live,
-            arm=None
-            if live is None and job.offset_band is None
-            else ArmSetup(model=self.arm.model, geometry=self.arm.geometry),
+            arm=None if live is None and job.offset_band is None else ArmSetup.of(self.arm),
             freedrive=freedrive,
             plan_metadata=plan_metadata(plan, self.options)
             if self.config.record_directory

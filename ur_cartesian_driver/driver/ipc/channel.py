@@ -22,6 +22,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, RobotModel
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProtocolError
 from ur_cartesian_driver.motion.events import Outcome, Progress
@@ -86,6 +87,11 @@ class ArmSetup:
 
     model: RobotModel
     geometry: DhTable
+
+    @classmethod
+    def of(cls, arm: Arm) -> ArmSetup:
+        """Return what an arm is made of: it takes long to send an arm itself."""
+        return cls(model=arm.model, geometry=arm.geometry)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
