@@ -66,14 +66,16 @@ class PathOffsetSubscriber:
             )
         stamp = nanoseconds(header.stamp)
         age = (self._clock.now().nanoseconds - stamp) / 1_000_000_000 if stamp else 0.0
-        if age < -MAX_STAMP_AHEAD:
-            raise InvalidGoal(
-                'header.stamp',
-                f'is {-age:.3f} s in the future',
-                'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-                'from the receipt',
-            )
         motion = self._server.running_motion
         if motion is None:
             raise RobotNotReady('No goal moves the arm.')
+        timeout = motion.offset_timeout
+        if timeout is not None and not -MAX_STAMP_AHEAD <= age <= timeout:
+            raise InvalidGoal(
+                'header.stamp',
+                f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
+                f'path_offset.timeout is {timeout:g} s',
+                'compare the clocks of both computers, or leave the stamp 0: then the age counts '
+                'from the receipt',
+            )
         motion.set_path_offset(along=vector.x, across=vector.y, normal=vector.z, age=max(0.0, age))
