@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 STEP, AHEAD = 0.05, 0.8
 #: How long after what the planner has seen of the arm a new tail begins, and how long after that
 #: its first point is, at least [s].
-LEAD, GAP = 0.2, 0.08
+LEAD, GAP = 0.2, 0.15
 #: Radius of the circle [m], and its period [s].
 RADIUS, PERIOD = 0.06, 4.0
 #: By how much the place of the circle wanders [m], and how fast [rad/s].
