@@ -77,6 +77,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.io_signals import Signals
+from ur_cartesian_driver.motion.joint_goal import JointGoal
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose
@@ -85,7 +86,7 @@ from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoReport
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.path import Path
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
@@ -276,21 +277,25 @@ class Driver(RobotServices, InteractiveMotions):
 
     # ---- motion -------------------------------------------------------------------------------
 
-    def plan(self, goal: Goal | Path) -> ArmPlan:
+    def plan(self, goal: Goal | Path | JointGoal) -> ArmPlan:
         """
         Check a goal and choose its primitives, starting from :attr:`rest_state`; nothing moves.
 
         ``plan(goal).show()`` opens a page with the arm on its path.
 
         :param goal: or a path: its frames are resolved now, and the arm has to stand at its start
-            unless its first motion is a joint motion.
+            unless its first motion is a joint motion; or a goal in joint space.
         :raises GoalRefused: the text says why; :exc:`RobotNotReady` without a robot state.
         """
         state = self._require(self.rest_state)
         if isinstance(goal, Path):
             goal = self._goal_of(goal, state)
-        arm = self.arm
-        planned = plan(goal, state, arm, self._options_for(state))
+        arm, options = self.arm, self._options_for(state)
+        planned = (
+            plan_joint_goal(goal, state, arm, options)
+            if isinstance(goal, JointGoal)
+            else plan(goal, state, arm, options)
+        )
         return ArmPlan.of(planned, arm, parse_planes(self.options.workspace_planes))
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
@@ -312,7 +317,7 @@ class Driver(RobotServices, InteractiveMotions):
 
     def execute(
         self,
-        goal: Goal | Path,
+        goal: Goal | Path | JointGoal,
         on_progress: OnProgress | None = None,
         timeout: float | None = None,
         *,

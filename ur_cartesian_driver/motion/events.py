@@ -120,7 +120,11 @@ class Progress:
     actual_pose: Pose
     actual_twist: Vector6 = ZERO6
     actual_acceleration: Vector6 | None = None
+    #: Joints as the controller wants them and as they are [rad], [rad/s].
+    desired_q: Vector6 = ZERO6
+    desired_qd: Vector6 = ZERO6
     actual_q: Vector6 = ZERO6
+    actual_qd: Vector6 = ZERO6
     #: Expected time of the desired pose from the start of the motion [s].
     time: float = 0.0
     #: Planned time that is left, at full speed scaling [s].

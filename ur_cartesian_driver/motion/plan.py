@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.goal_table import Rows
+from ur_cartesian_driver.motion.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.offset_band import OffsetBand
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -245,6 +246,8 @@ class Plan:
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: Where the path may give way; None = nowhere.
     offset_band: OffsetBand | None = None
+    #: Those of a joint goal; None where the goal is Cartesian.
+    joint_tolerances: JointTolerances | None = None
     #: What is ignored, slowed or changed, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
     #: Finds where the tool is slower than asked: long goals have many such stretches.

@@ -4,12 +4,14 @@
 Check a goal and plan it: primitives, times, joint configurations, report.
 
 :func:`check` makes the checks that need no robot, :func:`plan` all others; both refuse a goal by
-raising a :class:`~ur_cartesian_driver.motion.errors.GoalRefused`. A goal that passes becomes a
+raising a :class:`~ur_cartesian_driver.motion.errors.GoalRefused`; :func:`plan_joint_goal` does
+both for a joint goal. A goal that passes becomes a
 :class:`~ur_cartesian_driver.motion.plan.Plan`. Nothing here moves a robot.
 """
 
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.planner import plan
 from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.planning.spline.joint_goal_planner import plan_joint_goal
 
-__all__ = ['PlanningOptions', 'check', 'plan']
+__all__ = ['PlanningOptions', 'check', 'plan', 'plan_joint_goal']

@@ -16,6 +16,7 @@ import numpy as np
 from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSignal
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
+from ur_cartesian_driver.execution.monitoring.joint_tolerance_check import JointToleranceCheck
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
@@ -58,6 +59,7 @@ class GoalMonitor:
         self._speed_check = SpeedCheck(job.reference) if job.has_speed_profile else None
         self._path_check = ToleranceCheck(job.path_tolerance, job.T_base_frame)
         self._goal_check = ToleranceCheck(job.goal_tolerance, job.T_base_frame)
+        self._joint_check = JointToleranceCheck(job.joint_tolerances)
         self._checks_tcp = job.T_tcp_controlled == IDENTITY
         self._max_plan_deviation = max_plan_deviation
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
@@ -235,7 +237,10 @@ class GoalMonitor:
             actual_pose=seen.actual_tcp_pose,
             actual_twist=seen.actual_tcp_twist,
             actual_acceleration=seen.actual_tcp_acceleration,
+            desired_q=state.target_q,
+            desired_qd=state.target_qd,
             actual_q=state.actual_q,
+            actual_qd=state.actual_qd,
             time=time,
             time_remaining=max(0.0, job.duration - time),
             speed_scaling=state.effective_speed,
@@ -324,7 +329,9 @@ class GoalMonitor:
         desired, press = self._tracker.pose(), self._press()
         if press is not None:
             state = press.stiff_state(desired, state)
-        return self._violation(self._goal_check, desired, state)
+        return self._violation(
+            self._goal_check, desired, state
+        ) or self._joint_check.goal_violation(state)
 
     def contact_clause(self, state: RobotState) -> str:
         """Return where the tool touched, as the beginning of a sentence."""
@@ -418,13 +425,18 @@ class GoalMonitor:
 
     def _path_violation(self, state: RobotState) -> Fault | None:
         press = self._press()
-        if not ((self._path_check or press) and self._has_begun):
+        checked = self._path_check or press or self._joint_check.has_path
+        if not (checked and self._has_begun):
             return None
         desired, clause = self._desired(state), None
         if press is not None:
             clause = press.excess(desired, state, self._tracker.time())
             state = press.stiff_state(desired, state)
-        clause = clause or self._violation(self._path_check, desired, state)
+        clause = (
+            clause
+            or self._violation(self._path_check, desired, state)
+            or self._joint_check.path_violation(state)
+        )
         if clause is None:
             return None
         return GoalSignal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'

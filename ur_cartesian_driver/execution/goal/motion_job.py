@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.goal import (
     SafeOutput,
     Tolerance,
 )
+from ur_cartesian_driver.motion.joint_goal import JointTolerances
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, stops
 from ur_cartesian_driver.motion.offset_band import OffsetBand
@@ -60,6 +61,8 @@ class MotionJob:
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
+    #: Those of a joint goal, beside the others.
+    joint_tolerances: JointTolerances | None = None
     #: 0 = the default, negative = no limit [s].
     goal_time_tolerance: float = 0.0
     #: Whether the robot program reports how many points it has begun.
@@ -189,6 +192,7 @@ def job_from_plan(
         T_tcp_controlled=plan.T_tcp_controlled,
         path_tolerance=goal.path_tolerance,
         goal_tolerance=goal.goal_tolerance,
+        joint_tolerances=plan.joint_tolerances,
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,

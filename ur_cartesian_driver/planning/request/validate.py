@@ -106,7 +106,8 @@ def _number_of_points(goal: GoalTable, options: PlanningOptions) -> None:
     )
 
 
-def _tolerances_are_measurable(goal: GoalTable, options: PlanningOptions) -> None:
+def tolerances_are_measurable(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse limits on accelerations that the robot does not report."""
     if options.acceleration_known:
         return
     for name, tolerance in named_tolerances(apply_default_tolerances(goal, options)):
@@ -121,21 +122,7 @@ def _tolerances_are_measurable(goal: GoalTable, options: PlanningOptions) -> Non
 
 
 def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
-    age = goal.age
-    if age is None:
-        return
-    check_finite('trajectory.header.stamp', (age,))
-    if age > options.stamp_tolerance:
-        raise OldHeaderTimestamp(
-            f'trajectory.header.stamp is {age:.3f} s old, more than stamp_tolerance = '
-            f'{options.stamp_tolerance:g} s; send 0 for "now", or synchronise the clocks.'
-        )
-    if age < -MAX_STAMP_AHEAD:
-        raise InvalidGoal(
-            'trajectory.header.stamp',
-            f'is {-age:.1f} s in the future, more than {MAX_STAMP_AHEAD:g} s',
-            'send the goal later',
-        )
+    check_stamp(goal.age, options)
 
 
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
@@ -269,7 +256,7 @@ RULES: tuple[Rule, ...] = (
     check_tolerance_numbers,
     check_min_speed_fraction,
     check_replace_horizon,
-    _tolerances_are_measurable,
+    tolerances_are_measurable,
     _stamp,
     _supported,
     _times,
@@ -286,6 +273,28 @@ RULES: tuple[Rule, ...] = (
 
 
 # -- shared with the checks of appended points and those that need the robot ----------------------
+
+
+def check_stamp(age: float | None, options: PlanningOptions) -> None:
+    """
+    Check when a goal was sent.
+
+    :param age: of its stamp on receipt [s]; None = it has no stamp.
+    """
+    if age is None:
+        return
+    check_finite('trajectory.header.stamp', (age,))
+    if age > options.stamp_tolerance:
+        raise OldHeaderTimestamp(
+            f'trajectory.header.stamp is {age:.3f} s old, more than stamp_tolerance = '
+            f'{options.stamp_tolerance:g} s; send 0 for "now", or synchronise the clocks.'
+        )
+    if age < -MAX_STAMP_AHEAD:
+        raise InvalidGoal(
+            'trajectory.header.stamp',
+            f'is {-age:.1f} s in the future, more than {MAX_STAMP_AHEAD:g} s',
+            'send the goal later',
+        )
 
 
 def check_list_lengths(

@@ -89,7 +89,7 @@ class _PieceRefinement:
         n = len(spline.positions)
         #: Ends by the piece of the tool spline they lie on, and the exact time there.
         self.piece = np.arange(n)
-        self.times = np.concatenate([spline.times[:1], _to_ticks(spline.times[1:])])
+        self.times = np.concatenate([spline.times[:1], to_ticks(spline.times[1:])])
         joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
         self.joints = MotionRows(
             *(np.concatenate([a, b]) for a, b in zip(start, joints, strict=True))
@@ -161,7 +161,7 @@ class _PieceRefinement:
 
     def _halve(self, rows: NDArray[np.intp]) -> None:
         begin, end = self.times[rows], self.times[rows + 1]
-        middle = _to_ticks(0.5 * (begin + end))
+        middle = to_ticks(0.5 * (begin + end))
         short = np.flatnonzero(end - begin < 2.0 * _MIN_PIECE_TIME)
         if len(short):
             self._refuse(int(rows[short[0]]))
@@ -187,6 +187,7 @@ class _PieceRefinement:
         )
 
 
-def _to_ticks(times: Floats) -> Floats:
+def to_ticks(times: Floats) -> Floats:
+    """Return times rounded to whole ticks."""
     rounded: Floats = np.round(times / TICK) * TICK
     return rounded

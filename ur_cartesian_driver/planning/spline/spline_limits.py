@@ -15,9 +15,10 @@ from math import ceil
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import TooFast
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -53,27 +54,60 @@ class LimitExcess:
         """The limit with its value."""
         return f'{self.name} = {self.limit:.3f} {self.unit}'
 
-    def refusal(self, *, may_slow: bool = True) -> TooFast:
+    def refusal(self, *, may_slow: bool = True, rates: str = 'twists') -> TooFast:
         """
         Return the refusal of the goal.
 
         :param may_slow: whether the driver could give it more time.
+        :param rates: what its points call their velocities.
         """
         return TooFast(
             point_field(self.point, 'time_from_start'),
             f'gives too little time: at {100.0 * self.fraction:.0f} % of it {self.what} needs '
             f'{self.needed:.3f} {self.unit}, more than {self.limit_text}',
-            f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt twists and '
+            f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt {rates} and '
             f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateSamples:
+    """Tool and joints in samples of a spline."""
+
+    #: (m,) the point to which the sample's piece leads, and the fraction of the piece's time.
+    points: NDArray[np.int32]
+    u: Floats
+    #: (m, 6) each: of the TCP in base and of the joints.
+    twists: Floats
+    accelerations: Floats
+    qd: Floats
+    qdd: Floats
 
 
 def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return the quantity that exceeds its limit most, None if none does."""
+    """Return the quantity of a path that exceeds its limit most, None if none does."""
+    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
+    twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
+    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
+    samples = RateSamples(
+        points=path.points,
+        u=path.u,
+        twists=twists,
+        accelerations=accelerations,
+        qd=qd,
+        qdd=qdd,
+    )
+    return worst_excess_of(samples, kinematics.arm.model, options)
+
+
+def worst_excess_of(
+    samples: RateSamples, model: RobotModel, options: PlanningOptions
+) -> LimitExcess | None:
+    """Return the quantity of some samples that exceeds its limit most, None if none does."""
     worst: LimitExcess | None = None
-    for what, values, limit, power, unit, name in _quantities(kinematics, path, options):
+    for what, values, limit, power, unit, name in _quantities(samples, model, options):
         row = int(np.argmax(values))
         peak = float(values[row])
         factor = (peak / limit) ** (1.0 / power)
@@ -84,32 +118,29 @@ def worst_excess(
                 unit=unit,
                 name=name,
                 factor=factor,
-                point=int(path.points[row]),
-                fraction=float(path.u[row]),
+                point=int(samples.points[row]),
+                fraction=float(samples.u[row]),
                 needed=peak,
             )
     return worst
 
 
 def _quantities(
-    kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
+    samples: RateSamples, model: RobotModel, options: PlanningOptions
 ) -> Iterator[_Quantity]:
-    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
-    twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
-    qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
     if options.max_tool_speed > 0.0:
-        speed = np.linalg.norm(twists[:, :3], axis=1)
+        speed = np.linalg.norm(samples.twists[:, :3], axis=1)
         yield 'the tool', speed, options.max_tool_speed, 1, 'm/s', 'max_tool_speed'
     for part, name, unit in (
         (slice(0, 3), 'max_linear_acceleration', 'm/s^2'),
         (slice(3, 6), 'max_angular_acceleration', 'rad/s^2'),
     ):
-        values = np.linalg.norm(accelerations[:, part], axis=1)
+        values = np.linalg.norm(samples.accelerations[:, part], axis=1)
         yield 'the tool', values, getattr(options, name), 2, unit, name
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
     for k, (joint, limit) in enumerate(
-        zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
+        zip(JOINT_NAMES, model.max_joint_speed, strict=True)
     ):
-        source = f'the joint speed limit{kinematics.arm.model.speed_source(k)}'
-        yield joint, np.abs(qd[:, k]), limit, 1, 'rad/s', source
-        yield joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name
+        source = f'the joint speed limit{model.speed_source(k)}'
+        yield joint, np.abs(samples.qd[:, k]), limit, 1, 'rad/s', source
+        yield joint, np.abs(samples.qdd[:, k]), bound, 2, 'rad/s^2', name

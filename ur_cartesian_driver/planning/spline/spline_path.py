@@ -115,9 +115,16 @@ def solve_spline_path(
     :param q_start: the configuration at its begin [rad].
     :raises GoalRefused: the arm cannot follow.
     """
-    coarse = _coarse_samples(spline)
+    coarse = coarse_samples(spline.times)
     _check_sizes(kinematics, spline, coarse, first)
-    count = _sample_count(spline, coarse, first)
+    twists, accelerations = spline.rates(*coarse)
+    count = sample_count(
+        spline.times,
+        np.linalg.norm(twists[:, :3], axis=1),
+        np.linalg.norm(twists[:, 3:], axis=1),
+        np.linalg.norm(accelerations[:, :3], axis=1),
+        first,
+    )
     n = len(count)
     pieces = CurvePieces(
         path=ToolSplinePath(spline, count),
@@ -185,11 +192,11 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
     return refusal
 
 
-def _coarse_samples(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
-    """Return a few samples on all pieces: piece and time since its start."""
-    n = len(spline.positions)
-    piece = np.repeat(np.arange(n), _COARSE_SAMPLES)
-    return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), n) * np.diff(spline.times)[piece]
+def coarse_samples(times: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Return a few samples on all pieces between times (n + 1,): piece and time since its start."""
+    h = np.diff(times)
+    piece = np.repeat(np.arange(len(h)), _COARSE_SAMPLES)
+    return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), len(h)) * h[piece]
 
 
 def _check_sizes(
@@ -228,22 +235,27 @@ def _check_sizes(
             )
 
 
-def _sample_count(
-    spline: ToolSpline, coarse: tuple[NDArray[np.intp], Floats], first: int
+def sample_count(
+    times: Floats, speed: Floats, turn_rate: Floats, acceleration: Floats, first: int
 ) -> NDArray[np.intp]:
-    """Return the number of samples of each piece."""
-    n, h = len(spline.positions), np.diff(spline.times)
-    twists, accelerations = spline.rates(*coarse)
+    """
+    Return the number of samples of each piece.
 
-    def largest(vectors: Floats) -> Floats:
-        bound: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _COARSE_SAMPLES).max(axis=1)
+    :param speed: of the tool in the coarse samples [m/s]; ``turn_rate`` [rad/s] and
+        ``acceleration`` [m/s^2] likewise.
+    :param first: the number of the point at the end of the first piece.
+    """
+    h = np.diff(times)
+
+    def largest(values: Floats) -> Floats:
+        bound: Floats = values.reshape(len(h), _COARSE_SAMPLES).max(axis=1)
         return bound
 
     steps = _SPEED_MARGIN * np.max(
         [
-            h * largest(twists[:, :3]) / STEP_LENGTH,
-            h * largest(twists[:, 3:]) / STEP_ANGLE,
-            h * np.sqrt(largest(accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR)),
+            h * largest(speed) / STEP_LENGTH,
+            h * largest(turn_rate) / STEP_ANGLE,
+            h * np.sqrt(largest(acceleration) / (8.0 * ARC_CHORD_ERROR)),
         ],
         axis=0,
     )

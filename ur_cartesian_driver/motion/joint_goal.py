@@ -1,0 +1,80 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A goal in joint space as the client sent it: what control_msgs/FollowJointTrajectory carries.
+
+A joint goal may be wrong: ``planning.request.joint_goal_rules`` checks it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointPoint:
+    """Where the joints of a goal are at one time, in the order of its ``joint_names``."""
+
+    #: When to be there, from the start of the motion [s].
+    time: float
+    #: [rad]
+    positions: tuple[float, ...]
+    #: [rad/s]; empty = the driver chooses them.
+    velocities: tuple[float, ...] = ()
+    #: [rad/s^2]; empty = cubic polynomials, which need none.
+    accelerations: tuple[float, ...] = ()
+    #: [Nm]; has to be empty.
+    effort: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointTolerance:
+    """Largest deviations of one joint: 0 = the default (no limit), negative = no limit."""
+
+    name: str
+    #: [rad]
+    position: float = 0.0
+    #: [rad/s]
+    velocity: float = 0.0
+    #: [rad/s^2]; has to be 0 or negative: robots do not report it.
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointGoal:
+    """A joint trajectory and how exactly to follow it."""
+
+    #: All six, in any order, with the ``tf_prefix`` of the driver.
+    joint_names: tuple[str, ...]
+    points: tuple[JointPoint, ...]
+    #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
+    age: float | None = None
+    path_tolerance: tuple[JointTolerance, ...] = ()
+    goal_tolerance: tuple[JointTolerance, ...] = ()
+    #: How much later than planned the end may come [s]: 0 = the default, negative = without end.
+    goal_time_tolerance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointErrorBounds:
+    """Largest deviations of the six joints; zero and negative mean no limit."""
+
+    #: [rad], [rad/s]
+    position: Vector6 = ZERO6
+    velocity: Vector6 = ZERO6
+
+    def __bool__(self) -> bool:
+        """Tell whether there is any limit."""
+        return max(*self.position, *self.velocity) > 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointTolerances:
+    """The tolerances of a joint goal that passed its checks."""
+
+    path: JointErrorBounds = JointErrorBounds()
+    goal: JointErrorBounds = JointErrorBounds()
+    #: Joint positions at the end [rad].
+    end: Vector6

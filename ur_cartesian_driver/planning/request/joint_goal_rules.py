@@ -1,0 +1,231 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The checks of a joint goal that need no robot.
+
+Refusals name fields as control_msgs/FollowJointTrajectory does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, NotAvailable
+from ur_cartesian_driver.motion.joint_goal import (
+    JointErrorBounds,
+    JointGoal,
+    JointPoint,
+    JointTolerance,
+    JointTolerances,
+)
+from ur_cartesian_driver.motion.polynomials import MotionRows
+from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.number_rules import check_finite
+from ur_cartesian_driver.planning.request.spline_rules import (
+    MAX_ACCELERATION,
+    MAX_TWIST,
+    MIN_SPLINE_TIME,
+)
+from ur_cartesian_driver.planning.request.validate import check_list_lengths, check_stamp
+
+#: Larger joint positions are mistakes, such as degrees [rad].
+MAX_POSITION = 8.0 * pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CheckedJointGoal:
+    """A joint goal in rows, its joints in the order of the arm."""
+
+    #: (n,) [s], increasing
+    times: Floats
+    #: (n, 6) [rad], [rad/s], [rad/s^2]; NaN where the goal gives none.
+    joints: MotionRows
+    tolerances: JointTolerances
+    goal_time_tolerance: float
+
+
+def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointGoal:
+    """
+    Refuse a joint goal that is wrong for every robot; return it in rows.
+
+    :raises GoalRefused: a subclass; its text names point, field, value and bound.
+    """
+    try:
+        goal = with_declared_types(goal, JointGoal, 'JointGoal')
+    except WrongType as error:
+        raise InvalidGoal(error.field, error.problem) from None
+    check_stamp(goal.age, options)
+    check_finite('goal_time_tolerance', (goal.goal_time_tolerance,))
+    order = _order(goal.joint_names, options.tf_prefix)
+    check_list_lengths(
+        'trajectory.points',
+        len(goal.points),
+        0,
+        options,
+        if_empty='give at least one point',
+        if_too_many='split the goal or raise the parameter',
+    )
+    if not options.calibration_known:
+        raise NotAvailable(
+            'trajectory',
+            'has joint positions, but the calibration of this robot is unknown',
+            'send poses with FollowCartesianTrajectory',
+        )
+    if options.dialect.is_coarse:
+        raise NotAvailable(
+            'trajectory',
+            f'is a spline of joint positions, but robot programs of wire dialect '
+            f'{options.dialect.name} count in milliseconds, too coarse for splines',
+            'use a robot program of a newer dialect',
+        )
+    before = 0.0
+    for i, point in enumerate(goal.points):
+        _check_point(i, point, len(order), before, options)
+        before = point.time
+    if before == 0.0:
+        raise InvalidGoal(
+            point_field(len(goal.points) - 1, 'time_from_start'),
+            'is 0, so there is no time to move',
+            'give it a time greater than 0',
+        )
+    last = goal.points[-1]
+    if any(last.velocities):
+        raise InvalidGoal(
+            point_field(len(goal.points) - 1, 'velocities'),
+            'are not zero, but the motion ends at rest there',
+            'set them to 0',
+        )
+    q, qd, qdd = (
+        np.array([list(row) or [np.nan] * 6 for row in rows], dtype=np.float64)[:, order]
+        for rows in zip(
+            *((p.positions, p.velocities, p.accelerations) for p in goal.points), strict=True
+        )
+    )
+    return CheckedJointGoal(
+        times=np.array([point.time for point in goal.points]),
+        joints=MotionRows(q, qd, qdd),
+        tolerances=JointTolerances(
+            path=_bounds('path_tolerance', goal.path_tolerance, options.tf_prefix),
+            goal=_bounds('goal_tolerance', goal.goal_tolerance, options.tf_prefix),
+            end=vector6(q[-1].tolist()),
+        ),
+        goal_time_tolerance=goal.goal_time_tolerance,
+    )
+
+
+def _order(names: Sequence[str], tf_prefix: str) -> list[int]:
+    """Return where each joint of the arm stands in the goal."""
+    known = [tf_prefix + name for name in JOINT_NAMES]
+    for k, name in enumerate(names):
+        _check_name(f'trajectory.joint_names[{k}]', name, names[:k], known)
+    if missing := [name for name in known if name not in names]:
+        raise InvalidJoints(
+            f'trajectory.joint_names lacks {", ".join(missing)}; name all six joints.'
+        )
+    return [names.index(name) for name in known]
+
+
+def _check_name(field: str, name: str, before: Sequence[str], known: Sequence[str]) -> None:
+    if name not in known:
+        raise InvalidJoints(
+            f"{field} is '{name}', not a joint of this robot; use {', '.join(known)}."
+        )
+    if name in before:
+        raise InvalidJoints(f"{field} repeats '{name}'; name each joint once.")
+
+
+def _check_point(
+    index: int, point: JointPoint, joints: int, before: float, options: PlanningOptions
+) -> None:
+    if not point.positions:
+        raise InvalidGoal(
+            point_field(index, 'positions'), 'are empty', 'give one for each joint'
+        )
+    for field, values, bound in (
+        ('positions', point.positions, MAX_POSITION),
+        ('velocities', point.velocities, MAX_TWIST),
+        ('accelerations', point.accelerations, MAX_ACCELERATION),
+    ):
+        where = point_field(index, field)
+        if len(values) not in (0, joints):
+            raise InvalidGoal(
+                where, f'has {len(values)} values for {joints} joints', 'give one for each joint'
+            )
+        check_finite(where, values)
+        if any(abs(value) > bound for value in values):
+            raise InvalidGoal(
+                where,
+                f'contains a number beyond {bound:g}, more than any of these robots can do',
+                'check the units (rad, s)',
+            )
+    if point.accelerations and not point.velocities:
+        raise InvalidGoal(
+            point_field(index, 'velocities'),
+            'are empty, but there are accelerations',
+            'give both, or leave out the accelerations',
+        )
+    if point.effort:
+        raise InvalidGoal(
+            point_field(index, 'effort'), 'is given, but robots take none', 'leave it empty'
+        )
+    _check_time(index, point.time, before, options)
+
+
+def _check_time(index: int, time: float, before: float, options: PlanningOptions) -> None:
+    field = point_field(index, 'time_from_start')
+    check_finite(field, (time,))
+    if time < 0.0 or (index > 0 and time <= before):
+        previous = f' of points[{index - 1}]' if index > 0 else ''
+        raise InvalidGoal(
+            field,
+            f'is {time:g} s, {"not later" if index > 0 else "less"} than the {before:g} s'
+            f'{previous}',
+            'increase it',
+        )
+    if 0.0 < time < before + MIN_SPLINE_TIME:
+        raise InvalidGoal(
+            field,
+            f'gives the segment {time - before:g} s, less than the {MIN_SPLINE_TIME:g} s that a '
+            'piece of a spline needs',
+            'leave points out',
+        )
+    if time - before > options.max_segment_time:
+        raise InvalidGoal(
+            field,
+            f'gives the segment {time - before:g} s, more than max_segment_time = '
+            f'{options.max_segment_time:.0f} s',
+            'add points in between',
+        )
+
+
+def _bounds(field: str, entries: Sequence[JointTolerance], tf_prefix: str) -> JointErrorBounds:
+    """Return the tolerances of the joints, those that are not named unlimited."""
+    known = [tf_prefix + name for name in JOINT_NAMES]
+    names = [entry.name for entry in entries]
+    for k, entry in enumerate(entries):
+        _check_name(f'{field}[{k}].name', entry.name, names[:k], known)
+        for name in ('position', 'velocity', 'acceleration'):
+            check_finite(f'{field}[{k}].{name}', (getattr(entry, name),))
+        if entry.acceleration > 0.0:
+            raise InvalidGoal(
+                f'{field}[{k}].acceleration',
+                f'is {entry.acceleration:g}, but robots do not report the accelerations of their '
+                'joints',
+                'set it to 0',
+            )
+    by_name = dict(zip(names, entries, strict=True))
+    none = JointTolerance(name='')
+    found = [by_name.get(name, none) for name in known]
+    return JointErrorBounds(
+        position=vector6(each.position for each in found),
+        velocity=vector6(each.velocity for each in found),
+    )

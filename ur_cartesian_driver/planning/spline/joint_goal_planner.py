@@ -1,0 +1,368 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From a joint goal to a plan: the joint polynomials through its points, checked along the way.
+
+What the robot gets is what the client sent, piece by piece; a SPLINE goal differs only in where
+its pieces come from. The path of the tool follows from the joints, so that progress, limits of the
+tool and clearance are those of all goals. Joints may pass singularities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal_table import GoalTable, WaypointRows, zeros
+from ur_cartesian_driver.motion.joint_goal import JointGoal
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan import LateLines, Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats, keep_hemisphere
+from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.samples import counted
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.start_checks import check_approach, check_reported_tcp
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
+from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
+from ur_cartesian_driver.planning.request.joint_goal_rules import (
+    check_joint_goal,
+    CheckedJointGoal,
+)
+from ur_cartesian_driver.planning.request.validate import tolerances_are_measurable
+from ur_cartesian_driver.planning.spline.joint_polynomials import to_ticks
+from ur_cartesian_driver.planning.spline.spline_limits import RateSamples, worst_excess_of
+from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, sample_count
+from ur_cartesian_driver.planning.stop_prediction import at_set_point
+
+# A joint that is faster at a point than this many times the mean of a piece beside it overshoots.
+_MAX_MONOTONE = 3.0
+# Rounding of a joint position [rad].
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trajectory:
+    """The joints at the ends of n pieces, from rest where the arm stands."""
+
+    #: (n + 1,) [s], whole microseconds; (n + 1, 6) each.
+    times: Floats
+    joints: MotionRows
+    quintic: bool
+    #: The number of the point at the end of the first piece.
+    first: int
+    remarks: tuple[str, ...]
+
+    @property
+    def spline(self) -> JointSpline:
+        """The joints over time."""
+        return JointSpline.through(self.times, self.joints, quintic=self.quintic)
+
+    def stretched(self, factor: float) -> _Trajectory:
+        """Return the same path with all times multiplied by a factor, of whole microseconds."""
+        q, qd, qdd = self.joints
+        return replace(
+            self,
+            times=to_ticks(self.times * factor),
+            joints=MotionRows(q, qd / factor, qdd / factor**2),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Samples:
+    """Joints and tool along a trajectory; row 0 is the start."""
+
+    #: (m,) the piece, and the fraction of its time; (m,) [s]
+    piece: NDArray[np.intp]
+    u: Floats
+    times: Floats
+    #: (m, 6) each
+    joints: MotionRows
+    #: (m, 7) and (m, 6) of the TCP in base
+    poses: Floats
+    twists: Floats
+    accelerations: Floats
+    #: (m,) the point to which each piece leads
+    points: NDArray[np.int32]
+
+
+def plan_joint_goal(
+    goal: JointGoal, state: RobotState, arm: Arm, options: PlanningOptions
+) -> Plan:
+    """
+    Return the plan of a joint goal for a robot that rests in a state.
+
+    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
+    """
+    checked = check_joint_goal(goal, options)
+    state = at_set_point(state, arm)
+    table = _cartesian_goal(checked, state, arm, options)
+    kinematics = TcpKinematics(arm, state.T_flange_tcp)
+    check_reported_tcp(state, kinematics)
+    check_approach(state, table.waypoints.pose(0), options)
+    given = _trajectory(checked, state, options)
+    samples = _sampled(given, state, arm)
+    _check_ranges(samples, arm)
+    trajectory, remark = _fit_to_limits(given, samples, arm, options)
+    clearance = clearance_lines(
+        arm,
+        (state.T_flange_tcp,),
+        options,
+        samples.joints.x[1:],
+        state.actual_q,
+        samples.points[1:],
+        samples.u[1:],
+    )
+    poses = samples.poses.copy()
+    keep_hemisphere(poses)
+    durations = np.diff(trajectory.times)
+    begin = trajectory.times[samples.piece]
+    factor = trajectory.times[-1] / given.times[-1]
+    if remark:
+        table = replace(
+            table, waypoints=replace(table.waypoints, times=table.waypoints.times * factor)
+        )
+    return Plan(
+        goal=table,
+        segments=_segments(trajectory, samples, durations),
+        reference=ReferencePath(
+            poses=poses,
+            point=samples.points,
+            time=begin + samples.u * durations[samples.piece],
+            fraction=samples.u,
+        ),
+        start=state.actual_q,
+        T_flange_active=state.T_flange_tcp,
+        execution=ExecutionMode.SPLINE,
+        joint_tolerances=checked.tolerances,
+        remarks=(*trajectory.remarks, *remark, *clearance),
+    )
+
+
+def _cartesian_goal(
+    checked: CheckedJointGoal, state: RobotState, arm: Arm, options: PlanningOptions
+) -> GoalTable:
+    """Return what the goal means for the tool."""
+    n = len(checked.times)
+    table = GoalTable(
+        waypoints=WaypointRows(
+            times=checked.times,
+            poses=tcp_rows(arm, state.T_flange_tcp, checked.joints.x),
+            twists=zeros(n),
+            accelerations=zeros(n),
+            jerks=zeros(n),
+        ),
+        goal_time_tolerance=checked.goal_time_tolerance,
+        execution=ExecutionMode.SPLINE,
+    )
+    tolerances_are_measurable(table, options)
+    return add_safe_outputs(apply_default_tolerances(table, options), options)
+
+
+def _trajectory(
+    checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
+) -> _Trajectory:
+    """Return the goal from where the arm stands, without NaN."""
+    times, joints, remarks, first = checked.times, checked.joints, [], 0
+    if times[0] == 0.0:
+        _check_start(checked, state, options)
+        remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
+        times, first = times[1:], 1
+        joints = MotionRows(*(rows[1:] for rows in joints))
+    rest = np.zeros((1, 6))
+    q = np.concatenate([[state.actual_q], joints.x])
+    qd, qdd = (np.concatenate([rest, rows]) for rows in (joints.v, joints.a))
+    times = to_ticks(np.concatenate([[0.0], times]))
+    has_qd, has_qdd = (~np.isnan(rows).any(axis=1) for rows in (qd, qdd))
+    if not has_qd.all():
+        qd = np.where(np.isnan(qd), _chosen_velocities(times, q), qd)
+        if len(q) > 2:
+            remarks.append(
+                'velocities are chosen by the driver where the goal has none, so that no joint '
+                'turns beyond its points'
+            )
+    quintic = bool(has_qdd.all())
+    if not quintic and has_qdd[1:].any():
+        remarks.append('accelerations are ignored, because some points have none')
+    return _Trajectory(
+        times=times,
+        joints=MotionRows(q, qd, qdd if quintic else np.zeros_like(q)),
+        quintic=quintic,
+        first=first,
+        remarks=tuple(remarks),
+    )
+
+
+def _check_start(
+    checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
+) -> None:
+    """Refuse a first point at time 0 at which the arm does not rest."""
+    off = np.abs(checked.joints.x[0] - state.actual_q)
+    k = int(np.argmax(off))
+    if off[k] > options.start_tolerance_angle:
+        raise InvalidGoal(
+            point_field(0, 'time_from_start'),
+            f'is 0, but {JOINT_NAMES[k]} is {off[k]:.4f} rad away from the point (allowed are '
+            f'{options.start_tolerance_angle:g} rad)',
+            'give the first point a time greater than 0',
+        )
+    if (np.abs(checked.joints.v[0]) > 0.0).any():
+        raise InvalidGoal(
+            point_field(0, 'velocities'),
+            'are not zero, but the motion starts at rest there',
+            'set them to 0',
+        )
+
+
+def _chosen_velocities(times: Floats, q: Floats) -> Floats:
+    """
+    Return velocities by the neighbours, those of parabolas; 0 at both ends.
+
+    They are limited so that a joint moves only one way between two points, and rests for a moment
+    where it turns back (F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation).
+    """
+    h = np.diff(times)[:, None]
+    mean = np.diff(q, axis=0) / h
+    before, after = mean[:-1], mean[1:]
+    parabola = (h[1:] * before + h[:-1] * after) / (h[1:] + h[:-1])
+    bound = _MAX_MONOTONE * np.minimum(np.abs(before), np.abs(after))
+    qd = np.zeros_like(q)
+    qd[1:-1] = np.where(before * after > 0.0, np.clip(parabola, -bound, bound), 0.0)
+    return qd
+
+
+def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
+    """Return samples as dense as those of all goals, of the tool and of the fastest joint."""
+    spline, times = trajectory.spline, trajectory.times
+    piece, t = coarse_samples(times)
+    q, qd, qdd = evaluate(spline.coefficients[piece], t)
+    twists, accelerations = tool_rates(arm, state.T_flange_tcp, q, qd, qdd)
+    count = sample_count(
+        times,
+        np.linalg.norm(twists[:, :3], axis=1),
+        np.maximum(np.linalg.norm(twists[:, 3:], axis=1), np.abs(qd).max(axis=1)),
+        np.linalg.norm(accelerations[:, :3], axis=1),
+        trajectory.first,
+    )
+    piece, number = (np.concatenate([[0], rows]) for rows in counted(count))
+    u = number / count[piece]
+    t = u * np.diff(times)[piece]
+    joints = evaluate(spline.coefficients[piece], t)
+    twists, accelerations = tool_rates(arm, state.T_flange_tcp, *joints)
+    return _Samples(
+        piece=piece,
+        u=u,
+        times=times[piece] + t,
+        joints=joints,
+        poses=tcp_rows(arm, state.T_flange_tcp, joints.x),
+        twists=twists,
+        accelerations=accelerations,
+        points=(trajectory.first + piece).astype(np.int32),
+    )
+
+
+def _check_ranges(samples: _Samples, arm: Arm) -> None:
+    low, high = np.array(arm.model.position_limits).T
+    q = samples.joints.x
+    outside = (q < low - _ROUNDING) | (q > high + _ROUNDING)
+    if not outside.any():
+        return
+    row = int(np.flatnonzero(outside.any(axis=1))[0])
+    k = int(np.argmax(outside[row]))
+    raise JointLimitExceeded(
+        f'{point_field(int(samples.points[row]), "positions")}, at '
+        f'{100.0 * samples.u[row]:.1f} % of its segment: {JOINT_NAMES[k]} turns to '
+        f'{q[row, k]:.4f} rad, its range is {arm.model.range_text(k)}; keep it within.'
+    )
+
+
+def _fit_to_limits(
+    trajectory: _Trajectory, samples: _Samples, arm: Arm, options: PlanningOptions
+) -> tuple[_Trajectory, tuple[str, ...]]:
+    """Return the trajectory in a time that keeps the limits, and a remark if that is longer."""
+    found = worst_excess_of(
+        RateSamples(
+            points=samples.points,
+            u=samples.u,
+            twists=samples.twists,
+            accelerations=samples.accelerations,
+            qd=samples.joints.v,
+            qdd=samples.joints.a,
+        ),
+        arm.model,
+        options,
+    )
+    if found is None:
+        return trajectory, ()
+    if options.on_too_fast != 'slow':
+        raise found.refusal(rates='velocities')
+    slowed = trajectory.stretched(found.factor)
+    longest = float(np.diff(slowed.times).max())
+    if longest > options.max_segment_time:
+        raise found.refusal(rates='velocities')
+    return slowed, (
+        f'all times are stretched by {found.factor:.4g}, because of {found.limit_text} '
+        f'({found.what}, on the segment to point {found.point}): {slowed.times[-1]:.3f} s in '
+        'total',
+    )
+
+
+def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> PlannedRows:
+    n = len(durations)
+    ends = np.searchsorted(samples.piece, np.arange(n), side='right') - 1
+    steps = np.stack(
+        [
+            np.linalg.norm(np.diff(samples.poses[:, :3], axis=0), axis=1),
+            angle_rows(samples.poses[:-1, 3:], samples.poses[1:, 3:]),
+        ],
+        axis=1,
+    )
+    lengths, angles = np.diff(np.cumsum(steps, axis=0)[ends - 1], axis=0, prepend=0.0).T
+    q, qd, qdd = (rows[1:] for rows in trajectory.joints)
+    turns = np.abs(np.diff(trajectory.joints.x, axis=0)).max(axis=1)
+    kind = 'quintic' if trajectory.quintic else 'cubic'
+
+    def lines() -> list[str]:
+        return [
+            f'point {trajectory.first + i}: joints in a {kind} piece, up to {turn:.3f} rad, '
+            f'{length:.3f} m of the tool in {time:.3f} s, '
+            f'{"passes through" if moves else "stops there"}'
+            for i, (turn, length, time, moves) in enumerate(
+                zip(
+                    turns.tolist(),
+                    lengths.tolist(),
+                    durations.tolist(),
+                    qd.any(axis=1).tolist(),
+                    strict=True,
+                )
+            )
+        ]
+
+    return PlannedRows(
+        waypoints=(trajectory.first + np.arange(n)).astype(np.int32),
+        lengths=lengths,
+        angles=angles,
+        durations=durations,
+        blend_entries=zeros(n, 5),
+        joints=q,
+        primitives=SplineRows(
+            targets=q,
+            velocities=qd,
+            accelerations=qdd,
+            durations=durations,
+            quintic=np.full(n, trajectory.quintic),
+        ),
+        report_lines=LateLines(n, lines),
+    )
