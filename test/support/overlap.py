@@ -27,6 +27,7 @@ COMPUTING = (
     'test/acceptance/test_input_waits.py',
     'test/acceptance/test_script_calls.py',
     'test/acceptance/test_io_commands.py',
+    'test/acceptance/test_joint_trajectories.py',
     'test/acceptance/test_live_sessions.py',
     'test/acceptance/test_path_offsets.py',
     'test/acceptance/test_proportional_outputs.py',

@@ -147,9 +147,7 @@ def _check_point(
     index: int, point: JointPoint, joints: int, before: float, options: PlanningOptions
 ) -> None:
     if not point.positions:
-        raise InvalidGoal(
-            point_field(index, 'positions'), 'are empty', 'give one for each joint'
-        )
+        raise InvalidGoal(point_field(index, 'positions'), 'are empty', 'give one for each joint')
     for field, values, bound in (
         ('positions', point.positions, MAX_POSITION),
         ('velocities', point.velocities, MAX_TWIST),

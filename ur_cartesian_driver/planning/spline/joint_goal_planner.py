@@ -205,9 +205,7 @@ def _trajectory(
     )
 
 
-def _check_start(
-    checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
-) -> None:
+def _check_start(checked: CheckedJointGoal, state: RobotState, options: PlanningOptions) -> None:
     """Refuse a first point at time 0 at which the arm does not rest."""
     off = np.abs(checked.joints.x[0] - state.actual_q)
     k = int(np.argmax(off))
@@ -344,7 +342,7 @@ def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> 
                     turns.tolist(),
                     lengths.tolist(),
                     durations.tolist(),
-                    qd.any(axis=1).tolist(),
+                    (np.abs(qd).max(axis=1) > 0.0).tolist(),
                     strict=True,
                 )
             )

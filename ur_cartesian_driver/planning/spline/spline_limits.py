@@ -138,9 +138,7 @@ def _quantities(
         values = np.linalg.norm(samples.accelerations[:, part], axis=1)
         yield 'the tool', values, getattr(options, name), 2, unit, name
     bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
-    for k, (joint, limit) in enumerate(
-        zip(JOINT_NAMES, model.max_joint_speed, strict=True)
-    ):
+    for k, (joint, limit) in enumerate(zip(JOINT_NAMES, model.max_joint_speed, strict=True)):
         source = f'the joint speed limit{model.speed_source(k)}'
         yield joint, np.abs(samples.qd[:, k]), limit, 1, 'rad/s', source
         yield joint, np.abs(samples.qdd[:, k]), bound, 2, 'rad/s^2', name

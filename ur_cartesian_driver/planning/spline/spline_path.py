@@ -193,7 +193,7 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
 
 
 def coarse_samples(times: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Return a few samples on all pieces between times (n + 1,): piece and time since its start."""
+    """Return samples on all pieces between times (n + 1,): piece and time since its start."""
     h = np.diff(times)
     piece = np.repeat(np.arange(len(h)), _COARSE_SAMPLES)
     return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), len(h)) * h[piece]

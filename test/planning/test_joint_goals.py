@@ -1,0 +1,210 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint goals: what is refused and why, the velocities that the driver chooses, and limits."""
+
+from dataclasses import replace
+from math import inf, nan, pi
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import (
+    CollisionPredicted,
+    InvalidGoal,
+    InvalidJoints,
+    JointLimitExceeded,
+    NotAvailable,
+    OldHeaderTimestamp,
+    TooFast,
+)
+from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint, JointTolerance
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.planning import plan_joint_goal, PlanningOptions
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
+
+OPTIONS = PlanningOptions(max_tool_speed=0.0, max_approach_distance=0.0, self_collision='off')
+SIX = (0.1,) * 6
+ZERO = (0.0,) * 6
+
+
+def goal_through(cell, *rows, step=1.0, **fields):
+    """Return a goal through offsets from home, a step of time apart."""
+    points = tuple(
+        JointPoint(time=(i + 1) * step, positions=np.add(cell.state.actual_q, row))
+        for i, row in enumerate(rows)
+    )
+    return JointGoal(joint_names=JOINT_NAMES, points=points, **fields)
+
+
+def planned(cell, goal, options=OPTIONS, **more):
+    state = replace(cell.state, target_q=cell.state.actual_q)
+    return plan_joint_goal(goal, state, cell.arm, replace(options, **more))
+
+
+def spline_of(plan):
+    return JointSpline.of(plan.start, plan.rows.primitives)
+
+
+def point(**fields: Any) -> dict[str, Any]:
+    given: dict[str, Any] = {'time': 1.0, 'positions': SIX} | fields
+    return {'points': (JointPoint(**given),)}
+
+
+@pytest.mark.parametrize(
+    ('error', 'text', 'fields'),
+    [
+        (InvalidJoints, r'joint_names lacks wrist_3_joint', {'joint_names': JOINT_NAMES[:5]}),
+        (
+            InvalidJoints,
+            r'joint_names\[6\] repeats',
+            {'joint_names': (*JOINT_NAMES, 'elbow_joint')},
+        ),
+        (InvalidJoints, r"joint_names\[0\] is 'rail', not", {'joint_names': ('rail',)}),
+        (InvalidGoal, r'trajectory\.points is empty', {'points': ()}),
+        (InvalidGoal, r'points\[0\]\.positions are empty', point(positions=())),
+        (InvalidGoal, r'points\[0\]\.positions has 5 values for 6', point(positions=SIX[:5])),
+        (InvalidGoal, r'points\[0\]\.velocities has 1 values', point(velocities=(0.0,))),
+        (InvalidGoal, r'positions contains nan', point(positions=(*SIX[:5], nan))),
+        (InvalidGoal, r'positions contains a number beyond', point(positions=(*SIX[:5], 90.0))),
+        (InvalidGoal, r'velocities are empty, but', point(accelerations=SIX)),
+        (InvalidGoal, r'velocities are not zero, but the motion ends', point(velocities=SIX)),
+        (InvalidGoal, r'effort is given', point(effort=SIX)),
+        (InvalidGoal, r'time_from_start is -1 s, less than', point(time=-1.0)),
+        (InvalidGoal, r'time_from_start is 0, so there is no time', point(time=0.0)),
+        (InvalidGoal, r'gives the segment 0.0005 s, less', point(time=0.0005)),
+        (InvalidGoal, r'more than max_segment_time', point(time=1e5)),
+        (InvalidGoal, r'time_from_start contains inf', point(time=inf)),
+        (OldHeaderTimestamp, r'header.stamp is 5.000 s old', {'age': 5.0}),
+        (InvalidGoal, r'goal_time_tolerance contains nan', {'goal_time_tolerance': nan}),
+        (
+            InvalidJoints,
+            r"path_tolerance\[0\].name is 'rail'",
+            {'path_tolerance': (JointTolerance(name='rail'),)},
+        ),
+        (
+            InvalidGoal,
+            r'goal_tolerance\[0\].acceleration is 1, but robots do not report',
+            {'goal_tolerance': (JointTolerance(name='elbow_joint', acceleration=1.0),)},
+        ),
+        (InvalidGoal, r'JointGoal\.age', {'age': 'now'}),
+    ],
+)
+def test_what_is_wrong_for_every_robot_is_refused_by_name(cell, error, text, fields):
+    goal = JointGoal(**{'joint_names': JOINT_NAMES, **point()} | fields)
+    with pytest.raises(error, match=text):
+        planned(cell, goal)
+
+
+def test_the_order_of_times_and_the_first_point_count(cell):
+    one, two = goal_through(cell, ZERO, SIX).points
+    for points, text in (
+        (
+            (two, one),
+            r'points\[1\]\.time_from_start is 1 s, not later than the 2 s of points\[0\]',
+        ),
+        (
+            (replace(one, time=0.0, positions=np.add(one.positions, np.eye(6)[2] / 50)), two),
+            r'time_from_start is 0, but elbow_joint is 0.0200 rad away',
+        ),
+        ((replace(one, time=0.0, velocities=SIX), two), r'the motion starts at rest there'),
+    ):
+        with pytest.raises(InvalidGoal, match=text):
+            planned(cell, JointGoal(joint_names=JOINT_NAMES, points=points))
+    made = planned(cell, JointGoal(joint_names=JOINT_NAMES, points=(replace(one, time=0.0), two)))
+    assert made.rows.waypoints.tolist() == [1]
+    assert 'point 0: the robot is there' in made.remarks[0]
+
+
+def test_what_the_robot_cannot_do_is_refused_with_place_value_and_bound(cell):
+    far = (2.0 * pi, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for error, text, row, more in (
+        (JointLimitExceeded, r'shoulder_pan_joint turns to 6.\d+ rad, its range', far, {}),
+        (TooFast, r'shoulder_lift_joint needs .* adapt velocities', (0, 2.5, 0, 0, 0, 0), {}),
+        (TooFast, 'more than max_tool_speed = 0.100', SIX, {'max_tool_speed': 0.1}),
+        (
+            CollisionPredicted,
+            'plane "floor"',
+            (0, 0.8, 0, 0, 0, 0),
+            {'workspace_planes': ('floor 0 0 0.1 0 0 1',)},
+        ),
+        (
+            InvalidGoal,
+            'max_approach_distance',
+            (1.0, 0, 0, 0, 0, 0),
+            {'max_approach_distance': 0.3},
+        ),
+        (NotAvailable, 'calibration of this robot is unknown', SIX, {'calibration_known': False}),
+        (NotAvailable, 'milliseconds', SIX, {'dialect': DIALECTS['2.0']}),
+    ):
+        with pytest.raises(error, match=text):
+            planned(cell, goal_through(cell, np.add(row, 0.1 if row is far else 0.0)), **more)
+
+
+def test_a_trajectory_that_is_too_fast_is_slowed_as_a_whole(cell):
+    goal = goal_through(cell, SIX, ZERO, np.negative(SIX), step=0.5)
+    fast, slow = (
+        planned(cell, goal, max_tool_speed=speed, on_too_fast='slow') for speed in (0.0, 0.2)
+    )
+    factor = slow.duration / fast.duration
+    assert factor > 1.2
+    assert f'stretched by {factor:.4g}' in slow.remarks[1]
+    u = np.linspace(0.0, 1.0, 200)
+    q_fast, qd_fast, _ = spline_of(fast).rows(u * fast.duration)
+    q_slow, qd_slow, _ = spline_of(slow).rows(u * slow.duration)
+    np.testing.assert_allclose(q_slow, q_fast, atol=1e-5)
+    np.testing.assert_allclose(factor * qd_slow, qd_fast, atol=1e-4)
+    assert slow.goal.waypoints[-1].time == pytest.approx(slow.duration)
+
+
+def test_joints_come_in_any_order_and_with_the_prefix(cell):
+    plain = goal_through(cell, np.arange(6) * 0.02)
+    (one,) = plain.points
+    turned = JointGoal(
+        joint_names=tuple(f'left_{name}' for name in reversed(JOINT_NAMES)),
+        points=(replace(one, positions=one.positions[::-1]),),
+        path_tolerance=(JointTolerance(name='left_elbow_joint', position=0.1, velocity=-1.0),),
+    )
+    made = planned(cell, turned, tf_prefix='left_')
+    np.testing.assert_array_equal(made.rows.joints, planned(cell, plain).rows.joints)
+    assert made.joint_tolerances.path.position == (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+
+
+def test_accelerations_of_some_points_are_ignored_and_the_report_says_so(cell):
+    first, last = goal_through(cell, SIX, ZERO).points
+    rates = {'velocities': ZERO, 'accelerations': SIX}
+    full, partly = (
+        planned(cell, JointGoal(joint_names=JOINT_NAMES, points=(replace(first, **rates), end)))
+        for end in (replace(last, **rates), last)
+    )
+    assert all(piece.accelerations == SIX for piece in full.rows.primitives)
+    assert all(piece.accelerations is None for piece in partly.rows.primitives)
+    assert any('accelerations are ignored' in line for line in partly.remarks)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.05, 2.0), *[st.floats(-0.3, 0.3)] * 6), min_size=1, max_size=6)
+)
+def test_chosen_velocities_turn_no_joint_beyond_its_points(cell, steps):
+    times, rows = np.cumsum([step[0] for step in steps]), [step[1:] for step in steps]
+    points = tuple(
+        JointPoint(time=time, positions=np.add(cell.state.actual_q, row))
+        for time, row in zip(times, rows, strict=True)
+    )
+    made = planned(
+        cell,
+        JointGoal(joint_names=JOINT_NAMES, points=points),
+        on_too_fast='slow',
+        max_segment_time=2000.0,
+    )
+    spline, ends = spline_of(made), np.cumsum(made.rows.durations)
+    q_before = np.array(made.start)
+    for begin, end, row in zip(np.append(0.0, ends), ends, made.rows.joints, strict=False):
+        q, _, _ = spline.rows(np.linspace(begin, end, 40))
+        low, high = np.minimum(q_before, row), np.maximum(q_before, row)
+        assert (q > low - 1e-9).all()
+        assert (q < high + 1e-9).all()
+        q_before = row
