@@ -46,6 +46,8 @@ REQUIRES = [
 EXTRAS = {
     # The meshes of the robots, and self-collision with them.
     'collision': ['airo-models>=0.0.12,<0.1', 'example-robot-data>=4,<7', 'pin>=3,<5'],
+    # Recordings as MCAP.
+    'export': ['mcap>=1.6,<2', 'mcap-ros2-support>=0.6,<1'],
     # Drawings as goals (DXF).
     'import': ['ezdxf>=1.3,<2'],
     # The picture of the path that the demo draws.

@@ -58,4 +58,4 @@ install() { "$venv/bin/uv" pip install --quiet --python "$python" "$@"; }
 "$python" -c 'import tomllib
 print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' |
   install --requirement requirements-dev.txt --requirement -
-PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,import,plot,show,test]'
+PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,export,import,plot,show,test]'

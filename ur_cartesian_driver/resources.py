@@ -22,15 +22,22 @@ def share_path() -> Path:
     checkout = Path(__file__).resolve().parents[1]
     if (checkout / 'package.xml').is_file():
         return checkout
+    if share := installed_share(NAME):
+        return share
+    raise FileNotFoundError(
+        f'The data files of {NAME} are not installed: there is no share/{NAME}/package.xml in '
+        f'AMENT_PREFIX_PATH or {sys.prefix}. Build the package with colcon or install it by pip.'
+    )
+
+
+def installed_share(package: str) -> Path | None:
+    """Return share/PACKAGE of the ROS installation or of the pip environment, if it is there."""
     # The wheels of ROS 2 do not set AMENT_PREFIX_PATH, so there may be no ament index.
     for prefix in [
         *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
         sys.prefix,
     ]:
-        share = Path(prefix, 'share', NAME)
+        share = Path(prefix, 'share', package)
         if (share / 'package.xml').is_file():
             return share
-    raise FileNotFoundError(
-        f'The data files of {NAME} are not installed: there is no share/{NAME}/package.xml in '
-        f'AMENT_PREFIX_PATH or {sys.prefix}. Build the package with colcon or install it by pip.'
-    )
+    return None

@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command that draws recordings."""
 
-import csv
 import sys
 
-import numpy as np
 import pytest
 from synthetic_recording import only_file, outputs, packet, record
 
 from ur_cartesian_driver.cli import main
-from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 
 
@@ -44,26 +41,12 @@ def test_a_motion_in_which_much_happened_and_one_that_was_cut_off_are_drawn(tmp_
     assert (tmp_path / 'a.svg').read_text().startswith('<?xml')
 
 
-def test_the_table_has_a_line_for_each_packet(tmp_path, capsys):
-    record(tmp_path, map(packet, range(50)))
-    file = only_file(tmp_path)
-    assert main(['plot', str(file), '--csv', str(tmp_path / 'a.csv')]) == 0
-    assert 'picture' not in capsys.readouterr().out
-    with open(tmp_path / 'a.csv', encoding='utf-8') as table:
-        rows = list(csv.DictReader(table))
-    found = Recording.load(file)
-    assert [float(row['actual_q_0']) for row in rows] == found.actual_q[:, 0].tolist()
-    assert [float(row['target_pose_x']) for row in rows] == found.target_pose[:, 0].tolist()
-    np.testing.assert_allclose([float(row['deviation_position']) for row in rows], 0.001)
-
-
 def test_without_matplotlib_one_sentence_says_so(tmp_path, monkeypatch, capsys):
     record(tmp_path, [packet(0)])
     monkeypatch.setitem(sys.modules, 'matplotlib', None)
     assert main(['plot', str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
-        'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`), or use '
-        '--csv\n'
+        'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`)\n'
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from robot_cell import CYCLE, run_cell
 
+from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -22,7 +23,7 @@ from ur_cartesian_driver.motion.goal import (
     Segment,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, rotate
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults.fault_values import (
@@ -82,10 +83,18 @@ def kinds(recording):
     return [kind for _, kind, _ in recording.events]
 
 
-def test_a_recording_equals_what_happened(tmp_path):
-    """Packet by packet, with a slider that moves and an output that somebody switches."""
+@pytest.fixture(scope='module')
+def eventful(tmp_path_factory):
+    """
+    Record a motion with a slider that moves, an output that somebody switches, and a force.
+
+    Return the directory, and what the motion itself was: plan, outcome, packets of RTDE.
+    """
+    directory = tmp_path_factory.mktemp('eventful')
 
     async def scenario(cell):
+        cell.robot.controller.external_ft = True
+        cell.robot.controller.io.external_force = [1.0, -2.0, 3.0, 0.1, -0.2, 0.3]
         cell.robot.inject(SpeedSliderFault(fraction=0.5, trigger=AfterDistance(0.02)))
 
         async def switch(motion):
@@ -94,11 +103,18 @@ def test_a_recording_equals_what_happened(tmp_path):
 
         return await executed(cell, corner(cell), switch)
 
-    made, outcome, seen = run_cell(scenario, record_directory=str(tmp_path))
-    (found,) = recorded(tmp_path)
-    begin = min(seen)
-    steps = np.rint((np.array(sorted(seen)) - begin) / CYCLE).astype(int)
-    states = dict(zip(steps, (seen[time] for time in sorted(seen)), strict=True))
+    return directory, *run_cell(scenario, record_directory=str(directory))
+
+
+def by_cycle(seen):
+    """Return packets by the number of their cycle from the first one."""
+    return {round((time - min(seen)) / CYCLE): state for time, state in seen.items()}
+
+
+def test_a_recording_equals_what_happened(eventful):
+    directory, made, outcome, seen = eventful
+    (found,) = recorded(directory)
+    states = by_cycle(seen)
     rows = np.rint(found.time / CYCLE).astype(int)
     assert len(rows) + found.metadata['rows_left_out'] == rows[-1] + 1
     assert set(states) - set(rows) <= {rows[-1] + 1}
@@ -106,6 +122,7 @@ def test_a_recording_equals_what_happened(tmp_path):
         assert tuple(found.actual_q[i]) == states[i].actual_q
         assert tuple(found.target_pose[i]) == states[i].target_tcp_pose.row()
         assert tuple(found.actual_twist[i]) == states[i].actual_tcp_twist
+        assert tuple(found.wrench[i]) == states[i].actual_tcp_wrench
         assert found.speed_scaling[i] == states[i].speed_scaling
     np.testing.assert_array_equal(found.planned_pose, made.reference.poses)
     np.testing.assert_array_equal(found.planned_time, made.reference.time)
@@ -122,6 +139,47 @@ def test_a_recording_equals_what_happened(tmp_path):
     off = found.deviation()
     assert off.position.max() < 1e-3
     assert off.planned_time[-1] == pytest.approx(made.duration, abs=1e-6)
+
+
+def test_an_exported_recording_has_the_values_of_rtde(eventful, tmp_path):
+    pytest.importorskip('mcap_ros2')
+    from mcap_topics import pose_row, read_topics, twist_row
+
+    directory, _, _, seen = eventful
+    assert main(['export', str(directory), '-o', str(tmp_path / 'a.mcap')]) == 0
+    topics, _ = read_topics(tmp_path / 'a.mcap')
+    states = by_cycle(seen)
+    joints, *others = (
+        topics[name]
+        for name in (
+            '/joint_states',
+            '/ur_cartesian_driver/target_joint_states',
+            '/ur_cartesian_driver/tcp_pose',
+            '/ur_cartesian_driver/target_tcp_pose',
+            '/ur_cartesian_driver/tcp_twist',
+            '/ur_cartesian_driver/wrench',
+        )
+    )
+    compared = 0
+    for i, time in enumerate(joints.times):
+        state = states.get(round((time - joints.times[0]) * 1e-9 / CYCLE))
+        if state is None:
+            continue
+        compared += 1
+        target, pose, target_pose, twist, wrench = (topic.messages[i] for topic in others)
+        assert all(topic.times[i] == time for topic in others)
+        assert tuple(joints.messages[i].position) == state.actual_q
+        assert tuple(joints.messages[i].velocity) == state.actual_qd
+        assert tuple(target.position) == state.target_q
+        assert pose_row(pose.pose) == state.actual_tcp_pose.row()
+        assert pose_row(target_pose.pose) == state.target_tcp_pose.row()
+        assert twist_row(twist.twist) == state.actual_tcp_twist
+        force = wrench.wrench.force
+        assert rotate(state.actual_tcp_pose.quaternion, (force.x, force.y, force.z)) == (
+            pytest.approx(state.actual_tcp_wrench[:3], abs=1e-12)
+        )
+    assert compared > 0.9 * len(joints.times)
+    assert tuple(states[50].actual_tcp_wrench) == (1.0, -2.0, 3.0, 0.1, -0.2, 0.3)
 
 
 def test_each_motion_is_a_file_that_says_how_it_ended(tmp_path):

@@ -12,6 +12,7 @@ from ur_cartesian_driver.cli import (
     argument_types,
     check_robot,
     commands,
+    export_command,
     import_command,
     plan_commands,
     recording_plot,
@@ -49,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
     _add_where(sub)
     _add_check_robot(sub)
     _add_plot(sub)
+    _add_export(sub)
     return top
 
 
@@ -475,8 +477,24 @@ def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
         metavar='PICTURE',
         help='picture file, its suffix is the format; by default beside the recording, as .png',
     )
-    draw.add_argument(
-        '--csv',
-        metavar='TABLE',
-        help='write all packets as comma-separated values; without -o, draw no picture',
+
+
+def _add_export(sub: Commands[argparse.ArgumentParser]) -> None:
+    export = _add(
+        sub,
+        'export',
+        export_command.export,
+        'write a recorded motion for other programs: MCAP with messages of ROS 2, or CSV',
+    )
+    export.add_argument(
+        'file', help='recording, or a directory, of which the newest recording is taken'
+    )
+    export.add_argument(
+        '-o',
+        '--output',
+        metavar='FILE',
+        help='its suffix is the format, .mcap or .csv; by default beside the recording, as .mcap',
+    )
+    export.add_argument(
+        '--tf-prefix', default='', help='prefix for the names of frames and joints in MCAP'
     )

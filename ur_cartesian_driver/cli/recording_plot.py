@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``ur-cartesian plot``: draw a recorded motion, or write it as a table.
+``ur-cartesian plot``: draw a recorded motion.
 
 The picture shows on the left the planned and executed path, and on the right over time: deviation
 from the plan, tool speed, effective speed, and points, outputs and events.
@@ -10,7 +10,6 @@ from the plan, tool speed, effective speed, and points, outputs and events.
 from __future__ import annotations
 
 import argparse
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_format import (
-    EXECUTED_DTYPE,
     OUTPUT_NAMES,
     PART_SUFFIX,
 )
@@ -39,17 +37,12 @@ _MARKED_EVENTS = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 
 
 
 def plot(arguments: argparse.Namespace) -> int:
-    """Draw a recording, or write its table."""
+    """Draw a recording."""
     file = newest_recording(Path(arguments.file))
-    if arguments.csv:
-        with timed('writing the table'):
-            write_table(Recording.load(file), Path(arguments.csv))
-        print(f'table: {arguments.csv}')
-    if arguments.output or not arguments.csv:
-        picture = Path(arguments.output or file.with_suffix('.png'))
-        with timed('drawing'):
-            draw(Recording.load(file, MAX_ROWS), picture)
-        print(f'picture: {picture}')
+    picture = Path(arguments.output or file.with_suffix('.png'))
+    with timed('drawing'):
+        draw(Recording.load(file, MAX_ROWS), picture)
+    print(f'picture: {picture}')
     return 0
 
 
@@ -67,37 +60,6 @@ def newest_recording(path: Path) -> Path:
     return path
 
 
-# ---- the table ------------------------------------------------------------------------------
-
-
-def write_table(recording: Recording, file: Path) -> None:
-    """Write all packets as comma-separated values, and the deviation from the plan."""
-    deviation = recording.deviation()
-    executed = {name: getattr(recording, name) for name in EXECUTED_DTYPE.names or ()}
-    columns: dict[str, NDArray[Any]] = {'time': recording.time}
-    for name, values in executed.items():
-        if values.ndim > 1:
-            axes = _AXIS_NAMES.get(name.rpartition('_')[2], '012345')
-            columns |= {f'{name}_{axes[i]}': column for i, column in enumerate(values.T)}
-    columns |= {name: values for name, values in executed.items() if values.ndim == 1}
-    columns |= {
-        'deviation_position': deviation.position,
-        'deviation_angle': deviation.angle,
-        'planned_time': deviation.planned_time,
-    }
-    with open(file, 'w', newline='', encoding='utf-8') as opened:
-        writer = csv.writer(opened)
-        writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
-
-
-#: Names of the columns of a pose and of a twist; those of other rows have numbers.
-_AXIS_NAMES = {
-    'pose': ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw'),
-    'twist': ('x', 'y', 'z', 'rx', 'ry', 'rz'),
-}
-
-
 # ---- the picture ----------------------------------------------------------------------------
 
 
@@ -111,9 +73,7 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
     try:
         import matplotlib
     except ImportError:
-        raise OSError(
-            'no picture without matplotlib; install it (extra `plot`), or use --csv'
-        ) from None
+        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
     matplotlib.use('Agg')
     from matplotlib import pyplot
 

@@ -61,9 +61,22 @@ _SYNONYMS = {
     'quat z': 'qz',
     'quat w': 'qw',
 }
-#: The first of these fields of RTDE is the pose; each column has one number of it.
-_RTDE_POSES = ('actual_TCP_pose', 'target_TCP_pose')
-_RTDE_NUMBERS = ('x [m]', 'y [m]', 'z [m]', 'rx [rad]', 'ry [rad]', 'rz [rad]')
+#: The first of these that is there whole is the pose: names of our exports and of RTDE, where each
+#: column has one number of it.
+_RECORDED_POSES = (
+    {f'actual_pose_{name}': name for name in ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')},
+    *(
+        {
+            f'{pose}_{i}': name
+            for i, name in enumerate(
+                ('x [m]', 'y [m]', 'z [m]', 'rx [rad]', 'ry [rad]', 'rz [rad]')
+            )
+        }
+        for pose in ('actual_TCP_pose', 'target_TCP_pose')
+    ),
+)
+#: A fraction that RTDE reports, and no speed in the unit 'scaling'.
+_SPEED_SCALING = 'speed scaling'
 _QUATERNION, _NORMAL = ('qx', 'qy', 'qz', 'qw'), ('nx', 'ny', 'nz')
 _ROTATION_VECTOR, _ANGLES_OF_ROLL = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
 _GROUPS = (('x', 'y', 'z'), _QUATERNION, _NORMAL, _ROTATION_VECTOR, _ANGLES_OF_ROLL)
@@ -93,7 +106,7 @@ def collect_csv(text: str, options: ImportOptions, into: PathCollector) -> None:
     delimiter = max(';\t,', key=lines[first].count)
     if delimiter not in lines[first]:
         delimiter = ' '
-    titles = _without_rtde(next(csv.reader([lines[first]], delimiter=delimiter)))
+    titles = _plain_titles(next(csv.reader([lines[first]], delimiter=delimiter)))
     columns = _columns(titles, first + 1, options, into)
     decimal_comma = delimiter != ','
     make = _orientation({column.name for column in columns})
@@ -137,10 +150,9 @@ def collect_csv(text: str, options: ImportOptions, into: PathCollector) -> None:
         )
 
 
-def _without_rtde(titles: list[str]) -> list[str]:
-    """Return titles with the pose of RTDE named as other poses are."""
-    for pose in _RTDE_POSES:
-        names = {f'{pose}_{i}': name for i, name in enumerate(_RTDE_NUMBERS)}
+def _plain_titles(titles: list[str]) -> list[str]:
+    """Return titles with the pose of a recording named as other poses are."""
+    for names in _RECORDED_POSES:
         if names.keys() <= set(titles):
             return [names.get(title, title) for title in titles]
     return titles
@@ -150,13 +162,14 @@ def _columns(
     titles: list[str], line: int, options: ImportOptions, into: PathCollector
 ) -> list[_Column]:
     found: dict[str, _Column] = {}
+    others = []
     for index, title in enumerate(titles):
         match = _HEADER.fullmatch(title)
         plain = title.strip().lower().replace('_', ' ')
         name = '' if match is None else match[1].lower()
         name = _SYNONYMS.get(plain, _SYNONYMS.get(name, name))
-        if match is None or name not in _QUANTITIES:
-            into.remarks.add(line, f'column {title.strip()!r}', 'a path has no such quantity')
+        if match is None or name not in _QUANTITIES or plain == _SPEED_SCALING:
+            others.append(repr(title.strip()))
             continue
         if name in found:
             raise BrokenFile(line, f'the columns {found[name].title!r} and {title!r} are the same')
@@ -164,6 +177,9 @@ def _columns(
         found[name] = _Column(
             index, name, _factor(name, unit, title, line, options), title.strip()
         )
+    if others:
+        what = f'column{"s" * (len(others) > 1)} {", ".join(others)}'
+        into.remarks.add(line, what, 'a path has no such quantity')
     for group in _GROUPS:
         missing = [name for name in group if name not in found]
         if missing and (group[0] == 'x' or len(missing) < len(group)):

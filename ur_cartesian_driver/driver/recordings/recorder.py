@@ -208,6 +208,7 @@ class Recorder:
             *state.target_q,
             *state.actual_qd,
             *state.target_qd,
+            *state.actual_tcp_wrench,
             lag,
             buffered,
             state.speed_scaling,

@@ -76,6 +76,8 @@ class Recording:
     target_q: Floats = field(repr=False)
     actual_qd: Floats = field(repr=False)
     target_qd: Floats = field(repr=False)
+    #: (n, 6) [N], [Nm] at the TCP in base axes; NaN = unknown.
+    wrench: Floats = field(repr=False)
     #: (n,) [s] lag behind the set-points sent, and motion that the robot holds; NaN = unknown.
     lag: Floats = field(repr=False)
     buffered: Floats = field(repr=False)
@@ -117,11 +119,11 @@ class Recording:
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json each raise their own
             raise ValueError(f'{path} is damaged: {error}') from error
-        found._check_lengths(path)
+        found._check_columns(path)
         return found
 
-    def _check_lengths(self, path: Path) -> None:
-        """Refuse columns of different lengths: a part of the file was changed."""
+    def _check_columns(self, path: Path) -> None:
+        """Refuse columns of different lengths, or of other numbers: the file was changed."""
         for names, rows in (
             (_EXECUTED_COLUMNS, len(self.time)),
             (_PLANNED_COLUMNS, len(self.planned_time)),
@@ -132,6 +134,13 @@ class Recording:
                         f'{path} is damaged: {name} has {len(getattr(self, name))} rows, not '
                         f'{rows}'
                     )
+        for name in _EXECUTED_COLUMNS:
+            values, expected = getattr(self, name), disk.EXECUTED_DTYPE[name]
+            if values.dtype != expected.base or values.shape[1:] != expected.shape:
+                raise ValueError(
+                    f'{path} is damaged: {name} has rows of {values.dtype} {values.shape[1:]}, '
+                    f'not of {expected.base} {expected.shape}'
+                )
 
     @property
     def tool_speed(self) -> Floats:
@@ -216,6 +225,7 @@ def _from_file(path: Path, max_rows: int) -> Recording:
             columns = {
                 name: file[name] if name.startswith('planned_') else file[name][::step]
                 for name in _COLUMNS
+                if name in file or name not in disk.ADDED_COLUMNS
             }
     except KeyError as error:
         missing = str(error.args[0]).split()[0]
@@ -226,7 +236,7 @@ def _from_file(path: Path, max_rows: int) -> Recording:
         (float(time), str(kind), str(text))
         for time, kind, text in zip(times, kinds, texts, strict=True)
     ]
-    return Recording(metadata=json.loads(metadata.item()), events=events, **columns)
+    return Recording(metadata=json.loads(metadata.item()), events=events, **_complete(columns))
 
 
 def _from_folder(path: Path, max_rows: int) -> Recording:
@@ -235,11 +245,22 @@ def _from_folder(path: Path, max_rows: int) -> Recording:
     )
     metadata = json.loads((path / disk.METADATA_FILE).read_text(encoding='utf-8'))
     step = _step(len(rows), max_rows)
-    columns = {name: np.array(rows[name][::step]) for name in disk.EXECUTED_DTYPE.names or ()}
+    columns = {name: np.array(rows[name][::step]) for name in rows.dtype.names or ()}
     columns |= {f'planned_{name}': np.array(plan[name]) for name in disk.PLANNED_DTYPE.names or ()}
     return Recording(
-        metadata=metadata, events=disk.merge_events(disk.read_events(path), rows), **columns
+        metadata=metadata,
+        events=disk.merge_events(disk.read_events(path), rows),
+        **_complete(columns),
     )
+
+
+def _complete(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the columns with those that an older recording does not have."""
+    unknown = {
+        name: np.full((len(columns['time']), *disk.EXECUTED_DTYPE[name].shape), np.nan)
+        for name in disk.ADDED_COLUMNS
+    }
+    return unknown | columns
 
 
 def _step(rows: int, max_rows: int) -> int:

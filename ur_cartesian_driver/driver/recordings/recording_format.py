@@ -41,6 +41,7 @@ EXECUTED_DTYPE = np.dtype(
         ('target_q', '<f8', 6),
         ('actual_qd', '<f8', 6),
         ('target_qd', '<f8', 6),
+        ('wrench', '<f8', 6),
         ('lag', '<f8'),
         ('buffered', '<f8'),
         ('speed_scaling', '<f8'),
@@ -62,6 +63,8 @@ EXECUTED_STRUCT = struct.Struct(
         for name in EXECUTED_DTYPE.names or ()
     )
 )
+#: Columns that recordings from before they were added do not have: they are read as NaN.
+ADDED_COLUMNS = ('wrench',)
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 

@@ -1,0 +1,52 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A recording as comma-separated values: a row for each packet, and the deviation from the plan.
+
+The titles are the names of the columns with their units, in the form that the import reads.
+"""
+
+from __future__ import annotations
+
+import csv
+from typing import Any, TextIO
+
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYPE
+
+_POSE = ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')
+_TWIST = ('x [m/s]', 'y [m/s]', 'z [m/s]', 'rx [rad/s]', 'ry [rad/s]', 'rz [rad/s]')
+_WRENCH = ('fx [N]', 'fy [N]', 'fz [N]', 'tx [Nm]', 'ty [Nm]', 'tz [Nm]')
+#: What the titles of columns with several numbers add to the name, by the end of the name.
+_PARTS = {
+    'pose': _POSE,
+    'twist': _TWIST,
+    'wrench': _WRENCH,
+    'q': tuple(f'{i} [rad]' for i in range(6)),
+    'qd': tuple(f'{i} [rad/s]' for i in range(6)),
+    'output': ('0', '1'),  # [A] or [V]
+}
+_SECONDS = ('time', 'lag', 'buffered')
+
+
+def write_csv(recording: Recording, file: TextIO) -> None:
+    """Write all packets."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name in EXECUTED_DTYPE.names or ():
+        values = getattr(recording, name)
+        if values.ndim > 1:
+            parts = _PARTS[name.rpartition('_')[2]]
+            columns |= {f'{name}_{part}': values[:, i] for i, part in enumerate(parts)}
+        else:
+            columns[f'{name} [s]' if name in _SECONDS else name] = values
+    deviation = recording.deviation()
+    columns |= {
+        'deviation_position [m]': deviation.position,
+        'deviation_angle [rad]': deviation.angle,
+        'planned_time [s]': deviation.planned_time,
+    }
+    writer = csv.writer(file, lineterminator='\n')
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
