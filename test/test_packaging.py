@@ -222,6 +222,7 @@ def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
     assert ros - depends == set()
     # Not on PyPI; the driver does without them there.
     assert depends - ros == {
+        'control_msgs',
         'launch',
         'launch_ros',
         'tf2_msgs',

@@ -18,7 +18,7 @@ FIRST = {
     'weld': ['tutorial_seam'],
     'External Control': ['external_control'],
     'G-code': ['tutorial_file', 'importing'],
-    'MoveIt': ['coming_from/moveit'],
+    'MoveIt': ['coming_from/moveit', 'moveit'],
 }
 
 

@@ -25,7 +25,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.path_offset_subscriber import PathOffsetSubscriber
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
@@ -101,7 +101,7 @@ class CartesianDriverNode(Node):
         self.driver.open()
         self._publisher = StatePublisher(self, self.driver, settings)
         self._components.append(self._publisher)
-        self.action_server = CartesianActionServer(self, self.driver, settings)
+        self.action_server = GoalServer(self, self.driver, settings)
         self._components.append(self.action_server)
         self._components.append(AppendService(self, self.action_server))
         self.path_offsets = PathOffsetSubscriber(self, self.action_server)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The action server: it accepts every goal at once and gives it a :class:`GoalRun` with a thread.
+The action servers: they accept every goal at once and give it a :class:`GoalRun` with a thread.
 
 The executor of the node sees a goal when it is accepted and when its outcome is there. In between
 it serves cancel requests, parameters and the heartbeat, even with a single thread.
@@ -13,6 +13,7 @@ coroutine ends. A motion of ten minutes beside a busy topic would slow down the 
 
 from __future__ import annotations
 
+from functools import partial
 import threading
 from typing import Any
 
@@ -21,16 +22,17 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 
-from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
-from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalContext, GoalHandle, GoalRun
+from ur_cartesian_driver.ros.goals.goal_actions import GoalAction, installed_actions
+from ur_cartesian_driver.ros.goals.goal_context import GoalContext
+from ur_cartesian_driver.ros.goals.goal_run import goal_key, GoalHandle, GoalRun
 from ur_cartesian_driver.ros.goals.plan_marker_publisher import PlanMarkerPublisher
-from ur_cartesian_driver.ros.messages.action_messages import result_message
+from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.tf.tf_lookup import listen_to_tf
 
@@ -44,8 +46,8 @@ MAX_GOALS = 100
 JOIN_TIMEOUT = 10.0
 
 
-class CartesianActionServer:
-    """Serves ``~/follow_cartesian_trajectory``; the node opens and closes the driver."""
+class GoalServer:
+    """Serves the actions of the node, which opens and closes the driver."""
 
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Start to serve."""
@@ -62,11 +64,16 @@ class CartesianActionServer:
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
-        self._server: Any = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
+        self._servers: dict[str, Any] = {
+            action.name: self._serve(node, action) for action in installed_actions()
+        }
+
+    def _serve(self, node: Node, action: GoalAction) -> DeferredActionServer:
+        return DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node,
-            FollowCartesianTrajectory,
-            '~/follow_cartesian_trajectory',
-            self._begin,
+            action.action_type,
+            action.name,
+            partial(self._begin, action),
             # Of its own: goals and cancel requests are served while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),
             cancel_callback=self._cancel,
@@ -120,14 +127,15 @@ class CartesianActionServer:
             runs = list(self._runs.values())
         for run in runs:
             run.thread.join(JOIN_TIMEOUT)
-        self._server.destroy()
+        for server in self._servers.values():
+            server.destroy()
         if self._transforms is not None:
             self._transforms.close()
 
-    def _begin(self, handle: GoalHandle) -> None:
+    def _begin(self, action: GoalAction, handle: GoalHandle) -> None:
         """Give an accepted goal its run; called by the executor."""
-        run = GoalRun(handle, self._context, self._finish)
-        if not (run.is_scheduled or handle.request.validate_only):
+        run = GoalRun(handle, action, self._context, self._finish)
+        if not (run.is_scheduled or action.is_validation(handle.request)):
             self.arbiter.enqueue(run.arm_request)  # here, where goals come one after the other
         with self._lock:
             is_over_limit = len(self._runs) >= MAX_GOALS
@@ -154,9 +162,10 @@ class CartesianActionServer:
     def _finish(self, run: GoalRun, outcome: Outcome) -> None:
         """Release the arm and hand the outcome to the executor; called in the run's thread."""
         self.arbiter.release(run.arm_request)
-        self._server.finish(run.handle, lambda _: self._end(run, outcome))
+        server = self._servers[run.action.name]
+        server.finish(run.handle, lambda _: self._end(run, outcome))
 
-    def _end(self, run: GoalRun, outcome: Outcome) -> FollowCartesianTrajectory.Result:
+    def _end(self, run: GoalRun, outcome: Outcome) -> Message:
         """Put a goal into its final state and return its result; called by the executor."""
         try:
             if outcome.succeeded:
@@ -168,4 +177,4 @@ class CartesianActionServer:
         finally:
             with self._lock:
                 self._runs.pop(run.key, None)
-        return result_message(outcome)
+        return run.action.result(outcome)

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import threading
 from typing import Any, TypeAlias
 
 from rclpy.action.server import RCLError
-from rclpy.clock import Clock
 from rclpy.exceptions import InvalidHandle
 
-from ur_cartesian_driver.driver import Driver, MotionHandle
+from ur_cartesian_driver.driver import MotionHandle
 from ur_cartesian_driver.motion.errors import (
     Cancelled,
     DriverError,
@@ -29,15 +28,14 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.joint_goal import JointGoal
 from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning.request.joint_goal_rules import check_joint_goal
 from ur_cartesian_driver.planning.request.validate import check
-from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmRequest
+from ur_cartesian_driver.ros.goals.goal_actions import AnyGoal, GoalAction
+from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import nanoseconds
-from ur_cartesian_driver.ros.messages.action_messages import feedback_message, FeedbackFrame
-from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message, resolve_frames
-from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 
 GoalHandle: TypeAlias = Any
 
@@ -49,34 +47,13 @@ CANCELING_TIMEOUT = 1.0
 SHUTDOWN = 'The driver node is shutting down'
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GoalContext:
-    """What all goals of a node share."""
-
-    driver: Driver
-    arbiter: ArmArbiter
-    frames: Frames
-    clock: Clock
-    settings: Settings
-    #: Shows a plan; called in the threads of goals.
-    show: Callable[[Plan], None]
-
-    def now(self) -> int:
-        """Return the time of the node's clock [ns]."""
-        return int(self.clock.now().nanoseconds)
-
-    def snapshot(self) -> ArmSnapshot | None:
-        """Return where the arm is, or would come to rest; None while that is unknown."""
-        state = self.driver.rest_state
-        return None if state is None else ArmSnapshot.of(state)
-
-
 class GoalRun:
     """One goal, from its acceptance to its outcome."""
 
     def __init__(
         self,
         handle: GoalHandle,
+        action: GoalAction,
         context: GoalContext,
         on_end: Callable[[GoalRun, Outcome], None],
     ) -> None:
@@ -85,7 +62,7 @@ class GoalRun:
 
         :param on_end: takes the outcome, in the thread of the run.
         """
-        self.handle = handle
+        self.handle, self.action = handle, action
         self.key = goal_key(handle)
         self._context = context
         self._on_end = on_end
@@ -161,14 +138,8 @@ class GoalRun:
 
     def _process(self) -> Outcome:
         context, request = self._context, self.handle.request
-        goal = goal_from_message(
-            request,
-            context.frames,
-            now=self._received,
-            snapshot=context.snapshot(),
-            time_tolerance=context.settings.node.goal_time_tolerance,
-        )
-        if request.validate_only:
+        goal = self.action.goal(request, context, self._received)
+        if self.action.is_validation(request):
             plan = self._plan(goal)
             context.show(plan)
             return Outcome(
@@ -190,7 +161,7 @@ class GoalRun:
         self.is_waiting = False
         self._check_wanted()
 
-    def _plan_if_free(self, goal: Goal) -> Plan:
+    def _plan_if_free(self, goal: AnyGoal) -> Plan:
         """
         Acquire the arm and plan the goal.
 
@@ -198,7 +169,10 @@ class GoalRun:
         """
         arbiter = self._context.arbiter
         if not arbiter.acquire(self.arm_request):
-            check(goal, self._context.settings.planning)
+            if isinstance(goal, JointGoal):
+                check_joint_goal(goal, self._context.settings.planning)
+            else:
+                check(goal, self._context.settings.planning)
             holder = arbiter.holder
             other = (
                 'Another goal is'
@@ -211,7 +185,7 @@ class GoalRun:
             )
         return self._plan_from_here(goal)
 
-    def _plan_and_preempt(self, goal: Goal) -> Plan:
+    def _plan_and_preempt(self, goal: AnyGoal) -> Plan:
         """
         Plan the goal, have older goals give up the arm, and return the plan.
 
@@ -232,20 +206,11 @@ class GoalRun:
         del plan  # a long one has 100 MB and more, as has the next
         return self._plan_from_here(goal)
 
-    def _plan_from_here(self, goal: Goal) -> Plan:
+    def _plan_from_here(self, goal: AnyGoal) -> Plan:
         """Plan a goal whose frames are where they are now: the arm may have moved since."""
-        context = self._context
-        return self._plan(
-            resolve_frames(
-                goal,
-                self.handle.request.trajectory,
-                context.frames,
-                now=context.now(),
-                snapshot=context.snapshot(),
-            )
-        )
+        return self._plan(self.action.resolved(goal, self.handle.request, self._context))
 
-    def _plan(self, goal: Goal) -> Plan:
+    def _plan(self, goal: AnyGoal) -> Plan:
         plan = self._context.driver.plan(goal)
         self._check_wanted()
         return plan
@@ -286,16 +251,10 @@ class GoalRun:
 
     def _feedback_publisher(self, plan: Plan) -> Callable[[Progress], None]:
         """Return what publishes feedback; publishing is safe from any thread."""
-        context, trajectory = self._context, self.handle.request.trajectory
-        frame = FeedbackFrame(
-            frame_id=trajectory.header.frame_id or context.frames.base,
-            controlled_frame=trajectory.controlled_frame or context.frames.tcp,
-            T_frame_base=plan.goal.T_base_frame.inverse(),
-            joint_names=context.settings.joint_names,
-        )
+        make = self.action.feedback_of(self.handle.request, plan, self._context)
 
         def publish(progress: Progress) -> None:
-            message = feedback_message(progress, frame, context.clock.now().to_msg())
+            message = make(progress)
             # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
             with contextlib.suppress(InvalidHandle, RCLError):
                 self.handle.publish_feedback(message)

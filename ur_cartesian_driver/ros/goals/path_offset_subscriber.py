@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
-from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.message_fields import nanoseconds
 
 #: Only the newest offset counts, and a lost one is not sent again.
@@ -31,7 +31,7 @@ WARNING_PERIOD = 2.0
 class PathOffsetSubscriber:
     """Gives offsets to the motion that runs; the subscription goes with the node."""
 
-    def __init__(self, node: Node, server: CartesianActionServer) -> None:
+    def __init__(self, node: Node, server: GoalServer) -> None:
         """Subscribe."""
         self._clock, self._logger, self._server = node.get_clock(), node.get_logger(), server
         self._subscription = node.create_subscription(

@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.goals.goal_run import GoalRun
 from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_from_message
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
@@ -45,7 +45,7 @@ OVERLOAD_REFUSAL = (
 class AppendService:
     """Serves ``~/append_points``."""
 
-    def __init__(self, node: Node, server: CartesianActionServer) -> None:
+    def __init__(self, node: Node, server: GoalServer) -> None:
         """Start to serve."""
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')

@@ -1,0 +1,203 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""FollowJointTrajectory, with a stand-in for its classes: control_msgs is not on PyPI."""
+
+import sys
+from types import ModuleType
+
+from builtin_interfaces.msg import Duration
+from joint_trajectory_action import (
+    Feedback,
+    FollowJointTrajectory,
+    Goal,
+    JointTolerance,
+    JointTrajectoryPoint,
+    Result,
+    StandInHandle,
+    StandInServer,
+)
+import pytest
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint
+from ur_cartesian_driver.motion.joint_goal import JointTolerance as OurTolerance
+from ur_cartesian_driver.motion.pose import IDENTITY
+from ur_cartesian_driver.ros.goals.goal_actions import (
+    CartesianAction,
+    installed_actions,
+    JointAction,
+)
+from ur_cartesian_driver.ros.messages.joint_messages import (
+    joint_error_code,
+    joint_feedback,
+    joint_goal_from_message,
+    joint_result,
+)
+
+SIX = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+NAME = '~/follow_joint_trajectory'
+
+
+def goal_to(q, seconds=1.0, **fields):
+    message = Goal(**fields)
+    message.trajectory.joint_names = list(JOINT_NAMES)
+    sec, part = divmod(seconds, 1.0)
+    message.trajectory.points = [
+        JointTrajectoryPoint(
+            positions=list(q), time_from_start=Duration(sec=int(sec), nanosec=int(part * 1e9))
+        )
+    ]
+    return message
+
+
+def test_the_action_is_there_only_where_control_msgs_is(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'control_msgs', None)
+    assert [type(action) for action in installed_actions()] == [CartesianAction]
+    package, module = ModuleType('control_msgs'), ModuleType('control_msgs.action')
+    module.FollowJointTrajectory = FollowJointTrajectory  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, 'control_msgs', package)
+    monkeypatch.setitem(sys.modules, 'control_msgs.action', module)
+    _, joint_action = installed_actions()
+    assert joint_action.name == NAME
+    assert joint_action.action_type is FollowJointTrajectory
+
+
+def test_every_field_of_a_goal_is_read():
+    message = goal_to(SIX, 1.5)
+    (point,) = message.trajectory.points
+    point.velocities, point.accelerations, point.effort = [0.0] * 6, list(SIX), [1.0]
+    message.path_tolerance = [JointTolerance('elbow_joint', 0.1, 0.2, -1.0)]
+    message.goal_tolerance = [JointTolerance('wrist_1_joint', 0.3, 0.4, 0.0)]
+    message.trajectory.header.stamp.sec = 98
+    read = joint_goal_from_message(message, now=100 * 10**9, time_tolerance=0.7)
+    assert read == JointGoal(
+        joint_names=JOINT_NAMES,
+        points=(
+            JointPoint(
+                time=1.5,
+                positions=SIX,
+                velocities=(0.0,) * 6,
+                accelerations=SIX,
+                effort=(1.0,),
+            ),
+        ),
+        age=2.0,
+        path_tolerance=(
+            OurTolerance(name='elbow_joint', position=0.1, velocity=0.2, acceleration=-1.0),
+        ),
+        goal_tolerance=(OurTolerance(name='wrist_1_joint', position=0.3, velocity=0.4),),
+        goal_time_tolerance=0.7,
+    )
+    message.goal_time_tolerance.sec = -1
+    assert joint_goal_from_message(message, now=0, time_tolerance=0.7).goal_time_tolerance == -1.0
+
+
+@pytest.mark.parametrize('field', ['multi_dof_trajectory', 'component_path_tolerance'])
+def test_joints_that_an_arm_has_not_are_refused(field):
+    message = goal_to(SIX)
+    if field == 'multi_dof_trajectory':
+        message.multi_dof_trajectory.points = [object()]
+    else:
+        message.component_path_tolerance = [object()]
+    with pytest.raises(InvalidGoal, match=field):
+        joint_goal_from_message(message, now=0, time_tolerance=0.0)
+
+
+def test_feedback_has_desired_actual_and_error_of_each_joint():
+    progress = Progress(
+        waypoint=0,
+        fraction=0.5,
+        desired_pose=IDENTITY,
+        actual_pose=IDENTITY,
+        desired_q=SIX,
+        actual_q=(0.0,) * 6,
+        desired_qd=(1.0,) * 6,
+        actual_qd=(0.75,) * 6,
+        time=2.5,
+    )
+    stamp = Goal().trajectory.header.stamp
+    message = joint_feedback(Feedback, progress, JOINT_NAMES, stamp)
+    assert message.joint_names == list(JOINT_NAMES)
+    assert message.desired.positions == message.error.positions == list(SIX)
+    assert message.error.velocities == [0.25] * 6
+    assert message.actual.time_from_start == Duration(sec=2, nanosec=500_000_000)
+
+
+def test_every_code_of_ours_has_one_of_the_action_and_no_failure_is_successful():
+    known = {getattr(Result, name) for name in vars(Result) if name.isupper()}
+    for code in ErrorCode:
+        result = joint_result(Result, Outcome(code=code, text='Why.'))
+        assert result.error_code in known
+        assert (result.error_code == 0) == (code is ErrorCode.SUCCESSFUL)
+        if code is not ErrorCode.SUCCESSFUL:
+            assert result.error_string == f'{code.name}: Why.'
+    assert joint_error_code(ErrorCode.COLLISION) is ErrorCode.INVALID_GOAL
+    assert joint_error_code(ErrorCode.PROTECTIVE_STOP) is ErrorCode.PATH_TOLERANCE_VIOLATED
+
+
+class JointClient:
+    """Sends joint goals to the server of a cell, below rclpy's transport."""
+
+    def __init__(self, cell):
+        self.cell, self._action = cell, JointAction(FollowJointTrajectory)
+        self._goals = 0
+        cell.node.action_server._servers[NAME] = StandInServer()
+
+    @property
+    def q(self):
+        return self.cell.sim.state().q
+
+    def send(self, offset, seconds, **fields):
+        self._goals += 1
+        q = [value + offset for value in self.q]
+        handle = StandInHandle(goal_to(q, seconds, **fields), self._goals)
+        self.cell.node.action_server._begin(self._action, handle)
+        return handle
+
+    def moving(self, handle):
+        self.cell.spin_until(lambda: handle.feedback or handle.result)
+        assert handle.result is None, handle.result
+        self.cell.spin_until(lambda: any(abs(qd) > 0.01 for qd in self.cell.sim.state().qd))
+
+    def end(self, handle):
+        """Return how a goal ends: status, code, name of our code."""
+        self.cell.spin_until(lambda: handle.result)
+        name = handle.result.error_string.split(':')[0]
+        return handle.status, handle.result.error_code, name
+
+
+@pytest.mark.slow
+def test_a_joint_goal_runs_and_ends_with_codes_of_the_action(single_cell):
+    client = JointClient(single_cell)
+    begin = client.q
+    done = client.send(0.02, 1.0, goal_tolerance=[JointTolerance('elbow_joint', 0.001)])
+    status, code, _ = client.end(done)
+    assert (status, code) == ('succeeded', 0), done.result
+    assert client.q == pytest.approx([value + 0.02 for value in begin], abs=1e-4)
+    assert len(done.feedback) > 5
+
+    refused = client.send(100.0, 1.0)
+    assert client.end(refused) == ('aborted', Result.INVALID_GOAL, 'INVALID_GOAL')
+
+    cancelled = client.send(0.1, 4.0)
+    client.moving(cancelled)
+    cancelled.is_cancel_requested = True
+    single_cell.node.action_server._cancel(cancelled)
+    assert client.end(cancelled) == ('canceled', Result.INVALID_GOAL, 'CANCELLED')
+
+    preempted = client.send(-0.1, 4.0)
+    client.moving(preempted)
+    status, result = single_cell.run(single_cell.goal((0.5, 0.0, 0.0, 0.01)))
+    assert result.error_code == 0, result.error_string
+    assert client.end(preempted) == ('aborted', Result.INVALID_GOAL, 'PREEMPTED')
+
+    stopped = client.send(0.1, 4.0)
+    client.moving(stopped)
+    single_cell.sim.inject('protective_stop')
+    assert client.end(stopped) == (
+        'aborted',
+        Result.PATH_TOLERANCE_VIOLATED,
+        'PROTECTIVE_STOP',
+    )

@@ -1,0 +1,152 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The actions of the node: what a goal's run asks about the messages of its action.
+
+:class:`JointAction` is there where control_msgs is installed; it is not on PyPI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import importlib
+from typing import Any, Protocol, TypeAlias
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.joint_goal import JointGoal
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.ros.goals.goal_context import GoalContext
+from ur_cartesian_driver.ros.message_fields import Message
+from ur_cartesian_driver.ros.messages.action_messages import (
+    feedback_message,
+    FeedbackFrame,
+    result_message,
+)
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message, resolve_frames
+from ur_cartesian_driver.ros.messages.joint_messages import (
+    joint_feedback,
+    joint_goal_from_message,
+    joint_result,
+)
+
+AnyGoal: TypeAlias = Goal | JointGoal
+MakeFeedback: TypeAlias = Callable[[Progress], Message]
+
+
+class GoalAction(Protocol):
+    """One action: its type, its name, and its messages."""
+
+    #: The class of the action, and its name below the node.
+    action_type: Any
+    name: str
+
+    def is_validation(self, request: Message) -> bool:
+        """Tell whether a goal is only to be checked."""
+
+    def goal(self, request: Message, context: GoalContext, received: int) -> AnyGoal:
+        """
+        Return the goal of a message.
+
+        :param received: time of the node's clock [ns].
+        :raises GoalRefused: the message makes no sense.
+        """
+
+    def resolved(self, goal: Any, request: Message, context: GoalContext) -> AnyGoal:
+        """Return a goal with its frames where they are now."""
+
+    def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
+        """Return what makes the feedback messages of a plan."""
+
+    def result(self, outcome: Outcome) -> Message:
+        """Return the result message of an outcome."""
+
+
+class CartesianAction:
+    """Follow the path of a tool: ``~/follow_cartesian_trajectory``."""
+
+    action_type: Any = FollowCartesianTrajectory
+    name = '~/follow_cartesian_trajectory'
+
+    def is_validation(self, request: Message) -> bool:
+        """Tell whether a goal is only to be checked."""
+        return bool(request.validate_only)
+
+    def goal(self, request: Message, context: GoalContext, received: int) -> Goal:
+        """Return the goal of a message."""
+        return goal_from_message(
+            request,
+            context.frames,
+            now=received,
+            snapshot=context.snapshot(),
+            time_tolerance=context.settings.node.goal_time_tolerance,
+        )
+
+    def resolved(self, goal: Goal, request: Message, context: GoalContext) -> Goal:
+        """Return a goal with its frames where they are now."""
+        return resolve_frames(
+            goal,
+            request.trajectory,
+            context.frames,
+            now=context.now(),
+            snapshot=context.snapshot(),
+        )
+
+    def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
+        """Return what makes the feedback messages of a plan."""
+        trajectory = request.trajectory
+        frame = FeedbackFrame(
+            frame_id=trajectory.header.frame_id or context.frames.base,
+            controlled_frame=trajectory.controlled_frame or context.frames.tcp,
+            T_frame_base=plan.goal.T_base_frame.inverse(),
+            joint_names=context.settings.joint_names,
+        )
+        return lambda progress: feedback_message(progress, frame, context.clock.now().to_msg())
+
+    def result(self, outcome: Outcome) -> FollowCartesianTrajectory.Result:
+        """Return the result message of an outcome."""
+        return result_message(outcome)
+
+
+class JointAction:
+    """Follow a joint trajectory, for MoveIt and others: ``~/follow_joint_trajectory``."""
+
+    name = '~/follow_joint_trajectory'
+
+    def __init__(self, action_type: Any) -> None:
+        """Serve an action with the fields of control_msgs/FollowJointTrajectory."""
+        self.action_type = action_type
+
+    def is_validation(self, request: Message) -> bool:
+        """Tell that all goals are executed."""
+        return False
+
+    def goal(self, request: Message, context: GoalContext, received: int) -> JointGoal:
+        """Return the goal of a message."""
+        return joint_goal_from_message(
+            request, now=received, time_tolerance=context.settings.node.goal_time_tolerance
+        )
+
+    def resolved(self, goal: JointGoal, request: Message, context: GoalContext) -> JointGoal:
+        """Return the goal: joints have no frames."""
+        return goal
+
+    def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
+        """Return what makes the feedback messages of a plan."""
+        make, names = self.action_type.Feedback, context.settings.joint_names
+        return lambda progress: joint_feedback(make, progress, names, context.clock.now().to_msg())
+
+    def result(self, outcome: Outcome) -> Message:
+        """Return the result message of an outcome."""
+        return joint_result(self.action_type.Result, outcome)
+
+
+def installed_actions() -> list[GoalAction]:
+    """Return the actions of the node."""
+    actions: list[GoalAction] = [CartesianAction()]
+    try:
+        control_msgs = importlib.import_module('control_msgs.action')
+    except ImportError:
+        return actions
+    return [*actions, JointAction(control_msgs.FollowJointTrajectory)]

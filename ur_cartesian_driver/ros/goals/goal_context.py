@@ -1,0 +1,38 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What all goals of a node share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rclpy.clock import Clock
+
+from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
+from ur_cartesian_driver.ros.parameters.node_parameters import Settings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalContext:
+    """What all goals of a node share."""
+
+    driver: Driver
+    arbiter: ArmArbiter
+    frames: Frames
+    clock: Clock
+    settings: Settings
+    #: Shows a plan; called in the threads of goals.
+    show: Callable[[Plan], None]
+
+    def now(self) -> int:
+        """Return the time of the node's clock [ns]."""
+        return int(self.clock.now().nanoseconds)
+
+    def snapshot(self) -> ArmSnapshot | None:
+        """Return where the arm is, or would come to rest; None while that is unknown."""
+        state = self.driver.rest_state
+        return None if state is None else ArmSnapshot.of(state)
