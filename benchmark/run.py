@@ -32,6 +32,7 @@ MODULES = (
     'points',
     'load',
     'servo',
+    'replaced_tails',
     RTDE_RATE,
     'planning',
     'free_axis',

@@ -115,6 +115,21 @@ async def a_late_producer(cell: Any) -> Any:
     return await motion.ended()
 
 
+async def a_replanner(cell: Any) -> Any:
+    """Go round and round on tails that are replaced ten times a second."""
+    from append_goals import AppendMotion
+    from replanner import Readings, replan, Replanner
+
+    from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+
+    home = cell.memory.read().actual_tcp_pose
+    motion = AppendMotion(cell, Replanner(home).goal(ExecutionMode.SERVO))
+    readings = Readings(cell, 20.0)
+    await readings.connect()
+    await replan(cell, motion, readings, 10.0, 6.0)
+    return motion.outcome
+
+
 async def a_press(cell: Any) -> list[tuple[float, ...]]:
     """Grind a part that is lower than the path and has a step; return time, heights, force."""
     from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
@@ -255,6 +270,10 @@ PICTURES = {
     'open': Picture(
         title='Points that come while the arm goes (keep_open); once they come too late',
         happens=a_late_producer,
+    ),
+    'replaced': Picture(
+        title='A circle whose rest is planned anew ten times a second (replace_horizon)',
+        happens=a_replanner,
     ),
 }
 
