@@ -9,6 +9,7 @@ import pickle
 import pytest
 
 from ur_cartesian_driver.motion.errors import (
+    AlreadySent,
     DriverError,
     ErrorCode,
     ERRORS,
@@ -41,6 +42,8 @@ ALL = [DriverError, *descendants(DriverError)]
 
 
 def make(cls):
+    if cls is AlreadySent:
+        return cls(2, 1.5)
     return cls('points[2]', 'is wrong') if issubclass(cls, InvalidGoal) else cls(SENTENCE)
 
 
