@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Draw pictures of plans for doc/free_axis.md and doc/execution.md.
+Draw pictures of plans for doc/free_axis.md, doc/execution.md and doc/moveit.md.
 
 ::
 
@@ -21,12 +21,13 @@ from PIL import Image
 
 from ur_cartesian_driver.cli.commands import goal_file
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
+from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint
 from ur_cartesian_driver.motion.pose import IDENTITY, rotate
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.path import mm, PathPlace
 from ur_cartesian_driver.path import Path as ToolPath
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
 DOC = Path(__file__).resolve().parents[1] / 'doc'
@@ -100,9 +101,46 @@ def draw_taken_up_again() -> Figure:
     return figure
 
 
+def draw_moveit() -> Figure:
+    """Draw a joint through points that have positions only."""
+    state, times = robot(), (0.8, 1.6, 2.2, 3.0)
+    turns = (0.1, 0.16, 0.1, 0.18)
+    plan_of_joints = plan_joint_goal(
+        JointGoal(
+            joint_names=JOINT_NAMES,
+            points=tuple(
+                JointPoint(time=time, positions=(state.actual_q[0] + turn, *state.actual_q[1:]))
+                for time, turn in zip(times, turns, strict=True)
+            ),
+        ),
+        state,
+        Arm(robot_model('ur5e')),
+        PlanningOptions(max_tool_speed=1.0),
+    )
+    spline = plan_of_joints.joint_spline
+    t = np.linspace(0.0, spline.duration, 400)
+    q, qd, _ = spline.rows(t)
+    x, y = np.append(0.0, times), np.append(0.0, turns)
+    figure = Figure(figsize=(10, 3.2), layout='constrained')
+    position, velocity = figure.subplots(1, 2)
+    position.plot(x, y, color=GREY, linewidth=4, label='straight lines')
+    position.plot(t, q[:, 0] - state.actual_q[0], color=BLUE, label='this driver')
+    position.plot(x, y, 'o', color='black', label='points')
+    velocity.step(
+        x, np.append(np.diff(y) / np.diff(x), 0.0), where='post', color=GREY, linewidth=4
+    )
+    velocity.plot(t, qd[:, 0], color=BLUE)
+    for axes, name in ((position, 'position [rad]'), (velocity, 'velocity [rad/s]')):
+        axes.set(xlabel='time [s]', ylabel=name)
+        axes.grid(alpha=0.3)
+    figure.legend(*position.get_legend_handles_labels(), loc='outside upper center', ncols=3)
+    return figure
+
+
 PICTURES: dict[str, Any] = {
     'free_axis': draw_free_axis,
     'execution_taken_up_again': draw_taken_up_again,
+    'moveit': draw_moveit,
 }
 
 if __name__ == '__main__':

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """FollowJointTrajectory, with a stand-in for its classes: control_msgs is not on PyPI."""
 
+from importlib import import_module
+from importlib.util import find_spec
 import sys
 from types import ModuleType
 
+from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
 from joint_trajectory_action import (
     Feedback,
@@ -17,6 +20,7 @@ from joint_trajectory_action import (
     StandInServer,
 )
 import pytest
+from rclpy.action.client import ActionClient
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
@@ -201,3 +205,49 @@ def test_a_joint_goal_runs_and_ends_with_codes_of_the_action(single_cell):
         Result.PATH_TOLERANCE_VIOLATED,
         'PROTECTIVE_STOP',
     )
+
+
+if find_spec('control_msgs') is not None:  # with a ROS installation
+
+    @pytest.mark.slow
+    def test_a_client_of_control_msgs_is_served_over_ros(single_cell):
+        action_type = import_module('control_msgs.action').FollowJointTrajectory
+        point_type = import_module('trajectory_msgs.msg').JointTrajectoryPoint
+        client = ActionClient(
+            single_cell.client_node, action_type, '/ur_cartesian_driver/follow_joint_trajectory'
+        )
+        single_cell.spin_until(client.server_is_ready)
+        begin = single_cell.sim.state().q
+
+        def send(offset, seconds):
+            goal = action_type.Goal()
+            goal.trajectory.joint_names = list(JOINT_NAMES)
+            goal.trajectory.points = [
+                point_type(
+                    positions=[value + offset for value in begin],
+                    time_from_start=Duration(sec=seconds),
+                )
+            ]
+            feedback = []
+            handle = single_cell.await_(
+                client.send_goal_async(goal, lambda message: feedback.append(message.feedback))
+            )
+            assert handle.accepted
+            return handle, feedback
+
+        handle, feedback = send(0.02, 1)
+        status, result = single_cell.result(handle)
+        assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
+        assert single_cell.sim.state().q == pytest.approx([q + 0.02 for q in begin], abs=1e-4)
+        assert list(feedback[-1].joint_names) == list(JOINT_NAMES)
+        assert list(feedback[-1].actual.positions) == pytest.approx(
+            [q + 0.02 for q in begin], abs=1e-2
+        )
+
+        handle, feedback = send(0.1, 4)
+        single_cell.spin_until(lambda: feedback)
+        single_cell.await_(handle.cancel_goal_async())
+        status, result = single_cell.result(handle)
+        assert (status, result.error_code) == (GoalStatus.STATUS_CANCELED, Result.INVALID_GOAL)
+        assert result.error_string.startswith('CANCELLED: ')
+        client.destroy()
