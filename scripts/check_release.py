@@ -27,6 +27,7 @@ def problems(root: Path) -> list[str]:
     return [
         *maintainer_problems(package),
         *repository_problems(package, root),
+        *contact_problems(root),
         *version_problems(package, root),
         *changelog_problems(package, root),
     ]
@@ -65,6 +66,22 @@ def repository_problems(package: ElementTree.Element, root: Path) -> list[str]:
             elif what.split()[0] not in (url, f'{url}.git'):
                 found.append(
                     f'{place}: `git clone` does not name the repository of package.xml, {url}.git.'
+                )
+    return found
+
+
+def contact_problems(root: Path) -> list[str]:
+    """Return the placeholders in what people read who want to report something."""
+    found = []
+    if not (root / 'SECURITY.md').is_file():
+        found.append('SECURITY.md is missing; say in it how to report a vulnerability.')
+    pages = [*root.glob('SECURITY.md'), *sorted(root.glob('.github/**/*.*'))]
+    for page in pages:
+        for number, line in enumerate(text_of(page).splitlines(), 1):
+            if placeholder := PLACEHOLDER.search(line):
+                found.append(
+                    f'{page.relative_to(root)}:{number}: "{placeholder[0]}" is of a placeholder; '
+                    'set the contact or the address.'
                 )
     return found
 

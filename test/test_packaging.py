@@ -11,6 +11,7 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 from ur_cartesian_driver.resources import share_path
 
@@ -234,3 +235,34 @@ def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
         'python3-tqdm',
         'python3-urllib3',
     }
+
+
+def test_rosdep_knows_the_keys_of_package_xml():
+    used = [
+        element.text
+        for kind in ('buildtool_depend', 'depend', 'exec_depend', 'test_depend')
+        for element in package_xml().iter(kind)
+    ]
+    listed = yaml.safe_load((Path(__file__).parent / 'rosdistro_keys.yaml').read_text())
+    known = [key for source in listed.values() for key in source['keys']]
+    assert sorted(used) == sorted(known)
+    assert all(re.fullmatch('[0-9a-f]{40}', source['commit']) for source in listed.values())
+
+
+@needs_checkout
+def test_the_licence_of_everything_foreign_is_named():
+    page = (CHECKOUT / 'doc' / 'licences.md').read_text().lower()
+    listed = ''.join(
+        (CHECKOUT / name).read_text()
+        for name in ('setup.py', 'requirements-dev.txt', 'pyproject.toml')
+    )
+    named = set(re.findall(r'(?<![\w-])([A-Za-z][\w-]+)(?:\[\w+\])?[<>]=?\d', listed))
+    named = {re.sub('(ros-jazzy|colcon)-.*', r'\1', name) for name in named}
+    folders = {
+        str(folder.relative_to(CHECKOUT))
+        for kind in ('golden', 'files')
+        for folder in CHECKOUT.glob(f'test/*/{kind}')
+    }
+    assert {'viser', 'airo-models', 'codespell', 'cmake'} < named
+    assert 'test/importing/files' in folders
+    assert [name for name in sorted(named | folders) if name.lower() not in page] == []

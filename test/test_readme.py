@@ -31,6 +31,8 @@ README = CHECKOUT / 'README.md'
 DOCUMENTS = [
     README,
     CHECKOUT / 'CONTRIBUTING.md',
+    CHECKOUT / 'QUALITY_DECLARATION.md',
+    CHECKOUT / 'SECURITY.md',
     CHECKOUT / 'benchmark' / 'README.md',
     *sorted(CHECKOUT.glob('doc/**/*.md')),
 ]

@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 import pytest
+import yaml
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 SCRIPT = CHECKOUT / 'scripts' / 'check_release.py'
@@ -37,6 +38,8 @@ Forthcoming
 * First release.
 """,
     'README.md': f'$ git clone {URL}.git && cd ur_cartesian_driver\n',
+    'SECURITY.md': 'Write to **security@welding-cell.org**.\n',
+    '.github/ISSUE_TEMPLATE/config.yml': f'url: {URL}/security/policy\n',
     'doc/setup.md': f'git clone {URL}\ngit clone https://github.com/ros2/rclpy\n',
 }
 
@@ -56,7 +59,7 @@ def problems(check_release, tmp_path):
     def of_release_with(file=None, old='', new=''):
         for name, text in FILES.items():
             path = tmp_path / name
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             assert name != file or old in text
             path.write_text(text.replace(old, new) if name == file else text, encoding='utf-8')
         return check_release.problems(tmp_path)
@@ -79,6 +82,13 @@ def test_a_complete_release_passes(problems):
         ('README.md', 'welding-cell', 'ada', 'README.md:1: `git clone` does not name the'),
         ('README.md', f'{URL}.git', 'REPOSITORY', 'README.md:1: `git clone` does not name the'),
         ('doc/setup.md', 'welding-cell', '<owner>', 'doc/setup.md:1: `git clone` names a pl'),
+        ('SECURITY.md', 'welding-cell.org', 'example.invalid', 'SECURITY.md:1: "@example.'),
+        (
+            '.github/ISSUE_TEMPLATE/config.yml',
+            'welding-cell',
+            '<owner>',
+            'config.yml:1: "<owner>"',
+        ),
         ('CMakeLists.txt', '0.2.0', '0.1.0', 'CMakeLists.txt: the version is 0.1.0, but 0.2.0'),
         ('setup.py', "text('version')", "'0.1.0'", 'setup.py: the version is 0.1.0, but 0.2.0'),
         ('pyproject.toml', '[tool', '[project]\nversion = "0.1.0"\n[tool', 'pyproject.toml: the'),
@@ -99,6 +109,13 @@ def test_a_placeholder_of_the_repository_is_refused(problems):
     assert len(clones) == 2  # they name another repository now
 
 
+def test_a_release_says_how_to_report_a_vulnerability(check_release, problems, tmp_path):
+    problems()
+    (tmp_path / 'SECURITY.md').unlink()
+    (problem,) = check_release.problems(tmp_path)
+    assert problem.startswith('SECURITY.md is missing')
+
+
 def test_this_checkout_lacks_only_what_a_release_sets(check_release):
     lacking = check_release.problems(CHECKOUT)
     assert [
@@ -113,3 +130,16 @@ def test_a_problem_ends_the_script_with_a_message(check_release, problems, monke
     monkeypatch.setattr(check_release, 'ROOT', tmp_path)
     with pytest.raises(SystemExit, match=r'^Not ready for a release:\n  CMakeLists\.txt'):
         check_release.main()
+
+
+def test_issue_templates_are_forms():
+    for path in sorted((CHECKOUT / '.github' / 'ISSUE_TEMPLATE').glob('*.yml')):
+        form = yaml.safe_load(path.read_text(encoding='utf-8'))
+        if path.name == 'config.yml':
+            assert form['contact_links'][0].keys() == {'name', 'url', 'about'}
+            continue
+        assert {'name', 'description', 'body'} <= form.keys(), path.name
+        fields = [field for field in form['body'] if field['type'] != 'markdown']
+        names = [field['id'] for field in fields]
+        assert len(set(names)) == len(names)
+        assert all(field['attributes']['label'] for field in fields), path.name
