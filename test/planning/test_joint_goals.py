@@ -158,6 +158,14 @@ def test_a_trajectory_that_is_too_fast_is_slowed_as_a_whole(cell):
     np.testing.assert_allclose(q_slow, q_fast, atol=1e-5)
     np.testing.assert_allclose(factor * qd_slow, qd_fast, atol=1e-4)
     assert slow.goal.waypoints[-1].time == pytest.approx(slow.duration)
+    with pytest.raises(InvalidGoal, match=r'would take .* s because of .*, more than max_segment'):
+        planned(cell, goal, max_tool_speed=0.2, on_too_fast='slow', max_segment_time=0.6)
+
+
+def test_points_may_be_a_millisecond_apart(cell):
+    times = [0.5 + 0.001 * k for k in range(200)]  # as sums of decimals are
+    points = tuple(JointPoint(positions=cell.state.actual_q, time=time) for time in times)
+    planned(cell, JointGoal(joint_names=JOINT_NAMES, points=points))
 
 
 def test_joints_come_in_any_order_and_with_the_prefix(cell):

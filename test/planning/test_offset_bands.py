@@ -112,6 +112,24 @@ def test_a_band_in_which_the_arm_cannot_be_is_refused(cell, options, offset, err
     plan(replace(asked, path_offset=PathOffset()), cell.state, arm, replace(OPTIONS, **options))
 
 
+def test_offsets_count_against_the_speed_of_the_tool(cell):
+    asked = goal(cell.point(y=0.1, time=2.0))  # up to 0.075 m/s
+    with pytest.raises(
+        TooFast, match=r'with offsets at up to 0\.1\d\d m/s, more than max_tool_speed'
+    ):
+        plan(asked, cell.state, cell.arm, replace(OPTIONS, max_tool_speed=0.12))
+    for fine, bound in ((asked, 0.16), (replace(asked, path_offset=PathOffset()), 0.12)):
+        plan(fine, cell.state, cell.arm, replace(OPTIONS, max_tool_speed=bound))
+
+
+def test_a_self_collision_in_the_band_warns_once_where_it_does_not_refuse(cell):
+    options = replace(OPTIONS, self_collision='warn', min_clearance=0.08)
+    made = plan(goal(cell.point(y=0.1, time=2.0)), cell.state, cell.arm, options)
+    (line,) = [line for line in made.report if line.startswith('with a path offset of')]
+    assert 'come within' in line
+    assert 'less than min_clearance = 0.0800 m' in line
+
+
 def test_a_band_out_of_reach_is_refused(cell):
     # Towards the stretched arm, as far as it may go.
     far = next(

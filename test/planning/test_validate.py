@@ -136,6 +136,14 @@ REFUSALS = [
     (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
     (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
     (with_segment(PLAIN, 1, free_axis=4), InvalidGoal, 'segments[1].free_axis is 4; allowed are'),
+    (with_fields(PLAIN, on_path_tolerance=3), InvalidGoal, 'on_path_tolerance is 3; allowed are'),
+    (
+        with_fields(PLAIN, path_offset=replace(PathOffset(), **{'on_stale': 7})),
+        InvalidGoal,
+        'path_offset.on_stale is 7; allowed are',
+    ),
+    (pressing(frame=7), InvalidGoal, 'presses[0].frame is 7; allowed are'),
+    (pressing(contact=7), InvalidGoal, 'presses[0].contact is 7; allowed are'),
     # free axes
     (
         with_segment(PLAIN, 1, free_max=1.0),
@@ -801,12 +809,9 @@ REFUSALS = [
         (
             replace(TIMED, execution=mode, path_offset=PathOffset(limits=SIDEWAYS)),
             NotAvailable,
-            f'path_offset is set, but the robot {text}',
+            f'path_offset is set, but the robot has the path of a {mode.name} goal before it moves',
         )
-        for mode, text in (
-            (ExecutionMode.PRIMITIVES, 'makes the path of a PRIMITIVES goal by itself'),
-            (ExecutionMode.SPLINE, 'has the joints of a SPLINE goal before it moves'),
-        )
+        for mode in (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE)
     ),
 ]
 

@@ -383,6 +383,8 @@ class _Resumption:
                 first = self._start_index(places)
                 if isinstance(stretch, ProportionalOutput):
                     stretch = replace(stretch, begin_lead=0.0)
+                elif stretch.zero_sensor:  # it was zeroed where the tool was free
+                    stretch = replace(stretch, zero_sensor=False)
             if first < last:
                 left.append(replace(stretch, first_waypoint=first, last_waypoint=last))
         return tuple(left)

@@ -244,7 +244,7 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
     :raises GoalRefused: nowhere, or the arm could not be everywhere in the band.
     """
     band = offset_band(plan.goal.path_offset, plan.reference, plan.T_tcp_controlled)
-    OffsetBandCheck(
+    warnings = OffsetBandCheck(
         kinematics=planner.kinematics,
         options=planner.options,
         band=band,
@@ -252,7 +252,7 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
         spline=plan.joint_spline,
         tool_tips=tool_tips(planner.goal, planner.T_flange_active),
     ).check()
-    remarks = (*plan.remarks, *offset_remarks(band, plan.duration))
+    remarks = (*plan.remarks, *offset_remarks(band, plan.duration), *warnings[:1])
     return replace(plan, offset_band=band, remarks=remarks)
 
 

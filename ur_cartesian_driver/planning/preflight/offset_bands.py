@@ -37,7 +37,7 @@ from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.motion.vectors import norm, Vector3, vector3, vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
@@ -189,28 +189,51 @@ class OffsetBandCheck:
     spline: JointSpline
     tool_tips: Sequence[Pose]
 
-    def check(self) -> None:
+    def check(self) -> list[str]:
         """
-        Check all corners of the band.
+        Check all corners of the band, and return the warnings about them.
 
         :raises GoalRefused: the arm cannot be there; the text names corner, point and bound.
         """
         path, band = self.reference, self.band
+        self._check_tool_speeds()
         q, qd, _ = self.spline.rows(path.time)
         rows = np.clip(np.rint(path.time / band.step).astype(np.intp), 0, len(band.axes) - 1)
         axes = band.axes[rows]
         joint_speeds = np.abs(qd) + self._joint_speeds_of_offsets(q, axes)
         sides = ((-limit, limit) if limit else (0.0,) for limit in band.limits)
+        warnings: list[str] = []
         for corner in map(vector3, product(*sides)):
+            where = ', '.join(
+                f'{name} {1e3 * value:+g} mm'
+                for name, value in zip(OFFSET_AXES, corner, strict=True)
+                if value
+            )
             try:
-                self._check_corner(corner, axes, q, joint_speeds)
+                found = self._check_corner(corner, axes, q, joint_speeds)
             except GoalRefused as refusal:
-                where = ', '.join(
-                    f'{name} {1e3 * value:+g} mm'
-                    for name, value in zip(OFFSET_AXES, corner, strict=True)
-                    if value
-                )
                 raise refusal.reworded(f'With a path offset of {where}: {refusal}') from None
+            warnings += (f'with a path offset of {where}: {warning}' for warning in found)
+        return warnings
+
+    def _check_tool_speeds(self) -> None:
+        """Refuse a tool that offsets which change as fast as they may make too fast."""
+        path, band, bound = self.reference, self.band, self.options.max_tool_speed
+        if bound <= 0.0:
+            return
+        steps = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
+        on_path = steps / np.maximum(np.diff(path.time), 1e-6)
+        along, *across = (band.speed if limit else 0.0 for limit in band.limits)
+        # What the turning of the frame adds is as fast as an offset at most.
+        speeds = np.hypot(on_path + along, np.linalg.norm(across)) + band.speed
+        row = int(np.argmax(speeds))
+        if speeds[row] > bound:
+            raise TooFast(
+                self._where(row + 1),
+                f'moves the tool at {on_path[row]:.3f} m/s, with offsets at up to '
+                f'{speeds[row]:.3f} m/s, more than max_tool_speed = {bound:.3f} m/s',
+                'lower path_offset.speed, or give the motion more time',
+            )
 
     def _joint_speeds_of_offsets(self, q: Floats, axes: Floats) -> Floats:
         """Return how fast joints have to be for offsets that change as fast as they may (n, 6)."""
@@ -225,20 +248,19 @@ class OffsetBandCheck:
 
     def _check_corner(
         self, corner: Vector3, axes: Floats, q: Floats, joint_speeds: Floats
-    ) -> None:
+    ) -> list[str]:
+        """Check one corner, and return the warnings about its clearance."""
         arm, path = self.kinematics.arm, self.reference
         there = self._joints_at(corner, axes, q)
         self._check_singularities(q, there)
         self._check_joint_speeds(q, there, joint_speeds)
-        clearance_lines(
-            arm,
-            self.tool_tips,
-            self.options,
-            there,
-            vector6(q[0].tolist()),
-            path.point,
-            path.fraction,
-        )
+        start, warnings = vector6(q[0].tolist()), []
+        for T_flange_tip in self.tool_tips:
+            clear = Clearance(arm, T_flange_tip, self.options).check(there, start)
+            lines = clearance_remarks(clear, path.point, path.fraction)
+            if clear.warning is not None:
+                warnings.append(lines[0])
+        return list(dict.fromkeys(warnings))
 
     def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:
         """Return the joints along a corner, as they are reached from those on the path (n, 6)."""

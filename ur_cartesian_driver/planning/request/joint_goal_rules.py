@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, NotAvailable
 from ur_cartesian_driver.motion.joint_goal import (
@@ -24,6 +23,7 @@ from ur_cartesian_driver.motion.joint_goal import (
     JointTolerance,
     JointTolerances,
 )
+from ur_cartesian_driver.motion.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.vectors import vector6
@@ -36,9 +36,6 @@ from ur_cartesian_driver.planning.request.spline_rules import (
     MIN_SPLINE_TIME,
 )
 from ur_cartesian_driver.planning.request.validate import check_list_lengths, check_stamp
-
-#: Larger joint positions are mistakes, such as degrees [rad].
-MAX_POSITION = 8.0 * pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,7 +146,7 @@ def _check_point(
     if not point.positions:
         raise InvalidGoal(point_field(index, 'positions'), 'are empty', 'give one for each joint')
     for field, values, bound in (
-        ('positions', point.positions, MAX_POSITION),
+        ('positions', point.positions, MAX_JOINT_VALUE),
         ('velocities', point.velocities, MAX_TWIST),
         ('accelerations', point.accelerations, MAX_ACCELERATION),
     ):
@@ -189,7 +186,7 @@ def _check_time(index: int, time: float, before: float, options: PlanningOptions
             f'{previous}',
             'increase it',
         )
-    if 0.0 < time < before + MIN_SPLINE_TIME:
+    if time > 0.0 and time - before < MIN_SPLINE_TIME - SAME_TIME:
         raise InvalidGoal(
             field,
             f'gives the segment {time - before:g} s, less than the {MIN_SPLINE_TIME:g} s that a '

@@ -16,9 +16,13 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
+    ContactEnd,
     DEFAULT_STALL_TIMEOUT,
     FreeAxis,
+    OnPathTolerance,
+    PressFrame,
     SegmentType,
+    StaleOffset,
     Waypoint,
 )
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
@@ -44,6 +48,11 @@ _Enum = TypeVar('_Enum', bound=IntEnum)
 def check_enums(goal: GoalTable, options: PlanningOptions) -> None:
     """Refuse a mode or a type that does not exist."""
     _check_enum('execution', goal.execution, ExecutionMode)
+    _check_enum('on_path_tolerance', goal.on_path_tolerance, OnPathTolerance)
+    _check_enum('path_offset.on_stale', goal.path_offset.on_stale, StaleOffset)
+    for i, press in enumerate(goal.presses):
+        _check_enum(f'presses[{i}].frame', press.frame, PressFrame)
+        _check_enum(f'presses[{i}].contact', press.contact, ContactEnd)
     segments = goal.segments
     known = np.isin(segments.types, list(SegmentType)) & np.isin(segments.arc_modes, list(ArcMode))
     known &= np.isin(segments.free_axes, list(FreeAxis))

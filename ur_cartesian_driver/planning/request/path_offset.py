@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import DEFAULT_OFFSET_MOTION, PathOffset
 from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -15,10 +14,6 @@ from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_m
 #: [m/s^2], timeout [s].
 MAX_LIMIT = 0.1
 MAX_SPEED, MAX_ACCELERATION, MAX_TIMEOUT = 0.1, 2.0, 60.0
-_REASONS = {
-    ExecutionMode.PRIMITIVES: 'the robot makes the path of a PRIMITIVES goal by itself',
-    ExecutionMode.SPLINE: 'the robot has the joints of a SPLINE goal before it moves',
-}
 
 
 def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
@@ -53,10 +48,11 @@ def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
             'set one, or leave path_offset empty',
         )
     mode = resolve_execution_mode(goal)
-    if mode in _REASONS:
+    if not mode.traits.streams_setpoints:
         raise NotAvailable(
             'path_offset',
-            f'is set, but {_REASONS[mode]} and takes no offset on its way',
+            f'is set, but the robot has the path of a {mode.name} goal before it moves, and '
+            'takes no offset on its way',
             'set execution to SERVO',
         )
     if goal.keep_open:

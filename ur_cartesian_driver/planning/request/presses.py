@@ -13,7 +13,6 @@ from collections.abc import Iterator
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ContactEnd,
     Press,
@@ -55,7 +54,7 @@ def check_presses(goal: GoalTable, options: PlanningOptions) -> None:
     :raises NotAvailable: the execution mode has no force mode.
     """
     mode = resolve_execution_mode(goal)
-    if goal.presses and mode is not ExecutionMode.PRIMITIVES:
+    if goal.presses and mode.traits.is_spline:
         raise NotAvailable(
             'presses',
             f'is not empty, but {mode.name} follows joint positions, which do not give way',

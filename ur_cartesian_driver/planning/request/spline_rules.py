@@ -11,6 +11,7 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal import Segment, SegmentType
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -56,7 +57,7 @@ def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
 def _check_points(goal: GoalTable) -> None:
     points = goal.waypoints
     times = points.times
-    wrong = (times > 0.0) & (times < np.append(0.0, times[:-1]) + MIN_SPLINE_TIME)
+    wrong = (times > 0.0) & (np.diff(times, prepend=0.0) < MIN_SPLINE_TIME - SAME_TIME)
     for values, bound in (
         (points.poses[:, :3], MAX_POINT_COORDINATE),
         (points.twists, MAX_TWIST),
@@ -65,7 +66,7 @@ def _check_points(goal: GoalTable) -> None:
         wrong |= (np.abs(values) > bound).any(axis=1)
     for i in rows_where(wrong):
         point, before = points[i], float(times[i - 1]) if i > 0 else 0.0
-        if 0.0 < point.time < before + MIN_SPLINE_TIME:
+        if point.time > 0.0 and point.time - before < MIN_SPLINE_TIME - SAME_TIME:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
                 f'gives the segment {point.time - before:g} s, less than the '

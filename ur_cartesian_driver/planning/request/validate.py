@@ -106,11 +106,19 @@ def _number_of_points(goal: GoalTable, options: PlanningOptions) -> None:
     )
 
 
-def tolerances_are_measurable(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse limits on accelerations that the robot does not report."""
+def _measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
+    check_measurable_tolerances(apply_default_tolerances(goal, options), options)
+
+
+def check_measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
+    """
+    Refuse limits on accelerations that the robot does not report.
+
+    :param goal: with default tolerances filled in.
+    """
     if options.acceleration_known:
         return
-    for name, tolerance in named_tolerances(apply_default_tolerances(goal, options)):
+    for name, tolerance in named_tolerances(goal):
         if max(tolerance.acceleration) > 0.0:
             raise InvalidGoal(
                 f'{name}.acceleration_error',
@@ -256,7 +264,7 @@ RULES: tuple[Rule, ...] = (
     check_tolerance_numbers,
     check_min_speed_fraction,
     check_replace_horizon,
-    tolerances_are_measurable,
+    _measurable_tolerances,
     _stamp,
     _supported,
     _times,

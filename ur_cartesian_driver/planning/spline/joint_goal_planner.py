@@ -41,10 +41,15 @@ from ur_cartesian_driver.planning.request.joint_goal_rules import (
     check_joint_goal,
     CheckedJointGoal,
 )
-from ur_cartesian_driver.planning.request.validate import tolerances_are_measurable
+from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
 from ur_cartesian_driver.planning.spline.joint_polynomials import to_ticks
-from ur_cartesian_driver.planning.spline.spline_limits import RateSamples, worst_excess_of
+from ur_cartesian_driver.planning.spline.spline_limits import (
+    RateSamples,
+    stretch_remark,
+    worst_excess_of,
+)
 from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, sample_count
+from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
 # A joint that is faster at a point than this many times the mean of a piece beside it overshoots.
@@ -130,12 +135,8 @@ def plan_joint_goal(
     durations = np.diff(trajectory.times)
     begin = trajectory.times[samples.piece]
     factor = trajectory.times[-1] / given.times[-1]
-    if remark:
-        table = replace(
-            table, waypoints=replace(table.waypoints, times=table.waypoints.times * factor)
-        )
     return Plan(
-        goal=table,
+        goal=stretch_times(table, factor),
         segments=_segments(trajectory, samples, durations),
         reference=ReferencePath(
             poses=poses,
@@ -167,8 +168,9 @@ def _cartesian_goal(
         goal_time_tolerance=checked.goal_time_tolerance,
         execution=ExecutionMode.SPLINE,
     )
-    tolerances_are_measurable(table, options)
-    return add_safe_outputs(apply_default_tolerances(table, options), options)
+    table = apply_default_tolerances(table, options)
+    check_measurable_tolerances(table, options)
+    return add_safe_outputs(table, options)
 
 
 def _trajectory(
@@ -307,14 +309,8 @@ def _fit_to_limits(
     if options.on_too_fast != 'slow':
         raise found.refusal(rates='velocities')
     slowed = trajectory.stretched(found.factor)
-    longest = float(np.diff(slowed.times).max())
-    if longest > options.max_segment_time:
-        raise found.refusal(rates='velocities')
-    return slowed, (
-        f'all times are stretched by {found.factor:.4g}, because of {found.limit_text} '
-        f'({found.what}, on the segment to point {found.point}): {slowed.times[-1]:.3f} s in '
-        'total',
-    )
+    found.check_slowed(slowed.times, slowed.first, options)
+    return slowed, (stretch_remark(found.factor, found.reason, slowed.times[-1]),)
 
 
 def _segments(trajectory: _Trajectory, samples: _Samples, durations: Floats) -> PlannedRows:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.errors import TooFast
+from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -68,6 +68,35 @@ class LimitExcess:
             f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt {rates} and '
             f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
         )
+
+    @property
+    def reason(self) -> str:
+        """The limit, and where it is exceeded."""
+        return f'{self.limit_text} ({self.what}, on the segment to point {self.point})'
+
+    def check_slowed(self, times: Floats, first: int, options: PlanningOptions) -> None:
+        """
+        Check times (n,) that are stretched by the factor.
+
+        :param first: the point to which the first of their pieces leads.
+        :raises InvalidGoal: a piece takes too long.
+        """
+        durations = np.diff(times)
+        longest = int(np.argmax(durations))
+        if durations[longest] > options.max_segment_time:
+            raise InvalidGoal(
+                point_field(first + longest, 'time_from_start'),
+                f'would take {durations[longest]:.0f} s because of {self.name}, more than '
+                f'max_segment_time = {options.max_segment_time:.0f} s',
+                'move the path away from there',
+            )
+
+
+def stretch_remark(factor: float, reason: str, duration: float) -> str:
+    """Return the line of the report on times that are stretched, to a duration [s]."""
+    return (
+        f'all times are stretched by {factor:.4g}, because of {reason}: {duration:.3f} s in total'
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.errors import JointLimitExceeded
 from ur_cartesian_driver.motion.goal import PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal_table import GoalTable, zeros
 from ur_cartesian_driver.motion.joint_spline import JointSpline
@@ -45,13 +45,13 @@ from ur_cartesian_driver.planning.min_speed import slower_by
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.request.goal_fields import point_field, resolve_execution_mode
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.spline.joint_polynomials import (
     fit_joint_polynomials,
     JointPolynomials,
 )
 from ur_cartesian_driver.planning.spline.slow_spline import slow_spline_stretches
-from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
+from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, worst_excess
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
@@ -171,10 +171,6 @@ def plan_spline(
     poses = path.poses.copy()
     keep_hemisphere(poses)
     kind = 'quintic' if polynomials.quintic else 'cubic'
-    stretched = (
-        f'all times are stretched by {stretch:.4g}, because of {limit}: '
-        f'{path.spline.times[-1]:.3f} s in total'
-    )
     return SplinePieces(
         segments=segments,
         reference=ReferencePath(poses=poses, point=path.points, time=path.times, fraction=path.u),
@@ -182,7 +178,7 @@ def plan_spline(
         stretch=stretch,
         remarks=(
             *point_remarks(goal, first),
-            *([stretched] if limit else []),
+            *([stretch_remark(stretch, limit, path.spline.times[-1])] if limit else []),
             *_clearance_remarks(path, end, arm, tool_tips or (T_flange_tcp,), start, options),
             f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
             f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline',
@@ -277,17 +273,8 @@ def _fit_to_limits(
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
     path = path.stretch_times(found.factor)
-    longest = int(np.argmax(np.diff(path.spline.times)))
-    time = float(np.diff(path.spline.times)[longest])
-    if time > options.max_segment_time:
-        raise InvalidGoal(
-            point_field(path.first + longest, 'time_from_start'),
-            f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
-            f'{options.max_segment_time:.0f} s',
-            'move the path away from there',
-        )
-    where = f'{found.what}, on the segment to point {found.point}'
-    return path, found.factor, f'{found.limit_text} ({where})'
+    found.check_slowed(path.spline.times, path.first, options)
+    return path, found.factor, found.reason
 
 
 def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) -> PlannedRows:
