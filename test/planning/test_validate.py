@@ -138,7 +138,7 @@ REFUSALS = [
     (with_segment(PLAIN, 1, free_axis=4), InvalidGoal, 'segments[1].free_axis is 4; allowed are'),
     (with_fields(PLAIN, on_path_tolerance=3), InvalidGoal, 'on_path_tolerance is 3; allowed are'),
     (
-        with_fields(PLAIN, path_offset=replace(PathOffset(), **{'on_stale': 7})),
+        with_fields(PLAIN, path_offset=with_fields(PathOffset(), on_stale=7)),
         InvalidGoal,
         'path_offset.on_stale is 7; allowed are',
     ),
@@ -809,7 +809,7 @@ REFUSALS = [
         (
             replace(TIMED, execution=mode, path_offset=PathOffset(limits=SIDEWAYS)),
             NotAvailable,
-            f'path_offset is set, but the robot has the path of a {mode.name} goal before it moves',
+            f'path_offset is set, but the robot has the path of a {mode.name} goal before it',
         )
         for mode in (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE)
     ),
