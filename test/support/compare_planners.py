@@ -82,15 +82,45 @@ def copy_before(checkout, folder):
     (package / '__init__.py').write_text('')
 
 
+class _ByName(pickle.Pickler):
+    def reducer_override(self, thing):
+        """Reduce a dataclass to its fields by name: the older one may have fewer."""
+        if not is_dataclass(thing) or isinstance(thing, type):
+            return NotImplemented
+        return made, (
+            type(thing),
+            {each.name: getattr(thing, each.name) for each in fields(thing)},
+        )
+
+
 class _Renaming(pickle.Unpickler):
     def find_class(self, module, name):
-        """Return the class of the older package."""
-        return super().find_class(re.sub(rf'^{PACKAGE}\b', OLD, module), name)
+        """Return the class of the older package, `unknown` if it has none."""
+        try:
+            return super().find_class(re.sub(rf'^{PACKAGE}\b', OLD, module), name)
+        except (AttributeError, ModuleNotFoundError):
+            return unknown
+
+
+def unknown(*values):
+    """Stand for a class that the older package has not."""
+
+
+def made(kind, values):
+    """Return an object with those of the values that its class has a field for."""
+    if kind is unknown:
+        return None
+    thing = object.__new__(kind)
+    for each in fields(kind):
+        object.__setattr__(thing, each.name, values[each.name])
+    return thing
 
 
 def as_before(thing):
-    """Return an object as one of the older package."""
-    return _Renaming(BytesIO(pickle.dumps(thing))).load()
+    """Return an object as one of the older package; what that does not know is left out."""
+    pickled = BytesIO()
+    _ByName(pickled).dump(thing)
+    return _Renaming(BytesIO(pickled.getvalue())).load()
 
 
 # -- goals: (goal, state, arm, options) -----------------------------------------------------------
