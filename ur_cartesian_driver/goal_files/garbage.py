@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What makes many objects at once makes Python look through all of them again and again."""
+"""Pause the garbage collector while many objects are made at once."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def uncollected() -> Iterator[None]:
     """
     Let the garbage collector rest; also a decorator.
 
-    Files of 10,000 lines are read and written in half the time. The memory of what is dropped
-    meanwhile is free at once, unless it is part of a cycle.
+    It would visit all new objects again and again: files of 10,000 lines are read and written in
+    half the time. What is dropped meanwhile is free at once, unless it is part of a cycle.
     """
     was_enabled = gc.isenabled()
     gc.disable()

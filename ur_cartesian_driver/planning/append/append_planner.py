@@ -27,7 +27,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, WaypointRows
-from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
@@ -61,8 +61,6 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 #: Number of points that are planned again with the next ones: the last, which is held back, and
 #: the one whose blend leads into its motion.
 REPLANNED_POINTS = 2
-#: Times that differ by less are the same [s].
-SAME_TIME = 1e-6
 #: Delays after which a spline may start again from rest [s]; the first possible one is taken.
 START_DELAYS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 #: Rows of the reference path along a stopping piece.
@@ -550,7 +548,7 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             )
             for s in plan.segments[len(left_out) :]
         ),
-        reference=_path_from(path, start_time, 0.5 * SAME_TIME),
+        reference=_path_from(path, start_time, SAME_TIME),
         find_slow_stretches=tuple,  # they count from another point
     )
 
@@ -561,7 +559,7 @@ def _renumber_text(text: str, first: int) -> str:
 
 
 def _path_from(
-    path: ReferencePath, start_time: float, tolerance: float = SAME_TIME
+    path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
 ) -> ReferencePath:
     """Return the rows of a path from a time on [s]; copies, so that the others can go."""
     row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import contextlib
-import gc
 from typing import Any, TypeAlias
 
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
+
+from ur_cartesian_driver.goal_files.garbage import uncollected
 
 GoalHandle: TypeAlias = Any
 
@@ -34,13 +35,8 @@ class DeferredActionServer(ActionServer):
         collector would visit them again and again: 40 % of the time, in which no other thread
         runs.
         """
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
+        with uncollected():
             return super().take_data()  # type: ignore[no-untyped-call]  # rclpy's
-        finally:
-            if enabled:
-                gc.enable()
 
     def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
         """Start a goal; it is in the state EXECUTING."""
