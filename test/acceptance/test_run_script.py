@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 import pytest
-from robot_cell import run_cell
+from robot_cell import PRIMARY, run_cell
 
 from ur_cartesian_driver.driver.ipc.channel import CallAnswered, CallRobot
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -14,7 +14,8 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.services.service_calls import RunScriptCall
+from ur_cartesian_driver.robot.services.service_calls import MAX_SCRIPT_LENGTH, RunScriptCall
+from ur_cartesian_driver.urscript import parse
 
 pytestmark = [pytest.mark.acceptance]
 
@@ -141,7 +142,45 @@ def test_a_robot_in_local_control_takes_no_script():
     run_cell(scenario, headless=False, allow_scripts=True)
 
 
-@pytest.mark.parametrize('options', [{'script': ' '}, {'script': 'x', 'timeout': 1e4}])
+def test_a_primary_program_that_the_robot_does_not_begin_was_not_run():
+    async def scenario(cell):
+        cell.loop.freeze(PRIMARY)
+        answer = await run(cell, MOTION, within=5.0)
+        assert answer.text == 'The script was sent, but the robot did not begin it.'
+        assert not answer.ok
+
+    run_cell(scenario, allow_scripts=True)
+
+
+def test_a_primary_program_that_ends_at_once_was_run():
+    async def scenario(cell):
+        answer = await run(cell, 'def other():\nend\n', within=5.0)
+        assert answer.ok, answer.text
+
+    run_cell(scenario, allow_scripts=True)
+
+
+def test_a_long_script_is_parsed_outside_of_the_robot_loop(monkeypatch):
+    in_thread = []
+
+    async def to_thread(function, *arguments):
+        in_thread.append(function)
+        return function(*arguments)
+
+    monkeypatch.setattr('asyncio.to_thread', to_thread)
+
+    async def scenario(cell):
+        answer = await run(cell, OUTPUT + '# long\n' * 1000, within=3.0)
+        assert answer.ok, answer.text
+        assert in_thread == [parse]
+
+    run_cell(scenario, allow_scripts=True)
+
+
+@pytest.mark.parametrize(
+    'options',
+    [{'script': ' '}, {'script': 'x', 'timeout': 1e4}, {'script': '#' * (MAX_SCRIPT_LENGTH + 1)}],
+)
 def test_calls_that_cannot_be_meant(options):
     with pytest.raises(LocalProtocolError, match=r'script|timeout'):
         RunScriptCall(**options)

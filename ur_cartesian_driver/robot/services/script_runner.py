@@ -33,6 +33,8 @@ from ur_cartesian_driver.urscript import CompileError, parse
 REPORT_TIME = 0.3
 #: How long the robot may take to begin a primary program, or to end it when it is stopped [s].
 BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
+#: A longer script is parsed in a thread, because keepalives cannot wait [characters].
+MIN_THREAD_LENGTH = 1000
 #: How long the robot may report that no program runs between ours and the script [s].
 CHANGE_TIME = 0.3
 
@@ -59,7 +61,7 @@ class ScriptRunner:
         if not self._settings.allow_scripts:
             return failed('The parameter allow_scripts is false: no scripts of others are run.')
         try:
-            kind = parse(call.script).kind
+            kind = await _kind(call.script)
         except CompileError as error:
             reason = error.reason or error.text.rstrip(':').replace('_', ' ')
             return failed(f'The script was not sent: line {error.line}: {reason}.')
@@ -93,7 +95,10 @@ class ScriptRunner:
             return failed(f'The script was not sent: {refusal}.')
         if not link.send_script(encode_program(call.script), lambda: not link.upload_refusal()):
             return failed('The script was not sent: the primary interface is not connected.')
+        was_connected = link.program.connected
         has_begun = await wait_for_state(link, self._runs_script, BEGIN_TIMEOUT)
+        # A short one may have ended unseen, but it has ended ours.
+        has_run = has_begun or (was_connected and not link.program.connected)
         in_time = not has_begun or await self._ends_within(call.timeout)
         if not in_time:
             link.send_primary(PrimaryCommand.STOP_PROGRAM, lambda: self._runs_script(link.robot))
@@ -105,6 +110,8 @@ class ScriptRunner:
         after = '' if again.ok else f' The robot program does not run again: {again.text}'
         if error:
             return failed(f'The script was sent, and {error}.{after}')
+        if not has_run:
+            return failed(f'The script was sent, but the robot did not begin it.{after}')
         if after:
             return failed(f'The script was run.{after}')
         return succeeded('The script was run, and the robot program runs again.')
@@ -121,3 +128,14 @@ class ScriptRunner:
                 if not self._runs_script(self._link.robot):
                     return True
         return False
+
+
+async def _kind(script: str) -> str:
+    """
+    Return the kind of a script, ``def`` or ``sec``.
+
+    :raises CompileError: it is no program.
+    """
+    if len(script) < MIN_THREAD_LENGTH:
+        return parse(script).kind
+    return (await asyncio.to_thread(parse, script)).kind

@@ -30,6 +30,8 @@ PINS = {
 
 #: How long a script may take, by default and at most [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
+#: Longer scripts are mistakes [characters].
+MAX_SCRIPT_LENGTH = 200_000
 #: Longest text for the dashboard: as lines of any alphabet the server takes it.
 MAX_TEXT_LENGTH = 1000
 #: No tool is longer [m], and no arm carries more [kg].
@@ -202,10 +204,15 @@ class RunScriptCall:
     timeout: float = SCRIPT_TIMEOUT
 
     def __post_init__(self) -> None:
-        """Check that there is a script, and the time."""
+        """Check the length of the script, and the time."""
         _declare_types(self)
         if not self.script.strip():
             raise LocalProtocolError('The script is empty; give a def or sec of URScript.')
+        if len(self.script) > MAX_SCRIPT_LENGTH:
+            raise LocalProtocolError(
+                f'The script has {len(self.script)} characters, more than {MAX_SCRIPT_LENGTH}; '
+                'shorten it, or load it on the pendant.'
+            )
         if not 0.0 < self.timeout <= MAX_SCRIPT_TIMEOUT:  # NaN neither
             raise LocalProtocolError(
                 f'timeout is {self.timeout:g} s, it has to be more than 0 and at most '
