@@ -254,6 +254,9 @@ class GoalRun:
         make = self.action.feedback_of(self.handle.request, plan, self._context)
 
         def publish(progress: Progress) -> None:
+            # Who answers the first feedback finds the motion. The driver calls back without a
+            # lock, and has sent the whole request to start by then: this cannot block it.
+            self._begun.wait()
             message = make(progress)
             # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
             with contextlib.suppress(InvalidHandle, RCLError):

@@ -1,0 +1,68 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A run whose driver reports from a thread of its own, as fast as it can."""
+
+import threading
+from types import SimpleNamespace
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
+from ur_cartesian_driver.ros.goals.goal_run import GoalRun
+
+ENDED = Outcome(code=ErrorCode.SUCCESSFUL, text='')
+
+
+class EagerDriver:
+    """Reports progress before ``start`` returns."""
+
+    def __init__(self):
+        self.motion = SimpleNamespace(appender=None, result=lambda: ENDED)
+
+    def plan(self, goal):
+        return goal
+
+    def start(self, plan, on_progress):
+        reader = threading.Thread(target=on_progress, args=(0.0,))
+        reader.start()
+        reader.join(0.1)
+        return self.motion
+
+
+def test_who_gets_the_first_feedback_finds_the_motion():
+    driver, arbiter, found, outcomes = EagerDriver(), ArmArbiter(), [], []
+    published = threading.Event()
+
+    def publish(_):
+        found.append(run.motion(timeout=0.0))
+        published.set()
+
+    handle = SimpleNamespace(
+        goal_id=SimpleNamespace(uuid=bytes(16)),
+        request=SimpleNamespace(
+            trajectory=SimpleNamespace(
+                header=SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))
+            )
+        ),
+        publish_feedback=publish,
+    )
+    action = SimpleNamespace(
+        goal=lambda *_: 'goal',
+        is_validation=lambda _: False,
+        resolved=lambda goal, *_: goal,
+        feedback_of=lambda *_: lambda progress: progress,
+    )
+    context = SimpleNamespace(
+        now=lambda: 0,
+        driver=driver,
+        arbiter=arbiter,
+        show=lambda _: None,
+        settings=SimpleNamespace(node=SimpleNamespace(on_new_goal='preempt')),
+    )
+    run = GoalRun(handle, action, context, lambda _, outcome: outcomes.append(outcome))
+    arbiter.enqueue(run.arm_request)
+    run.thread.start()
+    run.thread.join()
+    assert published.wait(5.0)
+    assert found == [driver.motion]
+    assert outcomes == [ENDED]
