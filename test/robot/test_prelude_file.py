@@ -59,6 +59,10 @@ def test_functions_variables_and_threads_make_a_prelude(tmp_path):
         ('def ur_cartesian_driver():\nend', 'line 1: ur_cartesian_driver is a function of the'),
         ('point = 1\ndef f():\nend', "line 1: point is a local name of the driver's own program"),
         ('speed = 1\ndef f():\nend', "line 1: speed is a local name of the driver's own program"),
+        ('def x():\nend', "line 1: x is a local name of the driver's own program"),
+        ('def f():\nend\nthread number():\nend', 'line 3: number is a local name of the'),
+        ('\ndef f(): # HEADER_END\nend', 'line 2: the External Control node divides the program'),
+        ('def f():\n  textmsg("# HEADER_BEGIN")\nend', "at '# HEADER_BEGIN'; remove it"),
         ('def f():\n  urcd_running = 1\nend', 'line 2: urcd_running begins with urcd_, as the'),
         ('def f():\n  run urcd_watch()\nend', 'line 2: urcd_watch begins with urcd_, as the'),
         ('gap = 1', ' defines no function (def).'),
@@ -77,7 +81,7 @@ def test_a_file_that_is_none_is_refused(tmp_path):
     for name, reason in (
         ('nothing.script', 'No such file or directory.'),
         ('latin.script', 'it is not text in UTF-8.'),
-        ('long.script', 'has 200001 characters, more than 200000.'),
+        ('long.script', 'has more than 200000 characters.'),
     ):
         with pytest.raises(ValueError, match=r'^script_prelude is ') as error:
             DriverConfig(script_prelude=str(tmp_path / name), allow_scripts=True)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
-from ur_cartesian_driver.program.render import PREFIX, PROGRAM_NAME, taken_names
-from ur_cartesian_driver.urscript import CompileError, parse_line
+from ur_cartesian_driver.program.render import MARKERS, PREFIX, PROGRAM_NAME, taken_names
+from ur_cartesian_driver.urscript.parsing.parser import parse_line
 from ur_cartesian_driver.urscript.parsing.syntax_tree import (
     AssignStatement,
     children,
@@ -18,8 +18,9 @@ from ur_cartesian_driver.urscript.parsing.syntax_tree import (
     Statement,
     SyntaxNode,
 )
+from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Longer files are mistakes [bytes].
+#: Longer files are mistakes [characters].
 MAX_SIZE = 200_000
 
 
@@ -33,14 +34,13 @@ def read_prelude(path: str) -> Prelude:
         return NO_PRELUDE
     file = Path(path).expanduser()
     try:
-        text = file.read_text(encoding='utf-8-sig')
+        with file.open(encoding='utf-8-sig') as stream:
+            text = stream.read(MAX_SIZE + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else 'it is not text in UTF-8'
         raise ValueError(f'script_prelude is {path!r}, which cannot be read: {reason}.') from None
     if len(text) > MAX_SIZE:
-        raise ValueError(
-            f'script_prelude is {path!r}, which has {len(text)} characters, more than {MAX_SIZE}.'
-        )
+        raise ValueError(f'script_prelude is {path!r}, which has more than {MAX_SIZE} characters.')
     return compile_prelude(text, file.name)
 
 
@@ -74,11 +74,11 @@ def compile_prelude(text: str, name: str) -> Prelude:
         lines[defined] = statement.line
         if is_variable:
             variables.add(defined)
-            if defined in local_names:
-                raise ValueError(
-                    f"{where} {defined} is a local name of the driver's own program, and which of "
-                    'the two a controller reads is not documented; choose another name.'
-                )
+        if defined in local_names:
+            raise ValueError(
+                f"{where} {defined} is a local name of the driver's own program, and which of "
+                'the two a controller reads is not documented; choose another name.'
+            )
         if isinstance(statement, FunctionDefinition):
             if defined == PROGRAM_NAME or defined in calls:
                 raise ValueError(
@@ -95,9 +95,25 @@ def compile_prelude(text: str, name: str) -> Prelude:
                 )
     if not functions:
         raise ValueError(f'script_prelude: {name} defines no function (def).')
-    # Without comments: the External Control node divides the program by some.
-    kept = [line for line in text.split('\n') if line.lstrip()[:1] not in ('', '#')]
-    return Prelude(file=name, lines=tuple(kept), functions=tuple(functions))
+    return Prelude(file=name, lines=tuple(_code_lines(text, name)), functions=tuple(functions))
+
+
+def _code_lines(text: str, name: str) -> Iterator[str]:
+    """
+    Yield the lines without comments: the External Control node divides the program by some.
+
+    :raises ValueError: a line with code contains one of these.
+    """
+    for number, line in enumerate(text.split('\n'), start=1):
+        if line.lstrip()[:1] in ('', '#'):
+            continue
+        for marker in sorted(MARKERS):
+            if marker in line:
+                raise ValueError(
+                    f'script_prelude: {name}, line {number}: the External Control node divides '
+                    f"the program at '{marker}'; remove it from this line."
+                )
+        yield line
 
 
 def _defined_name(statement: Statement) -> str | None:
