@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+from ur_cartesian_driver.execution.monitoring.joint_tolerance_check import JointToleranceCheck
 from ur_cartesian_driver.execution.monitoring.tolerance_check import QUANTITIES, ToleranceCheck
 from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.joint_goal import JointErrorBounds, JointTolerances
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
     multiply,
@@ -149,3 +151,13 @@ def test_opposite_signs_of_a_quaternion_are_no_error():
     flipped = Pose(WANTED.position, (-x, -y, -z, -w))
     watched = ToleranceCheck(limit('orientation', [1e-6] * 3), IDENTITY)
     assert watched.violation(flipped, ON_TIME) is None
+
+
+def test_the_first_joint_whose_error_is_unknown_is_named():
+    check = JointToleranceCheck(
+        JointTolerances(path=JointErrorBounds(position=(0.1,) * 6, velocity=(0.1,) * 6), end=ZERO6)
+    )
+    state = replace(ON_TIME, actual_q=(0.2, 0.0, nan, 0.0, nan, 0.5), actual_qd=(1.0,) * 6)
+    assert check.path_violation(state) == (
+        'position of elbow_joint is off by nan rad, the tolerance is 0.100000 rad'
+    )

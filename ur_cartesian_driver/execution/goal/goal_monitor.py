@@ -428,15 +428,13 @@ class GoalMonitor:
         checked = self._path_check or press or self._joint_check.has_path
         if not (checked and self._has_begun):
             return None
-        desired, clause = self._desired(state), None
-        if press is not None:
-            clause = press.excess(desired, state, self._tracker.time())
-            state = press.stiff_state(desired, state)
-        clause = (
-            clause
-            or self._violation(self._path_check, desired, state)
-            or self._joint_check.path_violation(state)
-        )
+        clause = self._joint_check.path_violation(state)
+        if clause is None and (self._path_check or press):
+            desired = self._desired(state)
+            if press is not None:
+                clause = press.excess(desired, state, self._tracker.time())
+                state = press.stiff_state(desired, state)
+            clause = clause or self._violation(self._path_check, desired, state)
         if clause is None:
             return None
         return GoalSignal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'

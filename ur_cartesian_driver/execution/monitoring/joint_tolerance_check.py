@@ -10,6 +10,7 @@ check sees that the target itself is on the plan. At the end, the last point at 
 
 from __future__ import annotations
 
+from ur_cartesian_driver.execution.monitoring.tolerance_check import excess_clause
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.joint_goal import JointErrorBounds, JointTolerances
 from ur_cartesian_driver.motion.robot_state import RobotState
@@ -41,16 +42,11 @@ class JointToleranceCheck:
 
 def _violation(bounds: JointErrorBounds, q: Vector6, qd: Vector6, state: RobotState) -> str | None:
     """Return the joint with the largest ratio of error to limit, if that is outside."""
-    worst, found = 1.0, None
-    for quantity, unit, limits, errors in (
-        ('position', 'rad', bounds.position, subtract6(q, state.actual_q)),
-        ('velocity', 'rad/s', bounds.velocity, subtract6(qd, state.actual_qd)),
-    ):
-        for joint, limit, error in zip(JOINT_NAMES, limits, errors, strict=True):
-            if limit > 0.0 and not abs(error) <= worst * limit:
-                worst = abs(error) / limit
-                found = (
-                    f'{quantity} of {joint} is off by {abs(error):.6f} {unit}, the tolerance is '
-                    f'{limit:.6f} {unit}'
-                )
-    return found
+    return excess_clause(
+        (quantity, f'of {joint}', unit, error, limit)
+        for quantity, unit, limits, errors in (
+            ('position', 'rad', bounds.position, subtract6(q, state.actual_q)),
+            ('velocity', 'rad/s', bounds.velocity, subtract6(qd, state.actual_qd)),
+        )
+        for joint, limit, error in zip(JOINT_NAMES, limits, errors, strict=True)
+    )

@@ -10,9 +10,9 @@ the slider, a pause, a blend or the robot's own limits change target and actual 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.pose import (
@@ -70,19 +70,35 @@ class ToleranceCheck:
 
         :param desired: planned pose of the TCP in base.
         """
-        worst, found = 1.0, None
-        for quantity, limits in self._limited:
-            errors = quantity.error(desired, state, self._q_frame_base)
-            for axis, error, limit in zip(_AXES, errors, limits, strict=True):
-                if limit > 0.0 and not abs(error) <= worst * limit:
-                    worst, found = abs(error) / limit, (quantity, axis, abs(error), limit)
-        return None if found is None else _clause(*found)
+        return excess_clause(
+            (quantity.name, axis, quantity.unit, error, limit)
+            for quantity, limits in self._limited
+            for axis, error, limit in zip(
+                _AXES, quantity.error(desired, state, self._q_frame_base), limits, strict=True
+            )
+        )
 
 
-def _clause(quantity: ToleranceQuantity, axis: str, error: float, limit: float) -> str:
+def excess_clause(errors: Iterable[tuple[str, str, str, float, float]]) -> str | None:
+    """
+    Return a clause about the error with the largest ratio to its limit, if that is outside.
+
+    The first NaN is the largest.
+
+    :param errors: quantity, axis or joint, unit, error and limit; limits <= 0 are none.
+    """
+    worst, found = 1.0, None
+    for entry in errors:
+        *_, error, limit = entry
+        if limit > 0.0 and not abs(error) <= worst * limit:
+            worst, found = abs(error) / limit, entry
+            if isnan(worst):
+                break
+    if found is None:
+        return None
+    quantity, axis, unit, error, limit = found
     return (
-        f'{quantity.name} {axis} is off by {error:.6f} {quantity.unit}, the tolerance is '
-        f'{limit:.6f} {quantity.unit}'
+        f'{quantity} {axis} is off by {abs(error):.6f} {unit}, the tolerance is {limit:.6f} {unit}'
     )
 
 
