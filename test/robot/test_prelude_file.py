@@ -42,7 +42,7 @@ def test_functions_variables_and_threads_make_a_prelude(tmp_path):
         '    move_to(x[0], x[1], x[2])',
         '  end',
     ]
-    assert read_prelude('') == NO_PRELUDE
+    assert DriverConfig().prelude == NO_PRELUDE
 
 
 @pytest.mark.parametrize(

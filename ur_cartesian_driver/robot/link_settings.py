@@ -11,7 +11,6 @@ from math import isfinite
 from ur_cartesian_driver.motion.declared_types import declare_types
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
-from ur_cartesian_driver.robot.prelude_file import read_prelude
 
 #: A robot that reports less often cannot be monitored, nor be told from a lost one [Hz].
 MIN_RTDE_FREQUENCY = 10.0
@@ -91,7 +90,11 @@ class LinkSettings:
                 'functions are outside all checks of the driver: set allow_scripts to true, or '
                 'leave script_prelude out.'
             )
-        object.__setattr__(self, 'prelude', read_prelude(self.script_prelude))
+        if self.script_prelude:
+            # Here, because most drivers do without the parser of URScript.
+            from ur_cartesian_driver.robot.prelude_file import read_prelude
+
+            object.__setattr__(self, 'prelude', read_prelude(self.script_prelude))
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')

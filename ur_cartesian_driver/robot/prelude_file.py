@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude, PreludeFunction
+from ur_cartesian_driver.program.prelude import Prelude, PreludeFunction
 from ur_cartesian_driver.program.render import MARKERS, PREFIX, PROGRAM_NAME, taken_names
 from ur_cartesian_driver.urscript.parsing.parser import parse_line
 from ur_cartesian_driver.urscript.parsing.syntax_tree import (
@@ -26,12 +26,10 @@ MAX_SIZE = 200_000
 
 def read_prelude(path: str) -> Prelude:
     """
-    Return the functions of a file; none for an empty path.
+    Return the functions of a file.
 
     :raises ValueError: the file cannot be read or compiled; the sentence names file and line.
     """
-    if not path:
-        return NO_PRELUDE
     file = Path(path).expanduser()
     try:
         with file.open(encoding='utf-8-sig') as stream:

@@ -28,7 +28,6 @@ from ur_cartesian_driver.robot.services.dashboard_service import (
 )
 from ur_cartesian_driver.robot.services.polling import wait_for_state
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
-from ur_cartesian_driver.robot.services.script_runner import ScriptRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,
@@ -95,7 +94,12 @@ class ServiceDispatcher:
         self._recovery = RecoveryRunner(
             link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
-        self._scripts = ScriptRunner(settings, link, self._send_program)
+        self._run_script = self._refuse_script
+        if settings.allow_scripts:
+            # Here, because most drivers do without the parser of URScript.
+            from ur_cartesian_driver.robot.services.script_runner import ScriptRunner
+
+            self._run_script = ScriptRunner(settings, link, self._send_program).run
         self._pending_settings = 0
 
     @property
@@ -115,6 +119,9 @@ class ServiceDispatcher:
             return failed(f'The robot did not complete the call within {bound:g} s.')
         except (OSError, DriverError) as error:
             return failed(f'{str(error).rstrip(".")}.')
+
+    async def _refuse_script(self, call: RunScriptCall) -> ServiceAnswer:
+        return failed('The parameter allow_scripts is false: no scripts of others are run.')
 
     async def _execute(self, call: ServiceCall) -> ServiceAnswer:
         match call:
@@ -140,7 +147,7 @@ class ServiceDispatcher:
             case HandBackCall():
                 return await self._hand_back()
             case RunScriptCall():
-                return await self._scripts.run(call)
+                return await self._run_script(call)
             case RecoverCall(unlock_protective_stop=unlock):
                 return await self._recovery.run(
                     may_unlock=unlock or self._settings.unlock_protective_stops
