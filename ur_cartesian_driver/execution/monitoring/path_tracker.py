@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.events import PathPlace
+from ur_cartesian_driver.motion.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
@@ -40,8 +41,6 @@ SEARCH_MARGIN = 0.005
 #: [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_DISTANCE = 0.0005
-#: Times that differ by less are the same [s]; the wire counts in microseconds.
-SAME_TIME = 5e-7
 #: At a place where the plan waits the target is at most so far beside it [m]: the wire rounds to a
 #: micrometre, and a servo creeps.
 SAME_PLACE = 2e-5

@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import add, subtract, Vector3, vector3, Vector6
 
 #: The tracker may be so much before the time of a point at which the arm stands [s].
-SAME_TIME = 0.01
+POINT_TIME_TOLERANCE = 0.01
 _AXES = ('x', 'y', 'z')
 
 
@@ -47,11 +47,11 @@ class PressWindow:
 
     def contains(self, time: float) -> bool:
         """Tell whether the tool may be off its path at a planned time [s]."""
-        return self.begin - SAME_TIME <= time < self.release
+        return self.begin - POINT_TIME_TOLERANCE <= time < self.release
 
     def excess(self, planned: Pose, state: RobotState, time: float) -> str | None:
         """Return that the tool has given way too far, as a clause, or None."""
-        if time > self.end + SAME_TIME:
+        if time > self.end + POINT_TIME_TOLERANCE:
             return None
         errors = self._errors(planned, state.actual_tcp_pose)
         for k, (bound, unit) in enumerate(zip(self.max_yields, ('m', 'rad'), strict=True)):
