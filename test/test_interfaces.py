@@ -29,6 +29,7 @@ from ur_cartesian_driver.msg import (
 )
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
 from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage
+from ur_cartesian_driver.planning.append.appendable_goal import Replacement
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.srv import (
     AppendPoints,
@@ -183,6 +184,7 @@ def test_constants_of_an_enumeration_count_up(message, pattern, values):
         (SafetyMode, SafetyModeMessage, '', {'UNKNOWN': 0}),
         (AnalogDomain, IOStates, '', {}),
         (AnalogDomain, ToolData, '', {}),
+        (Replacement, AppendPoints.Request, '', {}),
         (AnalogDomain, IOCommand, '(?=CURRENT|VOLTAGE)', {}),
         (AnalogDomain, SetIO.Request, '(?=CURRENT|VOLTAGE)', {}),
         (OutputKind, SetIO.Request, '(?=.*_(DIGITAL|ANALOG)$)', {}),

@@ -114,7 +114,7 @@ def goal_from_fields(message: Message) -> GoalTable:
         path_tolerance=_tolerance(message.path_tolerance),
         goal_tolerance=_tolerance(message.goal_tolerance),
         goal_time_tolerance=seconds(message.goal_time_tolerance),
-        execution=_member(ExecutionMode, message.execution, 'execution'),
+        execution=enum_member(ExecutionMode, message.execution, 'execution'),
         io_commands=io_commands(message),
         keep_open=message.keep_open,
         replace_horizon=message.replace_horizon,
@@ -122,7 +122,9 @@ def goal_from_fields(message: Message) -> GoalTable:
             _safe_output(output, f'safe_outputs[{i}]')
             for i, output in enumerate(message.safe_outputs)
         ),
-        on_path_tolerance=_member(OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'),
+        on_path_tolerance=enum_member(
+            OnPathTolerance, message.on_path_tolerance, 'on_path_tolerance'
+        ),
         stall_timeout=seconds(message.stall_timeout),
         min_speed_fraction=message.min_speed_fraction,
         script_calls=tuple(
@@ -166,7 +168,7 @@ def rows_of_points(
     for name, enum in _PACKED_ENUMS:
         column = getattr(segments, name)
         for i in rows_where(~np.isin(column, list(enum)))[:1]:
-            _member(enum, int(column[i]), f'packed.{name}[{i}]')
+            enum_member(enum, int(column[i]), f'packed.{name}[{i}]')
     return waypoints, segments
 
 
@@ -222,7 +224,7 @@ def segment_rows(segments: Sequence[Message]) -> SegmentRows:
 
 
 def _segment(segment: Message, field: str) -> Segment:
-    type_ = _member(SegmentType, segment.type, f'{field}.type')
+    type_ = enum_member(SegmentType, segment.type, f'{field}.type')
     via: Pose | None = pose_from_message(segment.via)
     if type_ is not SegmentType.CIRCULAR and via == IDENTITY:
         via = None  # the default; another value is kept, so that it is refused and not ignored
@@ -234,8 +236,8 @@ def _segment(segment: Message, field: str) -> Segment:
         acceleration=segment.acceleration,
         via=via,
         via_posture=_posture(segment.via_posture),
-        arc_mode=_member(ArcMode, segment.arc_mode, f'{field}.arc_mode'),
-        free_axis=_member(FreeAxis, segment.free_axis, f'{field}.free_axis'),
+        arc_mode=enum_member(ArcMode, segment.arc_mode, f'{field}.arc_mode'),
+        free_axis=enum_member(FreeAxis, segment.free_axis, f'{field}.free_axis'),
         free_min=segment.free_min,
         free_max=segment.free_max,
     )
@@ -250,17 +252,17 @@ def _io_command(command: Message, field: str) -> IOCommand:
     return IOCommand(
         waypoint=command.point_index,
         offset=seconds(command.offset),
-        output=_member(OutputKind, command.output, f'{field}.output'),
+        output=enum_member(OutputKind, command.output, f'{field}.output'),
         pin=command.pin,
         value=command.value,
-        domain=_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
+        domain=enum_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
     )
 
 
 def _input_wait(wait: Message, field: str) -> InputWait:
     return InputWait(
         waypoint=wait.point_index,
-        input=_member(InputKind, wait.input, f'{field}.input'),
+        input=enum_member(InputKind, wait.input, f'{field}.input'),
         pin=wait.pin,
         value=wait.value,
         below=wait.below,
@@ -273,7 +275,7 @@ def _proportional_output(output: Message, field: str) -> ProportionalOutput:
     return ProportionalOutput(
         first_waypoint=output.first_point,
         last_waypoint=output.last_point,
-        domain=_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
+        domain=enum_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
         **{name: getattr(output, name) for name in PROPORTIONAL_NUMBERS},
     )
 
@@ -282,11 +284,11 @@ def _press(press: Message, field: str) -> Press:
     return Press(
         first_waypoint=press.first_point,
         last_waypoint=press.last_point,
-        frame=_member(PressFrame, press.frame, f'{field}.frame'),
+        frame=enum_member(PressFrame, press.frame, f'{field}.frame'),
         axes=tuple(press.axes),
         forces=tuple(press.forces),
         speed_limits=tuple(press.speed_limits),
-        contact=_member(ContactEnd, press.contact, f'{field}.contact'),
+        contact=enum_member(ContactEnd, press.contact, f'{field}.contact'),
         **{name: getattr(press, name) for name in PRESS_SETTINGS},
     )
 
@@ -297,16 +299,16 @@ def _path_offset(offset: Message) -> PathOffset:
         speed=offset.speed,
         acceleration=offset.acceleration,
         timeout=offset.timeout,
-        on_stale=_member(StaleOffset, offset.on_stale, 'path_offset.on_stale'),
+        on_stale=enum_member(StaleOffset, offset.on_stale, 'path_offset.on_stale'),
     )
 
 
 def _safe_output(output: Message, field: str) -> SafeOutput:
     return SafeOutput(
-        output=_member(OutputKind, output.output, f'{field}.output'),
+        output=enum_member(OutputKind, output.output, f'{field}.output'),
         pin=output.pin,
         value=output.value,
-        domain=_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
+        domain=enum_member(AnalogDomain, output.analog_domain, f'{field}.analog_domain'),
         restore=output.restore,
     )
 
@@ -320,7 +322,7 @@ def _tolerance(tolerance: Message) -> Tolerance:
     )
 
 
-def _member(enum: type[_Enum], value: int, field: str) -> _Enum:
+def enum_member(enum: type[_Enum], value: int, field: str) -> _Enum:
     """Return the member of a value, or refuse the value and list the members."""
     try:
         return enum(value)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
@@ -28,6 +29,14 @@ from ur_cartesian_driver.planning.request.io_commands import check_outputs
 from ur_cartesian_driver.planning.request.stops import refuse_dwells_of_open_goals
 from ur_cartesian_driver.planning.request.validate import check_list_lengths
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
+
+
+class Replacement(IntEnum):
+    """What appended points replace; values as in ``AppendPoints``."""
+
+    APPEND = 0
+    REPLACE_FROM_POINT = 1
+    REPLACE_FROM_TIME = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

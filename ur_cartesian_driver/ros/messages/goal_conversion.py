@@ -12,23 +12,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.goal_files.goal_reading import (
+    enum_member,
     goal_from_fields,
     io_commands,
     nanoseconds,
     rows_of_points,
 )
-from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints, Replacement
 from ur_cartesian_driver.ros.message_fields import Message
-from ur_cartesian_driver.srv import AppendPoints
-
-_APPEND, _FROM_POINT, _FROM_TIME = REPLACE_CHOICES = (
-    AppendPoints.Request.APPEND,
-    AppendPoints.Request.REPLACE_FROM_POINT,
-    AppendPoints.Request.REPLACE_FROM_TIME,
-)
 
 
 def goal_from_message(
@@ -71,19 +64,18 @@ def appended_points_from_message(message: Message) -> AppendedPoints:
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
     waypoints, segments = rows_of_points(message, message.points, 'points')
-    if message.replace not in REPLACE_CHOICES:
-        raise InvalidGoal(
-            'replace',
-            f'is {message.replace}; allowed are APPEND = {_APPEND}, REPLACE_FROM_POINT = '
-            f'{_FROM_POINT}, REPLACE_FROM_TIME = {_FROM_TIME}',
-        )
+    replacement = enum_member(Replacement, message.replace, 'replace')
     return AppendedPoints(
         waypoints=waypoints,
         segments=segments,
         io_commands=io_commands(message),
         last=message.last,
-        replace_from_point=message.first_index if message.replace == _FROM_POINT else None,
-        replace_from_time=message.replace_from_time if message.replace == _FROM_TIME else None,
+        replace_from_point=message.first_index
+        if replacement is Replacement.REPLACE_FROM_POINT
+        else None,
+        replace_from_time=message.replace_from_time
+        if replacement is Replacement.REPLACE_FROM_TIME
+        else None,
     )
 
 
