@@ -60,12 +60,25 @@ def test_the_action_is_there_only_where_control_msgs_is(monkeypatch):
     monkeypatch.setitem(sys.modules, 'control_msgs', None)
     assert [type(action) for action in installed_actions()] == [CartesianAction]
     package, module = ModuleType('control_msgs'), ModuleType('control_msgs.action')
-    module.FollowJointTrajectory = FollowJointTrajectory  # type: ignore[attr-defined]
+    vars(module)['FollowJointTrajectory'] = FollowJointTrajectory
     monkeypatch.setitem(sys.modules, 'control_msgs', package)
     monkeypatch.setitem(sys.modules, 'control_msgs.action', module)
     _, joint_action = installed_actions()
     assert joint_action.name == NAME
     assert joint_action.action_type is FollowJointTrajectory
+
+
+def test_a_control_msgs_that_is_broken_is_not_taken_for_missing(monkeypatch, tmp_path):
+    package = tmp_path / 'control_msgs'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'action.py').write_text('import no_such_typesupport')
+    monkeypatch.delitem(sys.modules, 'control_msgs', raising=False)
+    monkeypatch.delitem(sys.modules, 'control_msgs.action', raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ModuleNotFoundError, match='no_such_typesupport'):
+        installed_actions()
+    sys.modules.pop('control_msgs')
 
 
 def test_every_field_of_a_goal_is_read():

@@ -147,6 +147,8 @@ def installed_actions() -> list[GoalAction]:
     actions: list[GoalAction] = [CartesianAction()]
     try:
         control_msgs = importlib.import_module('control_msgs.action')
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name not in ('control_msgs', 'control_msgs.action'):
+            raise  # it is installed, but broken
         return actions
     return [*actions, JointAction(control_msgs.FollowJointTrajectory)]
