@@ -357,34 +357,23 @@ def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
     bring.add_argument(
         '--acceleration', type=argument_types.factor, help='[m/s^2]; by default as the speed'
     )
-    bring.add_argument(
-        '--blend',
-        type=argument_types.length,
-        default=0.0,
-        metavar='LENGTH',
-        help='at inner points, like 1mm',
-    )
-    bring.add_argument(
-        '--simplify',
-        type=argument_types.length,
-        default=0.0,
-        metavar='LENGTH',
-        help='merge points and find arcs, nowhere farther from the path than this, like 0.1mm',
-    )
-    bring.add_argument(
-        '--tolerance',
-        type=argument_types.length,
-        default=5e-5,
-        metavar='LENGTH',
-        help='of the lines that take the place of splines, ellipses and helices',
-    )
-    bring.add_argument(
-        '--lift',
-        type=argument_types.length,
-        default=0.0,
-        metavar='LENGTH',
-        help='go back between contours',
-    )
+    for name, default, text in (
+        ('blend', 0.0, 'at inner points, like 1mm'),
+        (
+            'simplify',
+            0.0,
+            'merge points and find arcs, nowhere farther from the path than this, like 0.1mm',
+        ),
+        ('tolerance', 5e-5, 'of the lines that take the place of splines, ellipses and helices'),
+        ('lift', 0.0, 'go back between contours'),
+    ):
+        bring.add_argument(
+            f'--{name}',
+            type=argument_types.length,
+            default=default,
+            metavar='LENGTH',
+            help=text,
+        )
     bring.add_argument(
         '--output-of',
         type=argument_types.code_output,
