@@ -48,7 +48,7 @@ def test_an_offset_is_sent_in_plain_numbers():
         (PlanWithReport, {}, 'path_offset is empty in the goal that runs; set its limits'),
         (PlanWithBand, {'across': nan}, 'across is nan; it must be finite'),
         (PlanWithBand, {'normal': 'near'}, "normal is 'near'"),
-        (PlanWithBand, {'age': -1.0}, 'age is -1.0; it must be finite, and at least 0'),
+        (PlanWithBand, {'age': -1}, 'age is -1.0; it must be finite, and at least 0'),
         (PlanWithBand, {'age': 0.6}, 'age is 0.600 s, path_offset.timeout is 0.5 s'),
     ],
 )

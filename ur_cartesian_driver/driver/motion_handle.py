@@ -123,9 +123,9 @@ class MotionHandle:
                 values[name] = with_declared_types(value, float, name)
             except WrongType as error:
                 raise InvalidGoal(error.field, error.problem) from None
-            if not isfinite(values[name]) or (name == 'age' and value < 0.0):
+            if not isfinite(values[name]) or (name == 'age' and values[name] < 0.0):
                 bound = ', and at least 0' if name == 'age' else ''
-                raise InvalidGoal(name, f'is {value}; it must be finite{bound}')
+                raise InvalidGoal(name, f'is {values[name]}; it must be finite{bound}')
         *offset, age = values.values()
         if age > self.offset_timeout:
             raise InvalidGoal(
