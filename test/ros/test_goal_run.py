@@ -4,6 +4,7 @@
 
 import threading
 from types import SimpleNamespace
+from typing import Any
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
@@ -52,7 +53,7 @@ def test_who_gets_the_first_feedback_finds_the_motion():
         resolved=lambda goal, *_: goal,
         feedback_of=lambda *_: lambda progress: progress,
     )
-    context = SimpleNamespace(
+    context: Any = SimpleNamespace(
         now=lambda: 0,
         driver=driver,
         arbiter=arbiter,

@@ -30,7 +30,7 @@ def test_offsets_of_a_client_move_the_tool_and_wrong_ones_say_why(single_cell):
         return str(refused.value)
 
     assert refusal(Vector3()) == 'No goal moves the arm.'
-    goal = cell.goal((2.0, 0.05, 0.0, 0.0), execution=SERVO)
+    goal = cell.goal((5.0, 0.05, 0.0, 0.0), execution=SERVO)  # time enough on a busy computer
     goal.path_offset.limits.z = 0.004
     height = cell.sim.state().T_base_tcp.position[2]
     handle = cell.send(goal)

@@ -68,7 +68,7 @@ class Readings:
 
     def __init__(self, cell: RobotCell, seconds: float) -> None:
         self._cell, self._recorder = cell, RtdeRecorder()
-        self._cycle: float = cell.robot.config.cycle  # type: ignore[union-attr]
+        self._cycle: float = cell.robot.config.cycle  # type: ignore[union-attr]  # it has started
         self._rows, self._count = np.empty((int(seconds / self._cycle), 13)), 0
 
     async def connect(self) -> None:
