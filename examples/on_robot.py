@@ -13,7 +13,7 @@ from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 def run(
     make: Callable[[Pose], Path],
     frames: Sequence[StaticFrame] = (),
-    meanwhile: Callable[[MotionHandle], None] = lambda motion: None,
+    meanwhile: Callable[[MotionHandle, Pose], None] = lambda motion, start: None,
     **settings: Any,
 ) -> None:
     """Make a path from where the tool of a robot is, print its plan, and carry it out."""
@@ -29,10 +29,11 @@ def run(
         driver.wait_ready(timeout=10.0)
         state = driver.state
         assert state is not None
-        path = make(state.actual_tcp_pose)
+        start = state.actual_tcp_pose
+        path = make(start)
         plan = driver.plan(path)
         print(*plan.report, sep='\n')
         if not given.plan:
             motion = driver.start(plan)
-            meanwhile(motion)
+            meanwhile(motion, start)
             print(motion.result().raise_for_error().text)

@@ -18,7 +18,7 @@ def tracked_seam(start: Pose) -> Path:
     )
 
 
-def follow(motion: MotionHandle) -> None:
+def follow(motion: MotionHandle, start: Pose) -> None:
     while not motion.done():
         motion.set_path_offset(across=mm(3))  # what your sensor sees
         sleep(0.02)

@@ -11,6 +11,8 @@ from dataclasses import replace
 import gc
 from math import pi
 import os
+from pathlib import Path as FilePath
+from runpy import run_path
 import sys
 
 from append_goals import AppendMotion, moved, retained_sizes
@@ -34,6 +36,7 @@ MAX_JUMP = 1.0
 #: Of the tool on the circle [m/s].
 SPEED = 2.0 * pi / PERIOD * RADIUS
 ARM = Arm(robot_model('ur5e'))
+EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'replanned.py'
 
 
 async def replanned(cell, mode, rate):
@@ -154,3 +157,28 @@ def test_a_goal_that_has_run_out_goes_on_from_rest(mode):
         assert 'was brought to rest once' in end.report[0]
 
     run_cell(scenario)
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_chunks_of_the_example_are_one_motion():
+    replanned = run_path(str(EXAMPLE))['replanned']
+
+    async def scenario(cell):
+        readings = Readings(cell, 10.0)
+        await readings.connect()
+        motion = AppendMotion(cell, replanned(cell.memory.read().actual_tcp_pose).goal())
+        assert await motion.until(lambda: motion.motion.progress)
+        while motion.progress.time < 1.5:
+            since = motion.progress.time + 0.3
+            chunk = replanned(motion.home, since).goal().waypoints
+            await motion.append(chunk, replace_from_time=since)
+            await cell.sleep(0.1)
+        await motion.append(last=True)
+        return motion.home, await motion.ended(), readings
+
+    home, end, readings = run_cell(scenario)
+    assert end.succeeded, end.text
+    assert not any('brought to rest' in line for line in end.report)
+    x, y, z = (ARM.forward_rows(readings.moving[:, 1:7])[:, :3] - home.position).T
+    assert np.hypot(x, y - 0.05) == pytest.approx(0.05, abs=1e-3)
+    assert 0.003 < z.max() < 0.006, 'where the later plans have it'
