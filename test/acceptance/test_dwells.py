@@ -56,10 +56,7 @@ class Journey:
         self.motion = cell.owner.start(self.plan)
 
     def look(self):
-        state = self.cell.memory.read()
-        if not self.seen or state.timestamp > self.seen[-1].timestamp:
-            self.seen.append(state)
-        return self.seen[-1]
+        return self.cell.collect(self.seen)
 
     def is_there(self, state, index=0):
         return state.target_tcp_pose.distance_to(self.places[index]) < 1e-4
@@ -71,8 +68,7 @@ class Journey:
         assert self.motion.outcome is None
 
     async def end(self, bound=10.0):
-        await self.cell.until(lambda: self.look() and self.motion.outcome, bound)
-        return self.motion.outcome
+        return await self.cell.record(self.motion, self.seen, bound)
 
     def rested(self):
         """Return for how long the target was at the first point [s]."""

@@ -111,21 +111,13 @@ async def executed(cell, goal, options=OPTIONS):
     """Run a joint goal; return its outcome, and times and joint targets of all packets."""
     made = plan_joint_goal(goal, cell.memory.read(), ARM, options)
     packets = []
-
-    def ended():
-        state = cell.memory.read()
-        if not packets or state.timestamp > packets[-1].timestamp:
-            packets.append(state)
-        return motion.outcome is not None
-
-    motion = cell.owner.start(made)
-    await cell.until(ended, 60.0)
+    outcome = await cell.record(cell.owner.start(made), packets)
     begin = next(
         (before.timestamp for before, after in pairwise(packets) if any(after.target_qd)),
         packets[0].timestamp,
     )
     return (
-        motion.outcome,
+        outcome,
         np.array([state.timestamp - begin for state in packets]),
         np.array([state.target_q for state in packets]),
         packets,

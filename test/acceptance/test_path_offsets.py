@@ -2,76 +2,60 @@
 # SPDX-License-Identifier: Apache-2.0
 """Paths that give way to offsets while the arm moves, judged by what RTDE reports."""
 
-from dataclasses import replace
 from math import pi, sin
+from pathlib import Path as FilePath
+from runpy import run_path
 
 import numpy as np
 import pytest
+from recorded_goal import RecordedGoal
 from robot_cell import run_cell
 
-from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, PathOffset, StaleOffset, Tolerance, Waypoint
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.motion.goal import PathOffset, StaleOffset, Tolerance
 
 pytestmark = [pytest.mark.acceptance]
 
-ARM = Arm(robot_model('ur5e'))
-SETUP = ArmSetup.of(ARM)
 #: Of the planned seam [s], [m], and how far the real one is bent to the side [m].
 TIME, LENGTH, BEND = 4.0, 0.16, 0.005
 #: Time between two offsets [s].
 PERIOD = 0.02
+EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'tracked_seam.py'
 
 
-class Seam:
+class TrackedSeam(RecordedGoal):
     """A line along y, whose tool points down: across is -x, normal is z."""
 
-    def __init__(self, cell, *, tolerance=0.0015, **changes):
-        self._cell, self.states = cell, []
-        state = cell.memory.read()
-        x, y, z = state.actual_tcp_pose.position
-        there = replace(state.actual_tcp_pose, position=(x, y + LENGTH, z))
-        goal = Goal(
-            waypoints=(Waypoint(pose=there, time=TIME),),
-            path_tolerance=Tolerance(position=(tolerance,) * 3),
-            execution=ExecutionMode.SERVO,
-            path_offset=PathOffset(limits=(0.0, 0.006, 0.006), **changes),
-        )
-        self.start = np.array((x, y, z))
-        self.motion = cell.owner.start(plan(goal, state, ARM, PlanningOptions()), arm=SETUP)
-        self._next = 0.0
-
     def send(self, across, normal=0.0, age=0.0):
-        number = len(self._cell.owner.motions)
-        self._cell.owner.send(SetPathOffset(motion=number, offset=(0.0, across, normal), age=age))
+        number = len(self.cell.owner.motions)
+        self.cell.owner.send(SetPathOffset(motion=number, offset=(0.0, across, normal), age=age))
 
     async def end(self, sensor=lambda place: None):
         """Run to the end; a sensor sees where the tool is, every PERIOD."""
+        due = 0.0
 
         def looked():
-            state = self._cell.memory.read()
-            if not self.states or state.timestamp > self.states[-1].timestamp:
-                self.states.append(state)
-                if state.timestamp >= self._next:
-                    self._next = state.timestamp + PERIOD
-                    sensor(np.array(state.actual_tcp_pose.position) - self.start)
-            return self.motion.outcome is not None
+            nonlocal due
+            state = self.cell.collect(self.states)
+            if state.timestamp >= due:
+                due = state.timestamp + PERIOD
+                sensor(np.array(state.actual_tcp_pose.position) - self.start)
+            return self.motion.outcome
 
-        await self._cell.until(looked, 60.0)
+        await self.cell.until(looked, 60.0)
         return self.motion.outcome
 
-    @property
-    def target(self):
-        """Where the controller's target is from the start (n, 3) [m]."""
-        return np.array([state.target_tcp_pose.position for state in self.states]) - self.start
 
-    @property
-    def times(self):
-        return np.array([state.timestamp for state in self.states])
+def start(cell, *, tolerance=0.0015, **changes):
+    """Start the planned seam."""
+    return TrackedSeam.along_y(
+        cell,
+        LENGTH,
+        TIME,
+        path_tolerance=Tolerance(position=(tolerance,) * 3),
+        path_offset=PathOffset(limits=(0.0, 0.006, 0.006), **changes),
+    )
 
 
 def bent(y):
@@ -81,7 +65,7 @@ def bent(y):
 
 def test_a_seam_bent_by_5_mm_is_followed_within_the_stated_lag():
     async def scenario(cell):
-        seam = Seam(cell)
+        seam = start(cell)
         # The sensor is where the tool is: it sees the seam there, not the offset that is asked.
         outcome = await seam.end(lambda place: seam.send(bent(place[1])))
         return seam, outcome
@@ -109,7 +93,7 @@ def test_jumps_and_nonsense_move_the_tool_within_the_bounds():
     limits, speed, acceleration = (0.0, 0.006, 0.006), 0.02, 0.2
 
     async def scenario(cell):
-        seam = Seam(cell, tolerance=0.003)
+        seam = start(cell, tolerance=0.003)
         rng = np.random.default_rng(1)
 
         def sensor(place):
@@ -133,7 +117,7 @@ def test_jumps_and_nonsense_move_the_tool_within_the_bounds():
 
 def test_a_sensor_that_fails_leaves_the_tool_where_the_goal_says():
     async def scenario(cell):
-        seam = Seam(cell, on_stale=StaleOffset.HOLD, timeout=0.3)
+        seam = start(cell, on_stale=StaleOffset.HOLD, timeout=0.3)
         return seam, await seam.end(lambda place: place[1] < 0.3 * LENGTH and seam.send(0.004))
 
     seam, outcome = run_cell(scenario)
@@ -145,7 +129,7 @@ def test_a_sensor_that_fails_leaves_the_tool_where_the_goal_says():
 
 def test_an_arm_that_is_pushed_off_the_path_that_gave_way_is_noticed():
     async def scenario(cell):
-        seam = Seam(cell)
+        seam = start(cell)
 
         def sensor(place):
             seam.send(0.005)
@@ -157,3 +141,19 @@ def test_an_arm_that_is_pushed_off_the_path_that_gave_way_is_noticed():
     outcome = run_cell(scenario)
     assert outcome.code is ErrorCode.PATH_TOLERANCE_VIOLATED
     assert 'position x is off by' in outcome.text
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_example_is_tracked_3_mm_to_the_side():
+    async def scenario(cell):
+        path = run_path(str(EXAMPLE))['tracked_seam'](cell.memory.read().actual_tcp_pose)
+        seam = TrackedSeam(cell, path.goal())
+        return seam, await seam.end(lambda place: seam.send(0.003))
+
+    seam, outcome = run_cell(scenario)
+    assert outcome.succeeded, outcome
+    x, y, z = seam.target.T
+    beside = -x[(y > 0.02) & (y < 0.18)]
+    assert beside == pytest.approx(0.003, abs=2e-4)
+    assert np.abs(z).max() < 5e-5
+    assert seam.target[-1] == pytest.approx((0.0, 0.2, 0.0), abs=5e-5)

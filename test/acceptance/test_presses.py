@@ -8,7 +8,9 @@ prove the wiring, not the robot. All in virtual time.
 """
 
 from dataclasses import replace
+from pathlib import Path as FilePath
 import re
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -41,6 +43,7 @@ DOWN = Press(
 )
 TABLE = -0.003
 TIGHT = Tolerance(position=(0.0005,) * 3, orientation=(0.01,) * 3)
+EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'grind.py'
 
 
 def put(cell, shape, offset, extent, **properties):
@@ -270,5 +273,26 @@ def test_the_frame_of_the_tool_turns_with_it():
         leaning = (places[:, 1] > 0.06) & (places[:, 1] < 0.085)
         # Along the others the arm is stiff, and takes what the table pushes there.
         assert forces[leaning, 2] == pytest.approx(20.0 / np.cos(lean), abs=1.0)
+
+    run_cell(scenario)
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason='only a checkout has the examples')
+def test_the_example_grinds_two_sides():
+    async def scenario(cell):
+        put(cell, 'plane', (0.0, 0.0, -0.032), (0.0, 0.0, 1.0))  # as its comment says
+        state = cell.memory.read()
+        goal = run_path(str(EXAMPLE))['grind'](state.actual_tcp_pose).goal()
+        motion = cell.owner.start(plan(goal, state, ARM, OPTIONS))
+        places, forces = await recorded(cell, motion)
+        assert motion.outcome.succeeded, motion.outcome.text
+        x, y, z = places.T
+        first, second = (y > 0.02) & (y < 0.05), (x > 0.02) & (x < 0.06)
+        for side in first, second:
+            assert forces[side, 2] == pytest.approx(20.0, abs=1.0)
+            assert z[side] == pytest.approx(-0.033, abs=0.0003)
+        assert np.abs(x[first]).max() < 1e-3
+        assert y[second] == pytest.approx(0.07, abs=1e-3)
+        assert places[-1] == pytest.approx((0.07, 0.07, 0.0), abs=5e-4)
 
     run_cell(scenario)

@@ -55,15 +55,8 @@ class Run:
         cell.owner._handle = tell
         self.motion = cell.owner.start(self.made)
 
-    def looked(self):
-        state = self.cell.memory.read()
-        if not self.packets or state.timestamp > self.packets[-1].timestamp:
-            self.packets.append(state)
-        return self.motion.outcome is not None
-
     async def end(self):
-        await self.cell.until(self.looked, 60.0)
-        return self.motion.outcome
+        return await self.cell.record(self.motion, self.packets)
 
     def begin(self):
         """Return when the first set-point of the motion was sent [s]."""
@@ -195,7 +188,7 @@ def test_a_cancel_stops_the_arm_on_the_way():
         run = Run(cell, straight(0.8))
         await cell.sleep(0.5)
         cell.owner.cancel()
-        took = await cell.until(run.looked)
+        took = await cell.until(lambda: run.motion.outcome)
         assert run.motion.outcome.code is ErrorCode.CANCELLED
         assert took < 0.5
         await cell.until(cell.at_rest, 2.0 * CYCLE)  # the last step of the brakes

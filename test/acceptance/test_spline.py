@@ -79,16 +79,8 @@ def run_goal(goal_from):
             PlanningOptions(),
         )
         packets = []
-
-        def looked():
-            state = cell.memory.read()
-            if not packets or state.timestamp > packets[-1].timestamp:
-                packets.append(state)
-            return motion.outcome is not None
-
-        motion = cell.owner.start(made)
-        await cell.until(looked, 60.0)
-        return run_of(made, motion.outcome, packets)
+        outcome = await cell.record(cell.owner.start(made), packets)
+        return run_of(made, outcome, packets)
 
     return run_cell(scenario)
 

@@ -281,6 +281,18 @@ class RobotCell:
             await asyncio.sleep(0.5 * CYCLE)
         return self.loop.time() - begin
 
+    def collect(self, states):
+        """Append what RTDE reported last to a list, unless it is there; return it."""
+        state = self.memory.read()
+        if not states or state.timestamp > states[-1].timestamp:
+            states.append(state)
+        return state
+
+    async def record(self, motion, states, bound=60.0):
+        """Collect all states until a goal ends; return its outcome."""
+        await self.until(lambda: self.collect(states) and motion.outcome, bound)
+        return motion.outcome
+
     def control_messages(self, first=0):
         """Return the messages that the driver sent on the reverse socket, from an index on."""
         (end,) = self.loop.open_ends(REVERSE)
