@@ -123,7 +123,7 @@ def cell(private_ros_graph):
     every_frame = [frame for name in NAMES for frame in getattr(example(name), 'FRAMES', ())]
     monkeypatch = pytest.MonkeyPatch()
     # Timeouts of ours that count in simulated time, which passes quickly.
-    monkeypatch.setattr(goal_monitor, 'STALL_TIMEOUT', RATE * goal_monitor.STALL_TIMEOUT)
+    monkeypatch.setattr(goal_monitor, 'STANDSTILL_TIMEOUT', RATE * goal_monitor.STANDSTILL_TIMEOUT)
     patient = partial(ProgramSettings, point_timeout=10.0)
     monkeypatch.setattr(program_sockets, 'ProgramSettings', patient)
     config = SimulatorConfig(

@@ -18,7 +18,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.goal_monitor import STALL_TIMEOUT
+from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalSignal,
     GoalState,
@@ -440,10 +440,10 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
         GoalState.MOVING: {
             GoalSignal.VIOLATION,
             GoalSignal.DEVIATION,
-            GoalSignal.STALLED,
+            GoalSignal.STANDSTILL,
             GoalSignal.STARVING,
         },
-        GoalState.RUNNING_OUT: {GoalSignal.VIOLATION, GoalSignal.DEVIATION, GoalSignal.STALLED},
+        GoalState.RUNNING_OUT: {GoalSignal.VIOLATION, GoalSignal.DEVIATION, GoalSignal.STANDSTILL},
         GoalState.AWAITING_POINTS: {
             GoalSignal.APPENDED,
             GoalSignal.NO_MORE_POINTS,
@@ -461,7 +461,7 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
         GoalSignal.UNANSWERED,
         GoalSignal.VIOLATION,
         GoalSignal.DEVIATION,
-        GoalSignal.STALLED,
+        GoalSignal.STANDSTILL,
         GoalSignal.STARVING,
         GoalSignal.STALE,
         GoalSignal.APPENDED,
@@ -588,7 +588,7 @@ def standing(machine, seconds, **changes):
 
 
 def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
-    commands = standing(started(), STALL_TIMEOUT + 0.3)
+    commands = standing(started(), STANDSTILL_TIMEOUT + 0.3)
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
     assert any(isinstance(c, StopProgram) for c in commands)
 

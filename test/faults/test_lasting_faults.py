@@ -8,7 +8,7 @@ import pytest
 import robot_cell
 from robot_cell import CYCLE, run_cell
 
-from ur_cartesian_driver.execution.goal.goal_monitor import STALL_TIMEOUT
+from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Tolerance
 from ur_cartesian_driver.motion.robot_state import RuntimeState
@@ -103,7 +103,7 @@ def test_an_output_long_after_the_end_is_waited_for():
     async def scenario(cell):
         late = IOCommand(
             waypoint=0,
-            offset=2.0 * STALL_TIMEOUT,
+            offset=2.0 * STANDSTILL_TIMEOUT,
             pin=1,
             value=1.0,
             output=OutputKind.STANDARD_DIGITAL,
@@ -111,7 +111,7 @@ def test_an_output_long_after_the_end_is_waited_for():
         motion = cell.owner.start(
             planned(cell.memory.read(), ((0.0, 0.01, 0.0),), 0.1, 1.0, io_commands=(late,))
         )
-        await cell.until(lambda: motion.outcome, 3.0 * STALL_TIMEOUT)
+        await cell.until(lambda: motion.outcome, 3.0 * STANDSTILL_TIMEOUT)
         assert motion.outcome.succeeded, motion.outcome
         assert cell.robot.controller.io.digital_out.standard[1]
 

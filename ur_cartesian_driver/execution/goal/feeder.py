@@ -133,7 +133,7 @@ class Feeder(ABC):
         return fault
 
     def confirms(self, now: float) -> bool:
-        """Tell whether the robot program reads what it gets: an arm that stands is not stalled."""
+        """Tell whether the robot program reads what it gets, so that the arm may stand still."""
         return False
 
     def has_arrived(self, packet: RobotState) -> bool:

@@ -31,9 +31,9 @@ from ur_cartesian_driver.motion.vectors import add, scale, Vector3
 #: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
 #: How long the target may stand still in the middle of a goal while nothing holds it [s].
-STALL_TIMEOUT = 2.0
+STANDSTILL_TIMEOUT = 2.0
 #: How much longer than planned it may stand where the plan itself waits [s].
-STALL_MARGIN = 1.0
+STANDSTILL_MARGIN = 1.0
 #: Rows of a path that differ by less are the same pose, at which the plan waits [m], [rad].
 SAME_POSE = 1e-9
 #: How far the controller's own target may be from the plan [m], [rad].
@@ -74,9 +74,9 @@ class GoalMonitor:
         #: How many motions of the goal the robot had begun in trajectories before this one.
         self._motions_before = 0
         #: How long the target has stood still while nothing held it [s].
-        self._stalled_time = 0.0
+        self._standstill_time = 0.0
         #: The same in scaled time, and how much of that is allowed.
-        self._stalled_scaled, self._stall_timeout = 0.0, _stall_timeout(job)
+        self._standstill_scaled, self._standstill_timeout = 0.0, _standstill_timeout(job)
         #: How long the program has run the motion that it began last [s], and which it is.
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first.
@@ -99,7 +99,7 @@ class GoalMonitor:
         """
         self._awaits_count, self._stale_begun = True, stale_begun
         self._motions_before = self.records.motions_before(sent)
-        self._stalled_time = self._stalled_scaled = 0.0
+        self._standstill_time = self._standstill_scaled = 0.0
         self.scaled_time = self._tracker.time()  # waiting at rest is no delay of the motion
 
     def update(
@@ -139,11 +139,11 @@ class GoalMonitor:
         if waits:
             self._tracker.wait(elapsed)
         if _stands_still(before, state):
-            self._stalled_time += passed
+            self._standstill_time += passed
             # At rest the scaling is 0: only the slider says how fast a wait would pass.
-            self._stalled_scaled += passed * state.target_speed_fraction
+            self._standstill_scaled += passed * state.target_speed_fraction
         else:
-            self._stalled_time = self._stalled_scaled = 0.0
+            self._standstill_time = self._standstill_scaled = 0.0
 
     def finish(self, time: float = inf) -> None:
         """Move to the end of the path, or to rest at a time [s]: the robot program reports it."""
@@ -154,7 +154,7 @@ class GoalMonitor:
         self._tracker.append(job.reference, self.records.end_time(records_before))
         self.records.append(job, records_before)
         self.job = job
-        self._stall_timeout = max(self._stall_timeout, _stall_timeout(job))
+        self._standstill_timeout = max(self._standstill_timeout, _standstill_timeout(job))
         if self.latest is not None:
             self.records.forget(self.records_begun() - 2)
 
@@ -282,13 +282,13 @@ class GoalMonitor:
         """
         Return the fault of a motion, with a clause for the outcome's text, or None.
 
-        :param may_stand_still: an arm that stands is not stalled.
+        :param may_stand_still: the arm may stand still.
         """
         return (
             self._plan_deviation(state)
             or self._late_call()
             or self._speed_violation(state)
-            or (None if may_stand_still else self._stall_fault())
+            or (None if may_stand_still else self._standstill_fault())
             or self._path_violation(state)
         )
 
@@ -410,17 +410,20 @@ class GoalMonitor:
         record = self.records.begun_records(self._motions_begun()) - 1
         return self.job.script_calls.get(record, (0.0, ''))
 
-    def _stall_fault(self) -> Fault | None:
+    def _standstill_fault(self) -> Fault | None:
         """Return that the arm stands although nothing holds it, or None."""
-        if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
+        if (
+            self._standstill_time < STANDSTILL_TIMEOUT
+            or self._standstill_scaled < self._standstill_timeout
+        ):
             return None
         longest = max(self._input_wait()[0], self.script_call()[0])
-        if self._stalled_time < longest + STALL_MARGIN:
+        if self._standstill_time < longest + STANDSTILL_MARGIN:
             return None
-        return GoalSignal.STALLED, (
-            f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '
-            'robot program has not reported the end: a message to it or from it was lost, so it '
-            'was ended'
+        return GoalSignal.STANDSTILL, (
+            f'the arm has stood still for {self._standstill_time:.3g} s, nothing holds it, and '
+            'the robot program has not reported the end: a message to it or from it was lost, so '
+            'it was ended'
         )
 
     def _path_violation(self, state: RobotState) -> Fault | None:
@@ -465,11 +468,11 @@ def _stands_still(before: RobotState | None, state: RobotState) -> bool:
     )
 
 
-def _stall_timeout(job: MotionJob) -> float:
+def _standstill_timeout(job: MotionJob) -> float:
     """Return for how long the arm may stand in a motion, of the controller's time [s]."""
     path = job.reference
     still = (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).all(axis=1)
     # A wait may have several rows: those that follow each other count as one.
     waits = np.bincount(np.cumsum(~still), weights=np.where(still, np.diff(path.time), 0.0))
     longest = max(float(waits.max(initial=0.0)), job.output_delay)
-    return longest + STALL_MARGIN if longest > 0.0 else 0.0
+    return longest + STANDSTILL_MARGIN if longest > 0.0 else 0.0

@@ -45,9 +45,10 @@ rest, the goal ends with the code that was decided (UNANSWERED); where it still 
 failure (TIMEOUT). A TCP that is not set in time ends the goal before it begins; one that is not
 restored in time, or not at all because the robot stopped, is left to whoever carries out the
 commands (``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have no deadline, because a
-speed slider at zero is no error; but where the arm stands for ``STALL_TIMEOUT`` and nothing holds
-it, a command or a result was lost (STALLED). RTDE packets that are too old, or stop, show nothing
-of the motion any more: the goal is cancelled (STALE), and ends as one whose connection was lost.
+speed slider at zero is no error; but where the arm stands for ``STANDSTILL_TIMEOUT`` and nothing
+holds it, a command or a result was lost (STANDSTILL). RTDE packets that are too old, or stop, show
+nothing of the motion any more: the goal is cancelled (STALE), and ends as one whose connection was
+lost.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ class GoalSignal(Enum):
     PREEMPT = auto()
     VIOLATION = auto()
     DEVIATION = auto()
-    STALLED = auto()
+    STANDSTILL = auto()
     STALE = auto()
     PROTECTIVE_STOP = auto()
     EMERGENCY_STOP = auto()
@@ -151,7 +152,7 @@ STOP_PROGRAM_AFTER = frozenset(
         GoalSignal.PROTECTIVE_STOP,
         GoalSignal.EMERGENCY_STOP,
         GoalSignal.UNANSWERED,
-        GoalSignal.STALLED,
+        GoalSignal.STANDSTILL,
     }
 )
 
@@ -192,7 +193,7 @@ _WHILE_RUNNING: Mapping[GoalSignal, Transition] = {
     GoalSignal.PREEMPT: Transition(GoalState.CANCELLING, ErrorCode.PREEMPTED),
     GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
     GoalSignal.DEVIATION: Transition(GoalState.CANCELLING, ErrorCode.EXECUTION_FAILED),
-    GoalSignal.STALLED: _end(ErrorCode.EXECUTION_FAILED),
+    GoalSignal.STANDSTILL: _end(ErrorCode.EXECUTION_FAILED),
     GoalSignal.STALE: Transition(GoalState.CANCELLING, ErrorCode.CONNECTION_LOST),
 }
 

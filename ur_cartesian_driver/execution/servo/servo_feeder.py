@@ -55,7 +55,7 @@ from ur_cartesian_driver.motion.vectors import subtract6, Vector3, Vector6, vect
 
 #: The connection to the inputs, as :class:`LinkLost` names it.
 SERVO_LINK = 'RTDE inputs'
-#: A robot program that has read one of our sequence numbers so lately is not stalled, wherever the
+#: A robot program that has read one of our sequence numbers so lately does not hang, wherever the
 #: arm stands [s].
 ANSWER_TIMEOUT = 1.0
 #: The controller's target is behind the set-point that the arm is led to by about the lookahead
