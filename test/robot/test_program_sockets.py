@@ -4,8 +4,13 @@
 
 import asyncio
 import contextlib
+import fcntl
 import itertools
 import socket
+import struct
+import termios
+import threading
+from time import monotonic, sleep
 from unittest.mock import Mock
 
 import pytest
@@ -352,26 +357,53 @@ def test_the_program_is_served_to_a_request_in_pieces_and_to_the_next_caller():
     asyncio.run(scene())
 
 
-def read_until_pause(port):
+def read_until_pause(port, sent):
     """Fetch the program as the External Control node does: it stops when nothing is waiting."""
     with socket.create_connection((HOST, port), timeout=5.0) as node:
         node.sendall(REQUEST)
-        received = node.recv(8192)
+        assert sent.wait(5.0)
         node.setblocking(False)
+        received = b''
         with contextlib.suppress(BlockingIOError):
             while data := node.recv(8192):
                 received += data
         return received
 
 
-def test_a_reader_that_stops_at_the_first_pause_gets_the_whole_program():
+def wait_until_acknowledged(sock):
+    """Wait until the system of the other side has all that was given to ours."""
+    deadline = monotonic() + 5.0
+    while struct.unpack('i', fcntl.ioctl(sock.fileno(), termios.TIOCOUTQ, bytes(4)))[0]:
+        assert monotonic() < deadline
+        sleep(0.001)
+
+
+def test_a_reader_that_stops_at_the_first_pause_gets_the_whole_program(monkeypatch):
+    """It has all that one call of ours sends: the loop does nothing more until it has read."""
+    sent, has_read = threading.Event(), threading.Event()
+
+    def send_at_once(connection, data):
+        result = at_once(connection, data)
+        wait_until_acknowledged(connection._transport.get_extra_info('socket'))
+        sent.set()
+        assert has_read.wait(5.0)
+        return result
+
+    def read(port):
+        try:
+            return read_until_pause(port, sent)
+        finally:
+            has_read.set()
+
+    at_once = transport.TcpConnection.send_at_once
+    monkeypatch.setattr(transport.TcpConnection, 'send_at_once', send_at_once)
+
     async def scene():
         async with cell() as here:
             here.sockets.render(HOST, ControllerVersion(major=5, minor=21, bugfix=0))
             port = here.sockets.ports['script_sender_port']
-            for _ in range(50):
-                program = await asyncio.to_thread(read_until_pause, port)
-                assert program.decode() == here.sockets.text + '\n'
+            program = await asyncio.to_thread(read, port)
+            assert program.decode() == here.sockets.text + '\n'
 
     asyncio.run(scene())
 
