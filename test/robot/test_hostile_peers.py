@@ -12,6 +12,7 @@ import pytest
 from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
@@ -27,6 +28,16 @@ ATTACKS = {
     'half of a result': [b'\0\0\0'],
     'nothing': [],
 }
+
+
+async def is_served_as_ever(name, reader, peer):
+    """Call after others: when the answer is there, those before have been dealt with."""
+    if name == 'script_sender_port':
+        peer.write(REQUEST)
+        assert await asyncio.wait_for(reader.readline(), 5.0) == b'the program\n'
+    else:  # turned away: the program is connected
+        with contextlib.suppress(ConnectionError):
+            assert await asyncio.wait_for(reader.read(), 5.0) == b''
 
 
 @pytest.mark.parametrize('attack', ATTACKS)
@@ -63,7 +74,10 @@ def test_a_peer_at_the_ports_does_not_get_between_driver_and_program(attack, han
                 peer.write(data)
             if hangs_up:
                 peer.transport.abort()
-        await asyncio.sleep(0.02)
+        for name, port in sockets.ports.items():
+            reader, peer = await asyncio.open_connection('127.0.0.1', port)
+            peers.append(peer)
+            await is_served_as_ever(name, reader, peer)
         program['trajectory_port'].write(struct.pack('>i', 0))
         assert await asyncio.wait_for(results.get(), 5.0) is TrajectoryResult.SUCCESS
         assert lost == []
