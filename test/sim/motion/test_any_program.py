@@ -110,6 +110,8 @@ def test_arm_never_jumps_and_comes_to_rest(recorder, program):
 @given(program=st.lists(calls, min_size=1, max_size=4))
 def test_cycles_solved_ahead_are_those_solved_one_by_one(recorder, calibrated, bound, program):
     ahead, single = recorder(calibrated=calibrated), recorder(calibrated=calibrated)
+    # A slow move takes up to 50,000 cycles: minutes, one by one. Four seconds show as much: the
+    # acceleration, the end of a batch, mostly the end of the move; the next call interrupts it.
     run(ahead, program, longest=2_000)
     with mock.patch.object(CycleBatch, 'next', return_value=None):
         run(single, program, longest=2_000)
