@@ -4,6 +4,7 @@
 
 from ur_cartesian_driver.path import digital, digital_input, mm, Path, Pose
 
+# The simulator needs the arc: ur-cartesian sim --input 'standard 3'
 TORCH, ARC_ESTABLISHED = digital(1), digital_input(3)
 
 

@@ -10,6 +10,14 @@ from ur_cartesian_driver.driver import Driver, DriverConfig, MotionHandle
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 
 
+def robot_options() -> argparse.ArgumentParser:
+    """Return a parser of the options that name the robot; the default is the simulated one."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument('--robot-ip', default='127.0.0.1')
+    parser.add_argument('--ur-type', default='ur5e')
+    return parser
+
+
 def run(
     make: Callable[[Pose], Path],
     frames: Sequence[StaticFrame] = (),
@@ -17,9 +25,7 @@ def run(
     **settings: Any,
 ) -> None:
     """Make a path from where the tool of a robot is, print its plan, and carry it out."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument('--robot-ip', default='127.0.0.1')
-    parser.add_argument('--ur-type', default='ur5e')
+    parser = robot_options()
     parser.add_argument('--plan', action='store_true', help='do not move')
     given = parser.parse_args()
     config = DriverConfig(

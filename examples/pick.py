@@ -6,6 +6,7 @@ from pathlib import Path as FilePath
 
 from ur_cartesian_driver.path import mm, Path, Pose
 
+# The simulator needs the sensor of the gripper: ur-cartesian sim --input 'standard 2'
 PRELUDE = str(FilePath(__file__).parents[1] / 'config' / 'examples' / 'gripper.script')
 
 

@@ -11,7 +11,10 @@ def tool_change(start: Pose) -> Path:
 
 
 if __name__ == '__main__':
-    with Driver(DriverConfig(robot_ip='192.168.56.101', ur_type='ur5e')) as driver:
+    from on_robot import robot_options
+
+    given = robot_options().parse_args()
+    with Driver(DriverConfig(robot_ip=given.robot_ip, ur_type=given.ur_type)) as driver:
         while True:
             driver.wait_ready(timeout=60.0)  # a person plays the program, or it comes round
             state = driver.state

@@ -12,6 +12,7 @@ from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.command_line.simulate import simulator_config
+from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterTime,
     DropFault,
@@ -66,6 +67,8 @@ def test_a_calibration_that_there_is_not_is_one_sentence(capsys):
         (['sim', '--rate', 'inf'], 'rate is inf; use'),
         (['sim', '--rate', '1e300'], 'rate is 1e+300; use 1 for real time'),
         (['sim', '--rate', '-1'], 'rate is -1.0; use'),
+        (['sim', '--input', 'standard 8'], '"standard 8" is no digital channel; use standard 0'),
+        (['sim', '--input', 'analog 0'], '"analog 0" is no digital channel'),
     ],
 )
 def test_a_number_that_means_nothing_is_one_sentence(options, sentence, capsys):
@@ -85,6 +88,10 @@ def test_options_reach_the_robot():
         'stop at 2 s',
         '--fault',
         'drop rtde',
+        '--input',
+        'standard 3',
+        '--input',
+        'tool 1',
     ]
     arguments = parser().parse_args(['sim', '--model', 'ur10e', *options])
     config = simulator_config(arguments)
@@ -94,6 +101,7 @@ def test_options_reach_the_robot():
         EventFault(action=FaultEvent.STOP, trigger=AfterTime(2.0)),
         DropFault(interface='rtde'),
     ]
+    assert assemble(config).controller.io.digital_in.packed() == 1 << 3 | 1 << 17
 
 
 def test_programs_of_a_directory_and_the_loaded_one_have_the_names_of_the_dashboard(tmp_path):

@@ -107,6 +107,8 @@ class Controller:
         self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
+        for channel in config.inputs:
+            self.io.digital_in.switch_on(channel)
         self.safety = SafetySystem(config.unlock_delay)
         self.power = ArmPower(
             RobotMode.RUNNING if config.power == 'running' else RobotMode.POWER_OFF,

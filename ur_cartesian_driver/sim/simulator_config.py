@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
+from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -99,6 +100,8 @@ class SimulatorConfig:
     faults: Sequence[Fault | str] = ()
     #: What the tool can touch, as :class:`ContactBody` or in words: 'plane 0 0 0.1 0 0 1'.
     contacts: Sequence[ContactBody | str] = ()
+    #: Digital inputs that are on from the start, such as 'standard 3'.
+    inputs: Sequence[str] = ()
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
@@ -122,6 +125,8 @@ class SimulatorConfig:
         if not all(map(isfinite, self.q)):
             raise ValueError(f'q is {self.q}; give the joint positions in radians.')
         object.__setattr__(self, 'contact_bodies', _contact_bodies(self.contacts))
+        for channel in self.inputs:
+            DigitalPort().switch_on(channel)
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
         if self.when_late not in ('skip', 'wait'):

@@ -84,6 +84,15 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
         help="what the tool can touch, in the base [m]: 'plane x y z nx ny nz' or 'box x y z dx "
         "dy dz'; may be given several times, see doc/simulation.md",
     )
+    command.add_argument(
+        '--input',
+        action='append',
+        default=[],
+        metavar='TEXT',
+        dest='inputs',
+        help="a digital input that is on: 'standard 3', 'configurable 0' or 'tool 1'; may be "
+        'given several times',
+    )
     command.add_argument('--power-off', action='store_true', help='start with the arm powered off')
     command.add_argument(
         '--local', action='store_true', help='local control: refuse scripts from the network'

@@ -10,7 +10,7 @@ the robot's manual: bit 0-127, integer and float 0-47.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from ur_cartesian_driver.motion.vectors import Vector6
 
@@ -57,6 +57,21 @@ class DigitalPort:
     standard: list[bool] = field(default_factory=lambda: [False] * STANDARD)
     configurable: list[bool] = field(default_factory=lambda: [False] * CONFIGURABLE)
     tool: list[bool] = field(default_factory=lambda: [False] * TOOL)
+
+    def switch_on(self, channel: str) -> None:
+        """
+        Switch a channel on, such as ``standard 3``.
+
+        :raises ValueError: there is no such channel.
+        """
+        side, _, pin = channel.strip().partition(' ')
+        values = {each.name: getattr(self, each.name) for each in fields(self)}.get(side, ())
+        if pin.strip() not in map(str, range(len(values))):
+            raise ValueError(
+                f'"{channel}" is no digital channel; use standard 0 to 7, configurable 0 to 7, '
+                'tool 0 or tool 1.'
+            )
+        values[int(pin)] = True
 
     def packed(self) -> int:
         """Return standard in bits 0-7, configurable in 8-15, tool in 16-17."""
