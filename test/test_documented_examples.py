@@ -8,12 +8,9 @@ line breaks; ``...`` stands for anything. ``validate`` runs as it is; ``sim`` an
 run as one cell in virtual time, where only the end of the goal is compared.
 """
 
-from itertools import takewhile
-from pathlib import Path
-import re
-import shlex
 from time import monotonic, sleep
 
+from pages import assert_shows, CHECKOUT, console_examples
 import pytest
 from robot_cell import run_cell
 
@@ -33,45 +30,34 @@ from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.faults.fault_values import AfterTime
 from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
 )
 
 ERRORS = CHECKOUT / 'doc' / 'errors.md'
+#: Tutorials whose commands need each other: test_tutorials.py runs them.
+FOLLOWED = {'tutorial_file'}
 #: Codes that no example of one goal and one robot can show.
 WITHOUT_EXAMPLE = {ErrorCode.PREEMPTED}
 
 
 def examples(document, *names):
     """Return the blocks whose first command is one of the names, as words and output."""
-    found = []
-    for body in re.findall(
-        r'^```console\n(.*?)^```$', document.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE
-    ):
-        lines = body.splitlines()
-        commands = [
-            shlex.split(line, comments=True)[1:]
-            for line in takewhile(lambda line: line.startswith('$ '), lines)
-        ]
-        if commands and commands[0][:1] == ['ur-cartesian'] and commands[0][1] in names:
-            found.append((commands, '\n'.join(lines[len(commands) :])))
-    return found
+    return [
+        (commands, shown)
+        for commands, shown in console_examples(document)
+        if commands and commands[0][:1] == ['ur-cartesian'] and commands[0][1] in names
+    ]
 
 
 def all_examples(*names):
     return [
         pytest.param(commands, shown, id=f'{document.stem}-{" ".join(commands[-1][1:])}')
         for document in sorted(CHECKOUT.glob('doc/*.md'))
+        if document.stem not in FOLLOWED
         for commands, shown in examples(document, *names)
         if 'validate' in names or len(commands) == 2
     ]
-
-
-def assert_shows(shown, came):
-    """Compare words; ``...`` in the document stands for any."""
-    parts = (re.escape(part.strip()) for part in ' '.join(shown.split()).split('...'))
-    assert re.fullmatch(' ?.*? ?'.join(parts), ' '.join(came.split())), came
 
 
 # ---- without a robot ----------------------------------------------------------------------------
