@@ -145,7 +145,7 @@ def test_a_plan_of_the_driver_can_be_written_as_a_page(planned, tmp_path):
 def test_without_viser_a_sentence_says_what_to_install(planned, monkeypatch):
     arm, made = planned
     monkeypatch.setitem(sys.modules, 'viser', None)
-    with pytest.raises(ImportError, match=r'pip install ur_cartesian_driver\[show\]'):
+    with pytest.raises(ImportError, match='pip install viser trimesh'):
         motion_page(replace(made), arm)
 
 

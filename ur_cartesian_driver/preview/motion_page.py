@@ -391,7 +391,7 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
     except ImportError as error:
         raise ImportError(
             'The page of a motion is drawn by viser, which is not installed: install it with '
-            '`pip install ur_cartesian_driver[show]`.',
+            '`pip install viser trimesh`.',
             name='viser',
         ) from error
     with redirect_stdout(io.StringIO()):  # it greets, whatever it is told
