@@ -178,7 +178,7 @@ class Segment:
     via_posture: Posture = Posture()
     arc_mode: ArcMode = ArcMode.UNCONSTRAINED
     #: About which axis the driver may turn the waypoint's pose, from ``free_min`` to ``free_max``
-    #: [rad]; both 0 = anyhow.
+    #: [rad]; both 0 = by any angle.
     free_axis: FreeAxis = FreeAxis.NONE
     free_min: float = 0.0
     free_max: float = 0.0
