@@ -2,18 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: what it prints, and its exit status."""
 
+from contextlib import nullcontext
 from io import StringIO
 import json
 import os
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import pytest
 import yaml
 
-from ur_cartesian_driver.cli import feedback_plot, main
+from ur_cartesian_driver.cli import demo, feedback_plot, main, parser
 from ur_cartesian_driver.cli.commands import goal_file
+from ur_cartesian_driver.cli.plan_commands import GoalPlanning
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
@@ -107,6 +110,22 @@ def test_validate_reads_standard_input_and_puts_a_prefix_before_names(capsys, mo
     assert main(['validate', '-', '--tf-prefix', 'left_', '-p', 'tf_prefix:=left_']) == 0
     assert main(['validate', 'postures', '-p', 'tf_prefix:=left_']) == 1
     assert 'left_base' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['', 'left'])
+def test_the_page_of_an_arm_of_the_demo_shows_its_plan(name, monkeypatch, tmp_path):
+    started = []
+
+    def process(*words, environment):
+        started.append(words)
+        return nullcontext(Mock())
+
+    monkeypatch.setattr(demo, 'process', process)
+    drawing = tmp_path / 'demo.png'
+    arm = demo.DemoArm(name=name, goal=goal_file('square'), model='ur5e', drawing=drawing)
+    demo._show(arm, {})
+    (words,) = started
+    assert GoalPlanning(parser().parse_args(words)).plan().goal.frame_id == f'{arm.tf_prefix}base'
 
 
 def test_validate_reads_pipes_as_of_a_process_substitution(capsys):

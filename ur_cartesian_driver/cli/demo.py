@@ -175,7 +175,9 @@ def _draw(arm: DemoArm, record: Path) -> None:
 
 def _show(arm: DemoArm, environment: dict[str, str]) -> None:
     """Write the page with the arm on its planned path."""
-    options = ('--tf-prefix', arm.tf_prefix, '--ur-type', arm.model)
+    options = ['--ur-type', arm.model]
+    if arm.name:  # in the goal, and for the driver that would plan it
+        options += ['--tf-prefix', arm.tf_prefix, '-p', f'tf_prefix:={arm.tf_prefix}']
     page = str(arm.drawing.with_suffix('.html'))
     with process('show', str(arm.goal), *options, '-o', page, environment=environment) as running:
         running.wait()
