@@ -319,6 +319,7 @@ class Controller:
         """End the modes and settings that end with a program."""
         self.freedrive = FreedriveState.OFF
         self.contact.force_mode = None
+        self.motion.path_offset.end_of_program()
         self.process = ProcessState()
         self.interpreter_mode.end_of_program()
         self.watchdogs.clear()

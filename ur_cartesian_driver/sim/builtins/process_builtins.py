@@ -4,79 +4,71 @@
 Functions around a process: path offset, screws, force limits, reaction to error codes.
 
 Arguments are checked as on the robot. An arm without dynamics has no wrench to limit and no torque
-to hold with, so those functions have no effect. The path offset is kept and reported but not
-applied; it ends with the program.
+to hold with, so those functions have no effect. The path offset moves the target
+(:mod:`~ur_cartesian_driver.sim.motion.controller_offset`); it ends with the program.
 """
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.vectors import Vector6, vector6
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,
     one_of,
     pose,
+    positive,
     six,
     whole,
     within,
 )
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
-from ur_cartesian_driver.sim.state.controller_state import ControllerPathOffset
+from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset, FRAMES
+from ur_cartesian_driver.sim.motion.motion_ownership import Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
-#: Frames of a path offset: base, TCP, motion, world.
-_FRAMES = (1, 2, 3, 4)
-
 
 class PathOffsetBuiltins(BuiltinGroup):
-    """A Cartesian offset on top of the moves: kept and reported, not applied."""
+    """A Cartesian offset on top of the moves."""
 
     @property
-    def _state(self) -> ControllerPathOffset:
-        return self._controller.process.path_offset
+    def _offset(self) -> ControllerPathOffset:
+        return self._controller.motion.path_offset
 
     def path_offset_enable(self) -> None:
         """Begin; limits and filter stay as they are."""
-        self._state.enabled = True
+        self._offset.enabled = True
 
-    def path_offset_disable(self, a: Value = 20) -> None:
-        """End; the offset is zero again."""
-        if number(a, 'a') <= 0.0:
-            raise RuntimeException(f'a is {a}; it must be greater than 0')
-        self._state.enabled = False
-        self._state.offsets.clear()
+    def path_offset_disable(self, a: Value = 20) -> Steps:
+        """End, and brake in joint space; return at rest."""
+        acceleration, controller = positive(a, 'a'), self._controller
+        controller.ownership.take(controller.programs.current_thread)
+        yield from controller.ownership.run(
+            lambda: controller.motion.end_path_offset(acceleration)
+        )
 
     def path_offset_set(self, offset: Value, type: Value) -> None:
         """Set the offset in a frame, cut to the limits along and about each axis."""
         frame, wanted = _frame(type), six(offset, 'offset')
-        if not self._state.enabled:
+        if not self._offset.enabled:
             raise RuntimeException('path_offset_set needs path_offset_enable before it.')
-        self._state.offsets[frame] = self._limited(wanted)
-
-    def _limited(self, offset: Vector6) -> Vector6:
-        state = self._state
-        bounds = (state.max_translation,) * 3 + (state.max_rotation,) * 3
-        return vector6(
-            max(-bound, min(bound, item)) for item, bound in zip(offset, bounds, strict=True)
-        )
+        self._offset.set(frame, wanted)
 
     def path_offset_get(self, type: Value) -> ScriptPose:
-        """Return the offset in a frame."""
-        return ScriptPose(*self._state.offsets.get(_frame(type), (0.0,) * 6))
+        """Return the offset that is applied now, in a frame."""
+        return ScriptPose(*self._offset.applied(_frame(type)))
 
     def path_offset_set_alpha_filter(self, alpha: Value) -> None:
         """Set the coefficient of the filter, 0..1."""
-        self._state.alpha = within(alpha, 'alpha', 0, 1)
+        self._offset.alpha = within(alpha, 'alpha', 0, 1)
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
         """Set the limits [m, rad]."""
-        self._state.max_translation = not_negative(transLimit, 'transLimit')
-        self._state.max_rotation = not_negative(rotLimit, 'rotLimit')
+        self._offset.max_translation = not_negative(transLimit, 'transLimit')
+        self._offset.max_rotation = not_negative(rotLimit, 'rotLimit')
 
 
 def _frame(type: Value) -> int:
-    return one_of(type, 'type', _FRAMES)
+    return one_of(type, 'type', FRAMES)
 
 
 class ProcessBuiltins(BuiltinGroup):

@@ -110,6 +110,20 @@ class ArmTarget:
         self.qd = self.tcp_twist = STILL
         self._still_for += self.cycle
 
+    def copy(self) -> ArmTarget:
+        """Return a target that is where this one is."""
+        other = ArmTarget(self.arm, self.cycle, self.q)
+        other.T_flange_tcp = self._T_flange_tcp
+        other.activate_tcp()
+        other.take_over(self)
+        return other
+
+    def take_over(self, other: ArmTarget) -> None:
+        """Be where another target is, and move as it does."""
+        self.q, self.qd, self.qdd = other.q, other.qd, other.qdd
+        self.T_base_tcp, self.tcp_twist = other.T_base_tcp, other.tcp_twist
+        self._still_for = other._still_for
+
     def teleport(self, q: Vector6) -> None:
         """Stand at joint positions [rad] without having moved there."""
         self.q, self.qd, self.qdd = q, STILL, STILL

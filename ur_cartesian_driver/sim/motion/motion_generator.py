@@ -21,6 +21,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion
 from ur_cartesian_driver.sim.motion.joint_kinematics import (
     MAX_JOINT_ACCELERATION,
@@ -56,6 +57,7 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     JointStopMotion,
     ServoLikeMotion,
     ServoMotion,
+    SetpointMotion,
     StopMotion,
     ToolSpeedMotion,
     ToolStopMotion,
@@ -84,7 +86,9 @@ class MotionGenerator:
         self.max_tool_speed = MAX_TOOL_SPEED
         #: How fast movel turns the tool for each m/s of its speed [rad/s].
         self.turn_ratio = 1.0
+        #: The target of the motion, and what a program adds to it.
         self._target = ArmTarget(arm, cycle, q)
+        self.path_offset = ControllerPathOffset(self._target)
         self._active = RunningMotion(self._target)
         self._reports = MotionReports()
         self._paths = PathQueue(self._target, self._active, self._reports)
@@ -95,29 +99,34 @@ class MotionGenerator:
     # -- state -------------------------------------------------------------------------------
 
     @property
+    def _displaced(self) -> ArmTarget:
+        """The target with the path offset."""
+        return self.path_offset.target or self._target
+
+    @property
     def q(self) -> Vector6:
         """Joint positions [rad]."""
-        return self._target.q
+        return self._displaced.q
 
     @property
     def qd(self) -> Vector6:
         """Joint speeds [rad/s]."""
-        return self._target.qd
+        return self._displaced.qd
 
     @property
     def qdd(self) -> Vector6:
         """Joint accelerations [rad/s^2]."""
-        return self._target.qdd
+        return self._displaced.qdd
 
     @property
     def T_base_tcp(self) -> Pose:
         """Pose of the TCP."""
-        return self._target.T_base_tcp
+        return self._displaced.T_base_tcp
 
     @property
     def tcp_twist(self) -> Vector6:
         """Twist of the TCP in base axes [m/s, rad/s]."""
-        return self._target.tcp_twist
+        return self._displaced.tcp_twist
 
     @property
     def T_flange_tcp(self) -> Pose:
@@ -127,6 +136,8 @@ class MotionGenerator:
     @T_flange_tcp.setter
     def T_flange_tcp(self, pose: Pose) -> None:
         self._target.T_flange_tcp = pose
+        if self.path_offset.target is not None:
+            self.path_offset.target.T_flange_tcp = pose
 
     @property
     def moving(self) -> bool:
@@ -146,7 +157,7 @@ class MotionGenerator:
     @property
     def steady(self) -> bool:
         """Whether the target has stood still for half a second."""
-        return self._target.steady
+        return self._displaced.steady
 
     @property
     def fault(self) -> MotionFault | None:
@@ -291,7 +302,14 @@ class MotionGenerator:
             return self.stopj(a)
         return self._replace(self._active.tool_stop(a, a if a_rot is None else a_rot))
 
+    def end_path_offset(self, a: float) -> Move:
+        """Brake in joint space at ``a`` [rad/s^2], and go on without a path offset from there."""
+        self.path_offset.end()
+        return self._replace(JointStopMotion(self._target.q, self._target.qd, a))
+
     def _replace(self, motion: ServoLikeMotion) -> Move:
+        if self.path_offset.target is not None and isinstance(motion, SetpointMotion):
+            self.path_offset.end_displacement()
         self._paths.clear()
         return self._active.replace(motion)
 
@@ -314,6 +332,7 @@ class MotionGenerator:
     def teleport(self, q: Vector6) -> None:
         """Stand at ``q`` [rad] without having moved there."""
         self._target.teleport(q)
+        self.path_offset.forget()
         self._active.motion = self._active.move = None
         self._paths.clear()
 
@@ -330,6 +349,18 @@ class MotionGenerator:
             active.hold()
         else:
             self._advance(active.motion)
+        if self.path_offset.is_active:
+            self._displace()
+
+    def _displace(self) -> None:
+        """Add the path offset to the target of this cycle."""
+        motion, offset = self._active.motion, self.path_offset
+        if self.fault is not None:
+            offset.hold()
+            return
+        self._reports.fault = offset.step(
+            moving=self.moving, is_led=isinstance(motion, SetpointMotion)
+        )
 
     def _advance(self, motion: Motion) -> None:
         active, cycle = self._active, self.cycle

@@ -41,22 +41,9 @@ class Pendant:
 
 
 @dataclass(slots=True, kw_only=True)
-class ControllerPathOffset:
-    """A Cartesian offset on top of the moves; the limits are a robot's defaults."""
-
-    enabled: bool = False
-    #: Frame -> offset [m, rad].
-    offsets: dict[int, Vector6] = field(default_factory=dict)
-    alpha: float = 1.0
-    max_translation: float = 0.1
-    max_rotation: float = 0.52
-
-
-@dataclass(slots=True, kw_only=True)
 class ProcessState:
     """Process settings of a program; they end with it."""
 
-    path_offset: ControllerPathOffset = field(default_factory=ControllerPathOffset)
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
