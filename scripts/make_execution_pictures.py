@@ -179,7 +179,7 @@ def draw_press() -> Path:
     return drawing
 
 
-async def a_tracked_seam(cell: Any) -> list[tuple[float, ...]]:
+async def a_tracked_seam(cell: Any, execution: str) -> list[tuple[float, ...]]:
     """Follow a seam that is bent by 5 mm, on the way back by a sensor that jumps."""
     from math import pi, sin
 
@@ -190,7 +190,7 @@ async def a_tracked_seam(cell: Any) -> list[tuple[float, ...]]:
     rows: list[tuple[float, ...]] = []
     x, y, _ = cell.memory.read().actual_tcp_pose.position
     setup = ArmSetup.of(Arm(robot_model(cell.robot.config.model)))
-    running = asyncio.ensure_future(a_goal('tracked_seam', arm=setup)(cell))
+    running = asyncio.ensure_future(a_goal('tracked_seam', execution=execution, arm=setup)(cell))
     asked = nan
     while not running.done():
         place = cell.memory.read().actual_tcp_pose.position
@@ -215,13 +215,16 @@ def draw_path_offset() -> Path:
     from robot_cell import run_cell
 
     drawing = CHECKOUT / 'doc' / 'execution_path_offset.png'
-    time, asked, beside = np.array(run_cell(a_tracked_seam)).T
     figure, axes = pyplot.subplots(figsize=(9.0, 3.2))
-    axes.plot(time - time[0], asked, color='#9aa5b1', label='offset that came')
-    axes.plot(time - time[0], beside, color='#c8372d', label='tool')
+    for execution, color in (('PRIMITIVES', '#1f77b4'), ('SERVO', '#c8372d')):
+        rows = run_cell(partial(a_tracked_seam, execution=execution))
+        time, asked, beside = np.array(rows).T
+        if execution == 'PRIMITIVES':
+            axes.plot(time - time[0], asked, color='#9aa5b1', label='offset that came')
+        axes.plot(time - time[0], beside, color=color, label=f'tool, {execution}')
     axes.set(xlabel='time [s]', ylabel='across the path [mm]')
     axes.set_title('A seam bent by 5 mm; then a sensor that jumps (path_offset)')
-    axes.legend(loc='upper right')
+    axes.legend(loc='upper right', bbox_to_anchor=(0.5, 1.0))
     figure.tight_layout()
     figure.savefig(drawing, dpi=100)
     compress(drawing)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from servo_cell import GuideCell
 
-from ur_cartesian_driver.execution.goal.goal_commands import EnterServo, Finish, WriteServo
+from ur_cartesian_driver.execution.goal.goal_commands import EnterServo, Finish, WriteInputs
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -99,7 +99,7 @@ def drive(slider=1.0, cancel_after=None):
         seen.commands += commands
         seen.motion.append(goal.feeder.stream.motion_time)
         seen.q.append(cell.q)
-        rows = [command.values for command in commands if isinstance(command, WriteServo)]
+        rows = [command.values for command in commands if isinstance(command, WriteInputs)]
         return rows[-1] if rows else None
 
     cell.controller.set_slider(slider)

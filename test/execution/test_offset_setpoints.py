@@ -77,12 +77,12 @@ class Drive:
     def run(self, seconds, *, dt=STEP, pause=STEP):
         for _ in range(round(seconds / pause)):
             self.time += pause
-            self.setpoints.update(self.time)
+            self.setpoints.requests.update(self.time)
             self.joints.append(self.setpoints.next(dt))
             self.places.append(np.array(ARM.forward(self.joints[-1]).position) - self._start)
 
     def offset(self, *offset, age=0.0):
-        self.setpoints.set_offset(offset, age, self.time)
+        self.setpoints.requests.set_offset(offset, age, self.time)
 
     @property
     def place(self):
@@ -125,10 +125,12 @@ def random_stream(seed):
             )
             if rng.random() < 0.5:
                 offset = tuple(rng.uniform(-1.0, 1.0) * limit for limit in limits)
-            setpoints.set_offset(offset, rng.choice((0.0, 0.0, 0.1, 5.0, -1.0, nan)), time)
+            setpoints.requests.set_offset(
+                offset, rng.choice((0.0, 0.0, 0.1, 5.0, -1.0, nan)), time
+            )
         elif rng.random() < 0.003:
             time += rng.uniform(0.0, 1.0)  # a gap
-        setpoints.update(time)
+        setpoints.requests.update(time)
         step = STEP * rng.choice((1, 1, 1, 2))  # one that catches up stands for two
         values.append(setpoints.next(step)[:3])
         motion += step
@@ -176,7 +178,7 @@ def test_a_stale_offset_stays_or_fades(on_stale, there):
     assert drive.place == [0.0, 3.0, 0.0]
     drive.run(0.8)
     assert drive.place == [0.0, there, 0.0]
-    assert 'the path offset was stale once: older than 0.3 s' in drive.setpoints.report
+    assert 'the path offset was stale once: older than 0.3 s' in drive.setpoints.requests.report
     drive.offset(0.0, 0.001, 0.0)
     drive.run(0.28)
     assert drive.place == [0.0, 1.0, 0.0], 'a newer one counts'
@@ -206,7 +208,9 @@ def test_what_is_old_or_no_number_is_ignored():
         drive.offset(*offset, age=age)
     drive.run(0.25)
     assert drive.place == [0.0, 2.0, 0.0]
-    assert any(line.startswith('5 path offsets came after') for line in drive.setpoints.report)
+    assert any(
+        line.startswith('5 path offsets came after') for line in drive.setpoints.requests.report
+    )
 
 
 def test_a_motion_that_is_held_holds_the_offset():

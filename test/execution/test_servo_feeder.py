@@ -14,14 +14,14 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     LeaveServo,
     OpenServo,
     SetTemporaryTcp,
-    WriteServo,
+    WriteInputs,
 )
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
+    INPUTS_LINK,
     LinkLost,
     PreemptRequested,
     ServoReceived,
@@ -112,7 +112,7 @@ class Cell:
     def _take(self, commands):
         self.commands += commands
         for command in commands:
-            if isinstance(command, WriteServo):
+            if isinstance(command, WriteInputs):
                 self.row = command.values
 
     def event(self, event):
@@ -161,17 +161,17 @@ def test_a_goal_arrives_and_gives_the_inputs_back():
     assert cell.outcome.code is ErrorCode.SUCCESSFUL, cell.outcome
     kinds = [type(command) for command in cell.commands]
     assert kinds[0] is OpenServo
-    assert kinds.index(WriteServo) < kinds.index(EnterServo)
+    assert kinds.index(WriteInputs) < kinds.index(EnterServo)
     assert kinds.count(LeaveServo) == 1
     assert kinds.index(LeaveServo) < kinds.index(Finish)
-    modes = [c.values[0] for c in cell.commands if isinstance(c, WriteServo)]
+    modes = [c.values[0] for c in cell.commands if isinstance(c, WriteInputs)]
     assert (modes[0], modes[-1]) == (0, 0)
     assert cell.joint == pytest.approx(LENGTH)
 
 
 def test_inputs_of_another_client_end_the_goal_before_anything_moves():
     cell = Cell(machine())
-    cell.event(LinkLost(link=SERVO_LINK, reason='the inputs are in use by another client.'))
+    cell.event(LinkLost(link=INPUTS_LINK, reason='the inputs are in use by another client.'))
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
     assert cell.outcome.text == (
         'The robot does not take set-points: the inputs are in use by '
@@ -185,7 +185,7 @@ def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
     cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
     assert 'did not answer through its registers' in cell.outcome.text
-    assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
+    assert {c.values[0] for c in cell.commands if isinstance(c, WriteInputs)} == {0}
 
 
 @pytest.mark.parametrize('T_flange_tcp', [None, NOZZLE])
@@ -196,7 +196,7 @@ def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
     assert 'A joint is 0.0500 rad away' in cell.outcome.text
     assert 'the arm was moved meanwhile' in cell.outcome.text
-    assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
+    assert {c.values[0] for c in cell.commands if isinstance(c, WriteInputs)} == {0}
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_a_wish_is_written_at_once_and_answered_by_leaving(event, code):
     for _ in range(60):
         cell.cycle()
     cell.event(event)
-    assert isinstance(cell.commands[-1], WriteServo)
+    assert isinstance(cell.commands[-1], WriteInputs)
     assert cell.commands[-1].values[0] == 0
     assert cell.goal.state is GoalState.CANCELLING
     cell.cycle(speed=1.0)
@@ -243,9 +243,11 @@ def test_a_program_that_takes_the_place_of_a_lost_one_finds_no_setpoints_in_the_
 
 def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
     cell = Cell(machine()).until(GoalState.MOVING)
-    cell.event(LinkLost(link=SERVO_LINK, reason='it closed'))
+    cell.event(LinkLost(link=INPUTS_LINK, reason='it closed'))
     assert cell.outcome.code is ErrorCode.CONNECTION_LOST
-    assert [type(c) for c in cell.commands if not isinstance(c, WriteServo)].count(LeaveServo) == 1
+    assert [type(c) for c in cell.commands if not isinstance(c, WriteInputs)].count(
+        LeaveServo
+    ) == 1
 
 
 @pytest.mark.slow
@@ -302,7 +304,7 @@ EVENTS = st.one_of(
     st.sampled_from([TrajectoryEnded(result=result) for result in TrajectoryResult]),
     st.sampled_from([CancelRequested(), PreemptRequested()]),
     st.sampled_from(
-        [LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', SERVO_LINK)]
+        [LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', INPUTS_LINK)]
     ),
 )
 
@@ -360,7 +362,7 @@ EACH = [
     CancelRequested(),
     PreemptRequested(),
     *(TrajectoryEnded(result=result) for result in TrajectoryResult),
-    *(LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', SERVO_LINK)),
+    *(LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', INPUTS_LINK)),
 ]
 
 

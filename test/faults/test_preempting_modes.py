@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 #: An arm that is held off its path is not where the next goal could begin, one that rests at a
 #: point does not move, nor does one in a function, one that presses stops as PRIMITIVES do, and
-#: one whose path has given way as SERVO does.
+#: one whose path has given way as without.
 KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
 LEFT_OUT = (
     'Waiting for the arm',
@@ -24,6 +24,7 @@ LEFT_OUT = (
     'Scripts',
     'Press',
     'Path offset',
+    'Path offset, PRIMITIVES',
 )
 for left_out in LEFT_OUT:
     del KINDS[left_out]

@@ -23,16 +23,23 @@ OPTIONS = PlanningOptions(self_collision='off')
 SIDEWAYS = PathOffset(limits=(0.0, 0.005, 0.004), speed=0.05, acceleration=0.5)
 
 
-def goal(*points, path_offset=SIDEWAYS, **fields):
-    return Goal(waypoints=points, execution=ExecutionMode.SERVO, path_offset=path_offset, **fields)
+#: Who offsets the path: the driver its set-points, or the controller its motions.
+both_modes = pytest.mark.parametrize(
+    'mode', [ExecutionMode.SERVO, ExecutionMode.PRIMITIVES], ids=lambda mode: mode.name
+)
+
+
+def goal(*points, path_offset=SIDEWAYS, mode=ExecutionMode.SERVO, **fields):
+    return Goal(waypoints=points, execution=mode, path_offset=path_offset, **fields)
 
 
 def band_of(cell, *points, **fields):
     return plan(goal(*points, **fields), cell.state, cell.arm, OPTIONS).offset_band
 
 
-def test_the_frame_is_that_of_the_controllers_own_offsets(cell):
-    band = band_of(cell, cell.point(y=0.1, time=2.0))
+@both_modes
+def test_the_frame_is_that_of_the_controllers_own_offsets(cell, mode):
+    band = band_of(cell, cell.point(y=0.1, time=2.0), mode=mode)
     tool_z = np.array(rotate(cell.home.quaternion, (0.0, 0.0, 1.0)))
     for row in (0, 100, -1):
         along, across, normal = band.axes[row]
@@ -46,21 +53,22 @@ def test_the_frame_is_that_of_the_controllers_own_offsets(cell):
     )
 
 
-def test_the_offset_fades_out_before_the_end_and_before_a_corner(cell):
+@both_modes
+def test_the_offset_fades_out_before_the_end_and_before_a_corner(cell, mode):
     corner = cell.point(y=0.1, time=2.0), cell.point(x=0.1, y=0.1, time=4.0)
-    band = band_of(cell, *corner)
+    band = band_of(cell, *corner, mode=mode)
     open_times = np.flatnonzero(band.is_open) * band.step
     assert open_times[0] == 0.0
     gaps = np.flatnonzero(np.diff(open_times) > 2 * band.step)
     ((last, first),) = [(open_times[k], open_times[k + 1]) for k in gaps]
     fading = 0.005 / 0.05 + 2 * 0.05 / 0.5
-    assert last < 2.0 - fading, 'in time'
+    assert 2.0 - 3 * fading < last < 2.0 - fading, 'in time'
     assert 2.0 < first < 2.5
     assert 4.0 - 3 * fading < open_times[-1] < 4.0 - fading
     # Straight on, nothing closes: not even where the arm rests.
     straight = cell.point(y=0.1, time=2.0), cell.point(y=0.2, time=4.5)
     rests = (Segment(dwell=0.5), Segment())
-    band = band_of(cell, *straight, segments=rests)
+    band = band_of(cell, *straight, segments=rests, mode=mode)
     assert (np.diff(np.flatnonzero(band.is_open)) == 1).all()
 
 
@@ -96,7 +104,8 @@ def test_the_report_names_bounds_and_gaps(cell):
     ],
     ids=['plane', 'singularity', 'joint speed'],
 )
-def test_a_band_in_which_the_arm_cannot_be_is_refused(cell, options, offset, error, text):
+@both_modes
+def test_a_band_in_which_the_arm_cannot_be_is_refused(cell, options, offset, error, text, mode):
     arm = cell.arm
     if error is TooFast:
         limits = (0.15,) * 6
@@ -106,14 +115,15 @@ def test_a_band_in_which_the_arm_cannot_be_is_refused(cell, options, offset, err
         name: tuple(each.format(low=low) for each in value) if isinstance(value, tuple) else value
         for name, value in options.items()
     }
-    asked = goal(cell.point(y=0.1, time=8.0), path_offset=replace(SIDEWAYS, **offset))
+    asked = goal(cell.point(y=0.1, time=8.0), path_offset=replace(SIDEWAYS, **offset), mode=mode)
     with pytest.raises(error, match=text):
         plan(asked, cell.state, arm, replace(OPTIONS, **options))
     plan(replace(asked, path_offset=PathOffset()), cell.state, arm, replace(OPTIONS, **options))
 
 
-def test_offsets_count_against_the_speed_of_the_tool(cell):
-    asked = goal(cell.point(y=0.1, time=2.0))  # up to 0.075 m/s
+@both_modes
+def test_offsets_count_against_the_speed_of_the_tool(cell, mode):
+    asked = goal(cell.point(y=0.1, time=2.0), mode=mode)  # up to 0.075 m/s
     with pytest.raises(
         TooFast, match=r'with offsets at up to 0\.1\d\d m/s, more than max_tool_speed'
     ):
@@ -122,22 +132,24 @@ def test_offsets_count_against_the_speed_of_the_tool(cell):
         plan(fine, cell.state, cell.arm, replace(OPTIONS, max_tool_speed=bound))
 
 
-def test_a_self_collision_in_the_band_warns_once_where_it_does_not_refuse(cell):
+@both_modes
+def test_a_self_collision_in_the_band_warns_once_where_it_does_not_refuse(cell, mode):
     options = replace(OPTIONS, self_collision='warn', min_clearance=0.08)
-    made = plan(goal(cell.point(y=0.1, time=2.0)), cell.state, cell.arm, options)
+    made = plan(goal(cell.point(y=0.1, time=2.0), mode=mode), cell.state, cell.arm, options)
     (line,) = [line for line in made.report if line.startswith('with a path offset of')]
     assert 'come within' in line
     assert 'less than min_clearance = 0.0800 m' in line
 
 
-def test_a_band_out_of_reach_is_refused(cell):
+@both_modes
+def test_a_band_out_of_reach_is_refused(cell, mode):
     # Towards the stretched arm, as far as it may go.
     far = next(
         point
         for x in np.arange(-0.5, 0.0, 0.01)
         if (point := _reached(cell, cell.point(x=float(x), time=20.0)))
     )
-    asked = goal(far, path_offset=PathOffset(limits=(0.1, 0.1, 0.1)))
+    asked = goal(far, path_offset=PathOffset(limits=(0.1, 0.1, 0.1)), mode=mode)
     with pytest.raises((Unreachable, NearSingularity), match='With a path offset of along'):
         plan(asked, cell.state, cell.arm, OPTIONS)
 
@@ -163,3 +175,17 @@ def test_a_path_that_can_give_way_nowhere_is_refused(cell, changes, time, text):
     )
     with pytest.raises(InvalidGoal, match=text):
         plan(goal(there), cell.state, cell.arm, OPTIONS)
+
+
+def test_in_a_blend_the_path_takes_offsets_only_if_it_turns_slowly(cell):
+    def gaps(radius, speed):
+        segments = (
+            Segment(velocity=speed, blend_radius=radius),
+            Segment(velocity=speed),
+        )
+        points = cell.point(y=0.15), cell.point(x=0.15, y=0.15)
+        band = band_of(cell, *points, segments=segments, mode=ExecutionMode.PRIMITIVES)
+        return np.count_nonzero(np.diff(band.is_open.astype(int)) == -1)
+
+    assert gaps(0.07, 0.02) == 1, 'the end'
+    assert gaps(0.005, 0.1) == 2, 'the blend and the end'

@@ -805,13 +805,24 @@ REFUSALS = [
         NotAvailable,
         'path_offset is set, but the end of a goal with keep_open, where an offset has to be gone',
     ),
-    *(
-        (
-            replace(TIMED, execution=mode, path_offset=PathOffset(limits=SIDEWAYS)),
-            NotAvailable,
-            f'path_offset is set, but the robot has the path of a {mode.name} goal before it',
-        )
-        for mode in (ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE)
+    (
+        replace(SPLINE, path_offset=PathOffset(limits=SIDEWAYS)),
+        NotAvailable,
+        'path_offset is set, but in a SPLINE goal the robot program leads the joints',
+    ),
+    (
+        replace(pressing(), path_offset=PathOffset(limits=SIDEWAYS)),
+        NotAvailable,
+        'path_offset is set, but the goal presses too, and the controller must not offset',
+    ),
+    (
+        replace(
+            PLAIN,
+            segments=(Segment(), Segment(type=SegmentType.OPTIMIZED_LINEAR), Segment()),
+            path_offset=PathOffset(limits=SIDEWAYS),
+        ),
+        NotAvailable,
+        'path_offset is set, but segments[1].type is OPTIMIZED: the robot chooses the speed',
     ),
 ]
 
@@ -910,6 +921,23 @@ def test_optimized_moves_need_a_software_that_knows_them(kind):
     check(goal, PlanningOptions())
     with pytest.raises(NotAvailable, match=r'segments\[0\]\.type is OPTIMIZED.*5\.21'):
         check(goal, PlanningOptions(optimove_known=False))
+
+
+@pytest.mark.parametrize(
+    ('options', 'text'),
+    [
+        ({'path_offset_known': False}, r"the robot's software is not known to have .* 5\.6"),
+        ({'dialect': DIALECTS['2.12']}, r'robot programs of wire dialect 2\.12 add no offsets'),
+    ],
+)
+def test_path_offsets_of_the_controller_need_a_software_and_a_program_that_have_them(
+    options, text
+):
+    goal = replace(PLAIN, path_offset=PathOffset(limits=SIDEWAYS))
+    check(goal, OPTIONS)
+    with pytest.raises(NotAvailable, match=text):
+        check(goal, replace(OPTIONS, **options))
+    check(replace(TIMED, execution=ExecutionMode.SERVO), replace(OPTIONS, path_offset_known=False))
 
 
 @pytest.mark.parametrize(

@@ -96,13 +96,20 @@ def test_statements_contain_no_numbers_of_the_protocol():
         ('optimove', (5, 21, 0), True),
         ('optimove', (10, 7, 9), False),
         ('optimove', (10, 8, 0), True),
+        ('path_offset', (3, 15, 8), False),
+        ('path_offset', (5, 6, 0), True),
+        ('path_offset', (10, 12, 0), False),
         ('target_payload', (3, 15, 8), False),
         ('target_payload', (5, 10, 0), True),
     ],
 )
 def test_functions_are_called_only_if_the_controller_has_them(feature, version, known):
     assert has_feature(feature, version) == known
-    name = {'optimove': 'optimovej(', 'target_payload': 'set_target_payload('}[feature]
+    name = {
+        'optimove': 'optimovej(',
+        'path_offset': 'path_offset_',
+        'target_payload': 'set_target_payload(',
+    }[feature]
     assert (name in text(version=version)) == known
     assert feature in FEATURES
 
@@ -157,7 +164,7 @@ def test_a_fraction_after_an_int_is_found(widened):
 def test_handles_of_threads_are_killed_and_not_compared():
     """What a controller makes of a handle beside a number is written nowhere."""
     handles = re.findall(r'(\w+) = run ', text())
-    assert len(handles) == 6
+    assert len(handles) == 7
     for handle in handles:
         assert re.search(rf'kill {handle}\b', text())
         assert not re.search(rf'\b{handle} *[!=]=|[!=]= *{handle}\b', text())

@@ -88,6 +88,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
     assert options - set(defaults()) == {
         'calibration_known',
         'optimove_known',
+        'path_offset_known',
         'acceleration_known',
         'dialect',
         'prelude',

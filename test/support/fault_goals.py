@@ -429,6 +429,36 @@ class OffsetGoal(ServoGoal):
         return self.fraction() > 0.5 and hypot(x, y - RADIUS) < RADIUS - 0.9 * SIDEWAYS
 
 
+@lru_cache
+def displaced_line(start):
+    """Return the plan of a line that may be left by 2 mm to its sides."""
+    return planned(
+        start.state,
+        ((0.0, 2.0 * SIDE, 0.0),),
+        0.06,
+        0.5,
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+        safe_outputs=SAFE_OUTPUTS,
+        path_offset=PathOffset(limits=(0.0, SIDEWAYS, 0.0), speed=0.02, acceleration=0.5),
+    )
+
+
+class OffsetMoveGoal(FaultGoal):
+    """A line by the controller, beside which the tool moves because an offset came once."""
+
+    def plan_from(self, start):
+        return displaced_line(start)
+
+    def is_in(self, phase):
+        assert phase == 'beside its path'
+        motion = len(self.cell.owner.motions)
+        self.cell.owner.send(SetPathOffset(motion=motion, offset=(0.0, SIDEWAYS, 0.0), age=0.0))
+        x, y = self.tool_offset()
+        return y > 0.5 * SIDE and abs(x) > 0.9 * SIDEWAYS
+
+
 #: Pins of the outputs switched at the second corner and after the end, and the delay of the
 #: latter [s].
 AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
@@ -759,6 +789,7 @@ GOALS = {
     'SERVO': ServoGoal,
     'Waiting for the arm': WaitingGoal,
     'Path offset': OffsetGoal,
+    'Path offset, PRIMITIVES': OffsetMoveGoal,
     'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,

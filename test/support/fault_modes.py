@@ -353,6 +353,27 @@ PATH_OFFSET = _mode(
     pendant=('protective stop',),
 )
 
+PATH_OFFSET_MOVES = _mode(
+    'Path offset, PRIMITIVES',
+    'A line with `path_offset`; an offset has moved the tool 2 mm to the side, by the path offset '
+    'of the controller. Whatever ends the goal, the arm brakes where it is, beside the path; a '
+    'pause and the slider keep it there.',
+    {'beside its path': 'on the line, the path has given way'},
+    2.2,
+    {},
+    faults=(
+        'protective stop',
+        'an operator pauses the program',
+        'an operator stops the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'RTDE is cut',
+        'the pose is measured 6 mm off',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
 OUTPUTS = _mode(
     'Outputs',
     'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
@@ -535,6 +556,7 @@ MODES = (
     SERVO,
     WAITING,
     PATH_OFFSET,
+    PATH_OFFSET_MOVES,
     APPEND,
     OUTPUTS,
     AT_A_POINT,

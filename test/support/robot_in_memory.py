@@ -111,13 +111,20 @@ class RobotInMemory:
         )
 
     def run(
-        self, primitives, *, data=None, announced_count=None, on_cycle=lambda controller: None
+        self,
+        primitives,
+        *,
+        data=None,
+        announced_count=None,
+        on_cycle=lambda controller: None,
+        takes_offsets=False,
     ):
         """
         Send the primitives as the driver does, and wait for the end of the motion.
 
         :param data: sent instead of their bytes; ``announced``: instead of their number.
         :param on_cycle: called after each cycle.
+        :param takes_offsets: whether the path gives way to offsets in registers.
         """
         self._socket(TRAJECTORY).feed(encode_points(primitives) if data is None else data)
         self._command(
@@ -125,6 +132,7 @@ class RobotInMemory:
                 TrajectoryAction.START,
                 len(primitives) if announced_count is None else announced_count,
                 read_timeout=0,
+                takes_offsets=takes_offsets,
             )
         )
         results, motion = TrajectoryResultDecoder(), self.controller.motion

@@ -19,7 +19,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     HandshakeDone,
     RtdeClientCodec,
 )
-from ur_cartesian_driver.robot.rtde.servo_connection import feedback_from_rtde, SERVO_FIELDS
+from ur_cartesian_driver.robot.rtde.register_connection import feedback_from_rtde, SERVO_FIELDS
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession

@@ -457,6 +457,7 @@ class Driver(RobotServices, InteractiveMotions):
             allow_tcp_change=self.options.allow_tcp_change
             and self.config.dialect.supports_tcp_change,
             optimove_known=has_feature('optimove', status.software()),
+            path_offset_known=has_feature('path_offset', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None,
         )

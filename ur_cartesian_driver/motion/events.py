@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
 from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.motion.offset_band import OffsetFeedback
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback
@@ -59,6 +60,10 @@ class PreemptRequested:
     by: str = 'a newer motion'
 
 
+#: The connection to the RTDE inputs, as :class:`LinkLost` names it.
+INPUTS_LINK = 'RTDE inputs'
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkLost:
     """A connection that the motion needs is gone; the reason is a clause for the error text."""
@@ -80,6 +85,13 @@ class ServoReceived:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetReceived:
+    """The robot program reported the path offset of its trajectory."""
+
+    feedback: OffsetFeedback
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OutputsSecured:
     """The outputs that have to be safe were written to the robot, as far as possible."""
 
@@ -92,6 +104,7 @@ class OutputsSecured:
 Event: TypeAlias = (
     StateReceived
     | ServoReceived
+    | OffsetReceived
     | TrajectoryEnded
     | CancelRequested
     | PreemptRequested

@@ -49,6 +49,8 @@ class ModeTraits:
     streams_setpoints: bool
     #: Whether ``io_commands`` are carried out.
     switches_outputs: bool
+    #: Whether the path can give way to offsets that come while the arm moves (``path_offset``).
+    takes_offsets: bool
 
 
 #: All modes but AUTO.
@@ -59,6 +61,7 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=False,
         streams_setpoints=False,
         switches_outputs=True,
+        takes_offsets=True,
     ),
     ExecutionMode.SPLINE: ModeTraits(
         planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
@@ -66,6 +69,7 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=True,
         streams_setpoints=False,
         switches_outputs=True,
+        takes_offsets=False,
     ),
     ExecutionMode.SERVO: ModeTraits(
         planner='ur_cartesian_driver.planning.planner:plan_spline_goal',
@@ -73,5 +77,6 @@ EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
         is_spline=True,
         streams_setpoints=True,
         switches_outputs=False,
+        takes_offsets=True,
     ),
 }

@@ -36,6 +36,17 @@ class AppliedOffset(NamedTuple):
 NO_OFFSET = AppliedOffset()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetFeedback:
+    """One packet of the robot program about the offset that the controller adds to its motion."""
+
+    #: The last sequence number that it has read.
+    last_sequence: int
+    #: Along, across, normal; and what the controller applies, in the base [m].
+    offset: Vector3
+    shift: Vector3
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OffsetBand:
     """How far a path may give way, and where."""
@@ -55,13 +66,17 @@ class OffsetBand:
     #: (n,) whether the path may give way there; if not, the offset fades out.
     is_open: NDArray[np.bool_]
 
-    def shift(self, time: float, offset: Vector3) -> Vector3:
-        """Return an offset at a time of the motion [s] in the base."""
+    def axes_at(self, time: float) -> NDArray[np.float64]:
+        """Return the axes at a time of the motion [s] in the base (3 axes, 3)."""
         row = min(max(time / self.step, 0.0), len(self.axes) - 1.0)
         k = min(int(row), len(self.axes) - 2)
         part = row - k
-        before, after = offset @ self.axes[k : k + 2]
-        return vector3(((1.0 - part) * before + part * after).tolist())
+        axes: NDArray[np.float64] = (1.0 - part) * self.axes[k] + part * self.axes[k + 1]
+        return axes
+
+    def shift(self, time: float, offset: Vector3) -> Vector3:
+        """Return an offset at a time of the motion [s] in the base."""
+        return vector3((offset @ self.axes_at(time)).tolist())
 
     def opens(self, time: float) -> bool:
         """Tell whether the path may give way at a time of the motion [s]."""

@@ -134,7 +134,7 @@ class Path(PathWithEvents):
         on_stale: StaleOffset = StaleOffset.HOLD,
     ) -> Path:
         """
-        Let the path give way to offsets that come while the arm moves, SERVO only.
+        Let the path give way to offsets that come while the arm moves, PRIMITIVES or SERVO.
 
         They are given by ``set_path_offset`` of the running motion, or on ``~/path_offset``.
 

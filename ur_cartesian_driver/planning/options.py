@@ -90,6 +90,8 @@ class PlanningOptions:
     calibration_known: bool = True
     #: Whether the robot's software has OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
     optimove_known: bool = True
+    #: Whether it has path offsets of its own (PolyScope 5 from 5.6 on).
+    path_offset_known: bool = True
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: bool = True
     #: The wire dialect of the robot program.

@@ -55,9 +55,12 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.preflight.clearance import clearance_lines
 from ur_cartesian_driver.planning.preflight.offset_bands import (
+    dense_path,
+    FILTER_SETTLING,
     offset_band,
     offset_remarks,
     OffsetBandCheck,
+    path_joints,
 )
 from ur_cartesian_driver.planning.preflight.start_checks import (
     check_approach,
@@ -193,7 +196,8 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     ]
     if goal.min_speed_fraction:
         remarks += unknown_speed_remark(goal, *unknown_speeds(geometries))
-    return planner.plan(goal, segments, motion, remarks, find_slow_stretches)
+    planned = planner.plan(goal, segments, motion, remarks, find_slow_stretches)
+    return _with_offset_band(planned, planner) if goal.path_offset else planned
 
 
 def _planned_rows(
@@ -243,13 +247,20 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
 
     :raises GoalRefused: nowhere, or the arm could not be everywhere in the band.
     """
-    band = offset_band(plan.goal.path_offset, plan.reference, plan.T_tcp_controlled)
+    path, settling = plan.reference, 0.0
+    if plan.execution.traits.streams_setpoints:
+        q, qd, _ = plan.joint_spline.rows(path.time)
+    else:
+        path, settling = dense_path(path), FILTER_SETTLING
+        q, qd = path_joints(path, planner.kinematics, planner.state.actual_q)
+    band = offset_band(plan.goal.path_offset, path, plan.T_tcp_controlled, settling)
     warnings = OffsetBandCheck(
         kinematics=planner.kinematics,
         options=planner.options,
         band=band,
-        reference=plan.reference,
-        spline=plan.joint_spline,
+        reference=path,
+        q=q,
+        qd=qd,
         tool_tips=tool_tips(planner.goal, planner.T_flange_active),
     ).check()
     remarks = (*plan.remarks, *offset_remarks(band, plan.duration), *warnings[:1])

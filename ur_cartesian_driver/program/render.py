@@ -34,6 +34,7 @@ from functools import cache
 from importlib.resources import files
 import re
 
+from ur_cartesian_driver.motion.approach import ARRIVAL_TOLERANCE, BRAKING_FRACTION
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import ContactEnd, InputKind, OutputKind
@@ -67,9 +68,12 @@ SERVO_MAX_REPEATS = 500
 #: A set-point that comes more steps after the previous one counts as one step, as in the guide.
 SERVO_MAX_STEPS = 50
 
+#: None is known to have it.
+_NO_VERSION = (1000, 0, 0)
 #: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     'optimove': ((5, 21, 0), (10, 8, 0)),
+    'path_offset': ((5, 6, 0), _NO_VERSION),
     'target_payload': ((5, 10, 0), (10, 0, 0)),
 }
 
@@ -119,6 +123,27 @@ PRESS_CONSTANTS: dict[str, float] = {
     'RETURN_SPEED': 0.02,
     #: The step of a CB3 controller [s], which has no gain of force mode.
     'STEP_WITHOUT_GAIN': 0.008,
+}
+
+#: Constants of path offsets.
+OFFSET_CONSTANTS: dict[str, float] = {
+    #: Frame of an offset for the controller: the axes of the base.
+    'FRAME_BASE': 1,
+    #: Time constant of the controller's filter [s]: a coefficient of 0.1 at 500 Hz, which the
+    #: manual calls a good compromise for welding.
+    'FILTER_TIME': 0.018,
+    #: The controller's limit of rotational offsets as it comes [rad]; there are none here.
+    'MAX_TURN': 0.52,
+    #: An offset brakes with this part of its acceleration, and is at its target when it is as
+    #: near [m]; in the driver too.
+    'BRAKING': BRAKING_FRACTION,
+    'TOLERANCE': ARRIVAL_TOLERANCE,
+    #: How fast the rate of the offset's time follows that of the motion [1/s].
+    'RATE_CHANGE': 10.0,
+    #: In a shorter time the offset does not move [s].
+    'MIN_TIME': 1e-6,
+    #: A tool that is no farther away is on its path [m].
+    'GONE': 1e-6,
 }
 
 #: Cycles by which an output is switched early: it takes effect at the end of its cycle.
@@ -313,6 +338,11 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('CONTACT', ContactEnd)
     for name, value in PRESS_CONSTANTS.items():
         yield f'PRESS_{name} = {value}'
+    for name, value in OFFSET_CONSTANTS.items():
+        yield f'OFFSET_{name} = {value:.10g}'
+    yield from _enum('OFFSET_IN', registers.OffsetInput)
+    yield from _enum('OFFSET_OUT', registers.OffsetOutput)
+    yield f'TRAJECTORY_TAKES_OFFSETS = {int(reverse.TAKES_OFFSETS)}'
     yield from _enum('FOLLOW', point_fields.FollowKind)
     # Floats, because a matrix of floats is made from them: a row for each analog output.
     yield f'FOLLOW_ONES = {[1.0] * script_command.ANALOG_OUTPUTS}'

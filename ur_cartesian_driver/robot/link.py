@@ -187,9 +187,11 @@ class RobotLink:
 
     # ---- commands -----------------------------------------------------------------------------
 
-    def send_control(self, action: TrajectoryAction, count: int) -> None:
+    def send_control(
+        self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
+    ) -> None:
         """Send a trajectory action to the robot program."""
-        self.program.send_control(action, count)
+        self.program.send_control(action, count, takes_offsets=takes_offsets)
         if action is TrajectoryAction.CANCEL:
             self.event_log.note('the driver sent CANCEL')
 

@@ -22,6 +22,7 @@ from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFe
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.points.offset_point_feeder import OffsetPointFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoFeeder
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
@@ -50,6 +51,8 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
 def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     """Return what sends points, at once or as they are appended."""
     monitor = _monitor(request, config)
+    if request.job.offset_band is not None:
+        return OffsetPointFeeder(monitor, request.job.offset_band)
     if not request.job.keep_open:
         return PointFeeder(monitor)
     # The last piece on the wire begins within the horizon of the feeder, and ends within that of

@@ -36,11 +36,13 @@ from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
 from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Recorder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
+    CloseOffsets,
     EnterServo,
     Finish,
     GoalCommand,
     LeaveServo,
     LogWarning,
+    OpenOffsets,
     OpenServo,
     ReportProgress,
     ReportServo,
@@ -52,20 +54,19 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendSafeOutputs,
     SetTemporaryTcp,
     StopProgram,
-    WriteServo,
+    WriteInputs,
 )
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
-from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
+    INPUTS_LINK,
     LinkLost,
     Outcome,
     PreemptRequested,
-    ServoReceived,
     StateReceived,
 )
 from ur_cartesian_driver.motion.io_signals import Signals
@@ -73,7 +74,12 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.link import RobotLink
-from ur_cartesian_driver.robot.rtde.servo_connection import ServoConnection
+from ur_cartesian_driver.robot.rtde.register_connection import (
+    offset_exchange,
+    RegisterConnection,
+    RegisterExchange,
+    servo_exchange,
+)
 
 #: More than this takes longer than a few milliseconds to unpack or prepare [bytes].
 MIN_THREAD_SIZE = 1 << 18
@@ -109,8 +115,8 @@ class MotionRunner:
         self._machine: GoalMachine | None = None
         self._number = 0
         self._points = PointBuffer()
-        #: The inputs of a motion that is streamed as set-points.
-        self._servo: ServoConnection | None = None
+        #: The inputs of a motion that gets set-points, or offsets of its path.
+        self._inputs: RegisterConnection | None = None
         #: What is offered to the machine at this moment.
         self._pending_append: AppendToMotion | None = None
         self._recorder = Recorder(
@@ -245,8 +251,8 @@ class MotionRunner:
     def _execute(self, commands: list[GoalCommand]) -> None:
         for command in commands:
             match command:
-                case SendControl(action=action, count=count):
-                    self._link.send_control(action, count)
+                case SendControl(action=action, count=count, takes_offsets=takes_offsets):
+                    self._link.send_control(action, count, takes_offsets=takes_offsets)
                 case SendPoints(first=first, end=end):
                     self._link.program.send_points(self._points.take(first, end))
                 case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):
@@ -269,11 +275,15 @@ class MotionRunner:
                     self._link.stop_program(reason)
                 case ReportProgress(progress=progress):
                     self._pipe.send(MotionProgress(motion=self._number, progress=progress))
-                case WriteServo(values=values):
-                    if self._servo is not None:
-                        self._servo.write_row(values)
+                case WriteInputs(values=values):
+                    if self._inputs is not None:
+                        self._inputs.write_row(values)
+                case OpenOffsets():
+                    self._open_inputs(offset_exchange(self.handle_event))
+                case CloseOffsets():
+                    self._close_inputs()
                 case OpenServo():
-                    self._open_servo()
+                    self._open_inputs(servo_exchange(self.handle_event))
                 case EnterServo():
                     self._link.send_servo(True)
                 case LeaveServo():
@@ -299,25 +309,27 @@ class MotionRunner:
                 self._recorder.add_plan(job.reference, self._machine.end_time_of(before))
         self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
 
-    def _open_servo(self) -> None:
-        """Take the inputs of the servo for the motion that runs."""
-        self._servo = ServoConnection(
-            lambda feedback: self.handle_event(ServoReceived(feedback=feedback))
-        )
+    def _open_inputs(self, exchange: RegisterExchange) -> None:
+        """Take the RTDE inputs of the motion that runs."""
+        self._inputs = RegisterConnection(exchange)
         self._spawn(
-            self._servo.run(
+            self._inputs.run(
                 self._config.robot_ip,
                 self._config.rtde_port,
-                lambda reason: self.handle_event(LinkLost(link=SERVO_LINK, reason=reason)),
+                lambda reason: self.handle_event(LinkLost(link=INPUTS_LINK, reason=reason)),
             )
         )
 
     def _leave_servo(self) -> None:
         """Have the robot program leave the servo, and give the inputs back."""
-        if self._servo is not None:
+        if self._inputs is not None:
             self._link.send_servo(False)
-            self._servo.close()
-            self._servo = None
+            self._close_inputs()
+
+    def _close_inputs(self) -> None:
+        if self._inputs is not None:
+            self._inputs.close()
+            self._inputs = None
 
     def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
         """Set the TCP for a goal; the owner remembers it in case this process dies."""
@@ -333,7 +345,9 @@ class MotionRunner:
         self._link.set_temporary_tcp(T_flange_tcp)
 
     def _finish(self, outcome: Outcome) -> None:
-        self._leave_servo()
+        if self._link.program.servo:
+            self._leave_servo()
+        self._close_inputs()
         machine, number = self._machine, self._number
         self._number, self._machine = 0, None
         self._points = PointBuffer()

@@ -21,6 +21,8 @@ class SendControl:
 
     action: TrajectoryAction
     count: int = 0
+    #: START: the path gives way to offsets that come through registers.
+    takes_offsets: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,13 +103,23 @@ class OpenServo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OpenOffsets:
+    """Take the RTDE inputs of path offsets, and report the robot's outputs for them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CloseOffsets:
+    """Release these inputs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EnterServo:
     """Have the robot program read these inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WriteServo:
-    """Write the inputs of the buffered servo, in the order of ``registers.SERVO_INPUTS``."""
+class WriteInputs:
+    """Write the RTDE inputs that were taken, in the order of their recipe in ``registers``."""
 
     values: tuple[float, ...]
 
@@ -150,8 +162,10 @@ GoalCommand: TypeAlias = (
     | ReportProgress
     | AnswerAppend
     | OpenServo
+    | OpenOffsets
+    | CloseOffsets
     | EnterServo
-    | WriteServo
+    | WriteInputs
     | LeaveServo
     | ReportServo
     | LogWarning

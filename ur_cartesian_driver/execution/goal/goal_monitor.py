@@ -87,6 +87,8 @@ class GoalMonitor:
         #: By how much the slider or a pause delayed the controller's clock in the newest packet,
         #: whether the arm moved or not [s].
         self.held_time = 0.0
+        #: How fast the time of the motion ran in the newest packet, 0 to 1.
+        self.rate = 0.0
 
     # ---- what goes on -------------------------------------------------------------------------
 
@@ -134,7 +136,8 @@ class GoalMonitor:
         waits = self._has_begun and self._tracker.waits
         # The program waits in real time, and reports no scaling while it does not move the arm.
         held = state.target_speed_fraction <= 0.0 or not playing
-        elapsed = passed * (state.effective_speed or float(waits and not held))
+        self.rate = state.effective_speed or float(waits and not held)
+        elapsed = passed * self.rate
         self.scaled_time += elapsed
         if waits:
             self._tracker.wait(elapsed)

@@ -132,6 +132,8 @@ class MotionJob:
             return 'what is done at points (dwell, input_waits, script_calls and the like)'
         if self.safe_outputs:
             return 'outputs that have to be safe (safe_outputs)'
+        if self.offset_band is not None and not self.execution.traits.streams_setpoints:
+            return 'offsets of its path (path_offset)'
         return '' if self.T_flange_tcp is None else 'another TCP than the robot has'
 
 

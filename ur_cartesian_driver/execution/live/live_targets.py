@@ -17,7 +17,7 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     LiveLimits,
     OnlineTrajectoryGenerator,
 )
-from ur_cartesian_driver.execution.servo.freshness import Freshness
+from ur_cartesian_driver.execution.offsets.freshness import Freshness
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Joints
 

@@ -3,8 +3,8 @@
 """
 Set-points beside a path that gives way to offsets which come while the arm moves.
 
-An offset may come at any time, jump, be too old or too large. The tool moves towards the newest
-one with bounded speed and acceleration along each axis of the frame of the path, never beyond the
+The tool moves towards the offset that is asked (:mod:`~ur_cartesian_driver.execution.offsets`)
+with bounded speed and acceleration along each axis of the frame of the path, never beyond the
 limits of the goal, and back to its path in time for the end of the motion. All of that counts in
 the time of the motion: where the motion is held, so is the offset.
 
@@ -13,24 +13,18 @@ The joints are those of the path, changed so that the tool is displaced and turn
 
 from __future__ import annotations
 
-from math import copysign, isfinite, nan
+from math import copysign
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.execution.servo.freshness import Freshness
+from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.servo.servo_stream import MIN_STEP
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_incremental import track_pose
 from ur_cartesian_driver.motion.approach import approach_speed, ARRIVAL_TOLERANCE
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.offset_band import (
-    AppliedOffset,
-    NO_OFFSET,
-    OFFSET_AXES,
-    OffsetBand,
-)
+from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import (
     add,
@@ -106,67 +100,18 @@ class OffsetSetpoints:
     def __init__(self, setpoints: SetpointSource, band: OffsetBand, arm: Arm) -> None:
         """Begin on the path, with no offset to move to."""
         self._setpoints, self._band, self._arm = setpoints, band, arm
+        #: What is asked.
+        self.requests = OffsetRequests(band)
         self._offset = BoundedOffset(band)
-        self._freshness = Freshness(band.timeout)
-        self._newest: Vector3 = ZERO3
-        self._is_stale = True
         #: Time of the motion [s], and that which the offset has used.
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
         #: How the joints of the newest set-point differ from those of the path [rad].
         self._change: Vector6 = ZERO6
-        self._cut = self._stale_count = 0
-        self._largest = list(ZERO3)
         # The newest set-points: joints, shift in the base, offset in the frame of the path.
         self._history: NDArray[np.float64] = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
-
-    # ---- offsets ------------------------------------------------------------------------------
-
-    def set_offset(self, offset: Vector3, age: float, now: float) -> None:
-        """
-        Take an offset.
-
-        :param offset: along, across, normal [m]; what is beyond the limits is cut.
-        :param age: how long ago it was true [s].
-        :param now: time of a steady clock [s].
-        """
-        if not all(map(isfinite, offset)):
-            age = nan
-        if not self._freshness.accept(age, now):
-            return
-        self._newest = vector3(
-            min(max(value, -limit), limit)
-            for value, limit in zip(offset, self._band.limits, strict=True)
-        )
-        self._cut += self._newest != offset
-        self._is_stale = False
-
-    def update(self, now: float) -> bool:
-        """Let the newest offset age; return whether it has just become stale."""
-        before, self._is_stale = self._is_stale, self._freshness.is_stale(now)
-        begins = self._is_stale and not before
-        self._stale_count += begins
-        return begins
-
-    @property
-    def stale_clause(self) -> str:
-        """That the newest offset is stale, and what follows."""
-        follows = 'goes back to its path' if self._fades else 'stays where it was'
-        return f'the path offset is older than {self._band.timeout:g} s: the tool {follows}'
-
-    @property
-    def _fades(self) -> bool:
-        return self._band.on_stale is StaleOffset.FADE
-
-    @property
-    def _target(self) -> Vector3:
-        if not self._band.opens(self._time):
-            if self._is_stale:  # behind a corner it would mean another direction
-                self._newest = ZERO3
-            return ZERO3
-        return ZERO3 if self._is_stale and self._fades else self._newest
 
     # ---- set-points ---------------------------------------------------------------------------
 
@@ -184,7 +129,7 @@ class OffsetSetpoints:
         while self._used < self._time - _ROUNDING:
             self._used += STEP
             self._before = self._offset.value
-            self._offset.step(self._target)
+            self._offset.step(self.requests.target(self._time))
         value = self._offset.value
         if self._used > self._time + _ROUNDING:  # the motion is held: between two steps
             back = (self._used - self._time) / STEP
@@ -204,7 +149,7 @@ class OffsetSetpoints:
         T_base_flange = Pose(add(flange.position, shift), flange.quaternion)
         q = track_pose(self._arm, T_base_flange, near) or near
         self._change = subtract6(q, on_path)
-        self._largest = [max(a, abs(b)) for a, b in zip(self._largest, offset, strict=True)]
+        self.requests.note_applied(offset)
         self._remember(q, shift, offset)
         return q
 
@@ -228,28 +173,3 @@ class OffsetSetpoints:
         self._seen = first + int(np.argmin(np.einsum('ij,ij->i', away, away)))
         found = self._history[self._seen % HISTORY].tolist()
         return AppliedOffset(vector3(found[6:9]), vector3(found[9:]))
-
-    @property
-    def report(self) -> tuple[str, ...]:
-        """What became of the offsets, as lines of the report."""
-        taken = self._freshness.accepted
-        largest = ', '.join(
-            f'{1e3 * value:.2f} mm {name}'
-            for name, value in zip(OFFSET_AXES, self._largest, strict=True)
-            if value
-        )
-        lines = [
-            ('1 path offset was' if taken == 1 else f'{taken} path offsets were')
-            + f' followed; the path gave way by {largest or "nothing"} at most'
-        ]
-        if self._freshness.dropped:
-            lines.append(
-                f'{self._freshness.dropped} path offsets came after a newer one, were older than '
-                f'{self._band.timeout:g} s or not finite, and were ignored'
-            )
-        if self._cut:
-            lines.append(f'{self._cut} path offsets were beyond path_offset.limits, and were cut')
-        if self._stale_count:
-            times = 'once' if self._stale_count == 1 else f'{self._stale_count} times'
-            lines.append(f'the path offset was stale {times}: older than {self._band.timeout:g} s')
-        return tuple(lines)

@@ -32,7 +32,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     LogWarning,
     OpenServo,
     ReportServo,
-    WriteServo,
+    WriteInputs,
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, START_ANGLE_TOLERANCE
 from ur_cartesian_driver.execution.goal.goal_transitions import (
@@ -47,22 +47,24 @@ from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
-from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.events import (
+    Event,
+    INPUTS_LINK,
+    LinkLost,
+    ServoReceived,
+    TrajectoryEnded,
+)
 from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
 from ur_cartesian_driver.motion.vectors import subtract6, Vector3, Vector6, vector6
 
-#: The connection to the inputs, as :class:`LinkLost` names it.
-SERVO_LINK = 'RTDE inputs'
 #: A robot program that has read one of our sequence numbers so lately does not hang, wherever the
 #: arm stands [s].
 ANSWER_TIMEOUT = 1.0
 #: The controller's target is behind the set-point that the arm is led to by about the lookahead
 #: time of ``servoj``, by more with a low gain: so many lookahead times at most.
 MAX_LAG_LOOKAHEADS = 4.0
-#: Shortest time between two warnings of the same kind [s].
-WARNING_PERIOD = 2.0
 #: So near to its last set-point servoj has come to its end [rad].
 _END_TOLERANCE = 1e-4
 
@@ -80,7 +82,7 @@ class ServoFeeder(Feeder):
         :param offsets: that source, where the path may give way.
         """
         super().__init__(monitor)
-        self._offsets, self._next_warning = offsets, -inf
+        self._offsets = offsets
         self.stream = stream
         self._spline = monitor.job.spline
         self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
@@ -153,21 +155,20 @@ class ServoFeeder(Feeder):
 
     def _stop(self) -> list[GoalCommand]:
         row = self.stream.stop()
-        return [] if row is None else [WriteServo(values=row)]
+        return [] if row is None else [WriteInputs(values=row)]
 
     def set_path_offset(self, offset: Vector3, age: float, now: float) -> bool:
         """Take a path offset; False = the goal permits none."""
         if self._offsets is not None:
-            self._offsets.set_offset(offset, age, now)
+            self._offsets.requests.set_offset(offset, age, now)
         return self._offsets is not None
 
     # ---- what the robot confirms --------------------------------------------------------------
 
     def take(self, event: Event, now: float) -> list[GoalCommand]:
         """Answer a packet of the servo's registers with a write."""
-        if self._offsets is not None and self._offsets.update(now) and now >= self._next_warning:
-            self._next_warning = now + WARNING_PERIOD
-            self._unsaid.append(LogWarning(text=self._offsets.stale_clause))
+        if self._offsets is not None:
+            self._unsaid += self._offsets.requests.warnings(now)
         if not isinstance(event, ServoReceived):
             return []
         commands, self._unsaid = self._write(event.feedback, now) + self._unsaid, []
@@ -182,7 +183,7 @@ class ServoFeeder(Feeder):
             # The time of the goal begins with its motion: not with the filling of the buffer.
             self._has_filled = True
             self.start_delay = self.monitor.scaled_time - self.stream.source_time + self.stream.lag
-        commands: list[GoalCommand] = [] if row is None else [WriteServo(values=row)]
+        commands: list[GoalCommand] = [] if row is None else [WriteInputs(values=row)]
         if before is ServoPhase.OPENING and self.stream.phase is ServoPhase.ENTERING:
             commands.append(EnterServo())
         return commands
@@ -195,7 +196,7 @@ class ServoFeeder(Feeder):
             case TrajectoryEnded():  # of a goal before this one
                 return NO_MEANING
             case LinkLost(link=link, reason=reason) if (
-                link == SERVO_LINK and state is GoalState.ARMING
+                link == INPUTS_LINK and state is GoalState.ARMING
             ):
                 return GoalSignal.TIMEOUT, (
                     f'the robot does not take set-points: {reason}'.rstrip('.')
@@ -280,7 +281,7 @@ class ServoFeeder(Feeder):
 
     def report_lines(self) -> tuple[str, ...]:
         """Return how often the motion has waited for the arm, and what became of offsets."""
-        return (*self._wait.report, *(self._offsets.report if self._offsets else ()))
+        return (*self._wait.report, *(self._offsets.requests.report if self._offsets else ()))
 
     def _joint_error(self) -> Vector6:
         packet = self.monitor.latest

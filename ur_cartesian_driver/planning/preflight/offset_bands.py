@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
-from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
@@ -30,12 +30,11 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
 )
 from ur_cartesian_driver.motion.goal import PathOffset
-from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.offset_band import OFFSET_AXES, OffsetBand
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
-from ur_cartesian_driver.motion.vectors import norm, Vector3, vector3, vector6
+from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.vectors import Joints, norm, Vector3, vector3, vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location
@@ -56,24 +55,34 @@ _MIN_EDGE = 1e-7
 _MIN_ANGLE_SINE = 0.05
 #: How much longer than the law of the offset needs it has to fade out.
 _FADE_MARGIN = 1.1
+#: How much later an offset is gone that the robot program moves and the controller filters [s]:
+#: five times the time constant of the filter, a packet to the robot and back, and what the program
+#: lags behind after a change of the speed scaling.
+FILTER_SETTLING = 0.2
+#: The paths of the robot's own motions have few samples: time between two for the checks [s].
+_CHECK_STEP = 0.02
 #: A corner is reached from the path in steps that are no longer [m], in which a joint that turns
 #: farther would change the branch [rad].
 _STRIDE, _MAX_CHANGE = 0.02, 0.5
 
 
 def offset_band(
-    wanted: PathOffset, reference: ReferencePath, T_tcp_controlled: Pose
+    wanted: PathOffset,
+    reference: ReferencePath,
+    T_tcp_controlled: Pose,
+    settling_time: float = 0.0,
 ) -> OffsetBand:
     """
     Return the band of a path.
 
     :param T_tcp_controlled: the controlled frame, whose path it is.
+    :param settling_time: how much later than its law an offset is gone [s].
     :raises InvalidGoal: the path gives way nowhere.
     """
     speed, acceleration, timeout = offset_motion(wanted)
     frames = _frames(reference, T_tcp_controlled)
     turns = _turns_too_fast(frames, hypot(*wanted.limits), speed, acceleration)
-    fading = fade_time(max(wanted.limits), speed, acceleration)
+    fading = fade_time(max(wanted.limits), speed, acceleration) + settling_time
     times = STEP * np.arange(len(frames))
     closed = turns | (times >= reference.time[-1] - fading)
     fade = int(np.ceil(fading / STEP))
@@ -97,6 +106,44 @@ def offset_band(
         axes=frames,
         is_open=~closed,
     )
+
+
+def dense_path(path: ReferencePath) -> ReferencePath:
+    """Return a path with samples between those that it has, for the checks."""
+    first, last = path.time[0], path.time[-1]
+    times = np.union1d(path.time, np.arange(first, last, _CHECK_STEP))
+    row = np.clip(np.searchsorted(path.time, times, side='right') - 1, 0, len(path.time) - 2)
+    steps = np.maximum(path.time[row + 1] - path.time[row], 1e-300)
+    part = np.minimum((times - path.time[row]) / steps, 1.0)
+    return ReferencePath(
+        poses=interpolate_rows(path.poses[row], path.poses[row + 1], part),
+        point=path.point[np.where(part > 0.0, row + 1, row)],
+        time=times,
+        fraction=np.where(
+            path.point[row] == path.point[row + 1],
+            path.fraction[row] + part * (path.fraction[row + 1] - path.fraction[row]),
+            part * path.fraction[row + 1],
+        ),
+    )
+
+
+def path_joints(
+    path: ReferencePath, kinematics: TcpKinematics, start: Joints
+) -> tuple[Floats, Floats]:
+    """
+    Return the joints along a path (n, 6) [rad], and their speeds [rad/s].
+
+    :param start: the joints before it.
+    :raises GoalRefused: there is none somewhere.
+    """
+    solved = solve_path(kinematics.arm, compose_rows(path.poses, kinematics.T_tcp_flange), start)
+    if not solved.found.all():
+        row = int(np.argmin(solved.found))
+        where = describe_location(int(path.point[row]), float(path.fraction[row]))
+        raise kinematics.no_solution_error(pose_from_row(path.poses[row].tolist()), where)
+    rates = np.abs(np.diff(solved.q, axis=0)) / np.maximum(np.diff(path.time), 1e-6)[:, None]
+    rates = np.pad(rates, ((1, 1), (0, 0)))
+    return solved.q, np.maximum(rates[1:], rates[:-1])
 
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:
@@ -179,14 +226,16 @@ class OffsetBandCheck:
     """
     The checks of a band along a path.
 
-    :param spline: the joints over the times of the path.
+    :param reference: the path, whose samples are as near to each other as they are to be checked.
+    :param q: (n, 6) the joints there [rad]; ``qd``: their speeds [rad/s].
     """
 
     kinematics: TcpKinematics
     options: PlanningOptions
     band: OffsetBand
     reference: ReferencePath
-    spline: JointSpline
+    q: Floats
+    qd: Floats
     tool_tips: Sequence[Pose]
 
     def check(self) -> list[str]:
@@ -197,7 +246,7 @@ class OffsetBandCheck:
         """
         path, band = self.reference, self.band
         self._check_tool_speeds()
-        q, qd, _ = self.spline.rows(path.time)
+        q, qd = self.q, self.qd
         rows = np.clip(np.rint(path.time / band.step).astype(np.intp), 0, len(band.axes) - 1)
         axes = band.axes[rows]
         joint_speeds = np.abs(qd) + self._joint_speeds_of_offsets(q, axes)

@@ -4,11 +4,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal import DEFAULT_OFFSET_MOTION, PathOffset
 from ur_cartesian_driver.motion.goal_table import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
+from ur_cartesian_driver.planning.request.goal_fields import (
+    OPTIMIZED_TYPES,
+    resolve_execution_mode,
+    segment_field,
+    type_table,
+)
 
 #: Largest limit [m], as that of the controller's own offsets by default; speed [m/s], acceleration
 #: [m/s^2], timeout [s].
@@ -21,7 +28,7 @@ def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
     Refuse offsets that are out of bounds, or not possible.
 
     :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode has no set-points that could be displaced.
+    :raises NotAvailable: the execution mode, or the robot, cannot offset the path.
     """
     wanted = goal.path_offset
     if wanted == PathOffset():
@@ -48,19 +55,58 @@ def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
             'set one, or leave path_offset empty',
         )
     mode = resolve_execution_mode(goal)
-    if not mode.traits.streams_setpoints:
+    if not mode.traits.takes_offsets:
         raise NotAvailable(
             'path_offset',
-            f'is set, but the robot has the path of a {mode.name} goal before it moves, and '
-            'takes no offset on its way',
-            'set execution to SERVO',
+            f'is set, but in a {mode.name} goal the robot program leads the joints along their '
+            'spline, and would bring an offset back at once',
+            'set execution to PRIMITIVES or SERVO',
         )
+    if not mode.traits.streams_setpoints:
+        _check_controller_offsets(goal, options)
     if goal.keep_open:
         raise NotAvailable(
             'path_offset',
             'is set, but the end of a goal with keep_open, where an offset has to be gone, is not '
             'known',
             'send all points at once',
+        )
+
+
+def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None:
+    """
+    Refuse offsets that the controller cannot add to its own motions.
+
+    :raises NotAvailable: names the reason.
+    """
+    if not options.path_offset_known:
+        raise NotAvailable(
+            'path_offset',
+            "is set, but the robot's software is not known to have path offsets of its own "
+            '(PolyScope 5 has them from 5.6 on)',
+            'set execution to SERVO',
+        )
+    if not options.dialect.supports_stops:
+        raise NotAvailable(
+            'path_offset',
+            f'is set, but robot programs of wire dialect {options.dialect.name} add no offsets '
+            'to their motions',
+            'set execution to SERVO',
+        )
+    if goal.presses:
+        raise NotAvailable(
+            'path_offset',
+            'is set, but the goal presses too, and the controller must not offset its path '
+            'while it controls a force',
+            'leave presses empty, and path_offset empty in goals that press',
+        )
+    optimized = np.flatnonzero(type_table(OPTIMIZED_TYPES)[goal.motions.types])
+    if len(optimized):
+        raise NotAvailable(
+            'path_offset',
+            f'is set, but {segment_field(int(optimized[0]), "type")} is OPTIMIZED: the robot '
+            'chooses the speed, so nobody knows when an offset has to begin to fade',
+            'use LINEAR or JOINT segments, or set execution to SERVO',
         )
 
 

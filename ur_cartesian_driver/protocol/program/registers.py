@@ -17,10 +17,12 @@ to the program     int         27         synchronization (:class:`SyncState`)
 to the program     double      24 - 29    joint positions [rad]
 to the program     double      30 - 35    max deviation of the joints from them [rad]
 to the program     double      46         time of these joint positions [s]
+to the program     double      24 - 41    path offset of a trajectory (:class:`OffsetInput`)
 from the program   int         24         actual mode
 from the program   int         25         last sequence number that the program read
 from the program   int         26         points begun of the running trajectory
 from the program   double      24         lag: motion time in the buffer [s]
+from the program   double      25 - 30    path offset as it is now (:class:`OffsetOutput`)
 from the program   int         27         set-points carried out
 from the program   int         28         repetitions of set-points that the arm was not near
 from the program   int         29         sequence numbers skipped
@@ -33,7 +35,8 @@ from the program   int         35         token of the last SET_SAFE_OUTPUTS tha
 =================  ==========  =========  ====================================================
 
 The ints from 26 are ours; a program after the guide does not write them. The counts 27 to 31 start
-at 0 when the program enters the control mode ``BUFFERED_SERVO``.
+at 0 when the program enters the control mode ``BUFFERED_SERVO``. The doubles of path offsets are
+ours, too; a trajectory and the servo never run at once.
 
 The ints 32 to 34 show the driver that the program is its own: it writes them when it has read the
 first message on the reverse socket, the count last. Registers survive programs. So version and
@@ -43,6 +46,7 @@ number count only after the count has changed on this connection.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TypeAlias
 
 
 class InputInteger(IntEnum):
@@ -86,6 +90,31 @@ class OutputDouble(IntEnum):
     LAG_TIME = 24
 
 
+class OffsetInput(IntEnum):
+    """Double registers that the driver writes in a trajectory whose path may give way."""
+
+    #: Where the offset shall go: along, across, normal [m].
+    TARGET = 24
+    #: How fast the time of the motion runs, 0 to 1.
+    RATE = 27
+    #: The axes of the frame of the path, in the base.
+    ALONG = 28
+    ACROSS = 31
+    NORMAL = 34
+    #: Bounds of the goal: along, across, normal [m]; of each [m/s], [m/s^2].
+    LIMITS = 37
+    SPEED = 40
+    ACCELERATION = 41
+
+
+class OffsetOutput(IntEnum):
+    """Double registers that the robot program writes in such a trajectory."""
+
+    #: Along, across, normal [m]; what the controller applies, in the base [m].
+    VALUE = 25
+    SHIFT = 28
+
+
 class ServoMode(IntEnum):
     """Desired and actual mode of the buffered servo."""
 
@@ -113,19 +142,22 @@ class ExternalError(IntEnum):
 #: Grows when the robot program learns what the driver relies on.
 PROGRAM_VERSION = 1
 
+Register: TypeAlias = (
+    InputInteger | InputDouble | OutputInteger | OutputDouble | OffsetInput | OffsetOutput
+)
+
 #: See :class:`OutputInteger`.
 POINTS_BEGUN = OutputInteger.POINTS_BEGUN
 
 
-def register_name(
-    register: InputInteger | InputDouble | OutputInteger | OutputDouble, offset: int = 0
-) -> str:
+def register_name(register: Register, offset: int = 0) -> str:
     """
     Return the name of a register in an RTDE recipe.
 
-    :param offset: 0 to 5 within a group of six.
+    :param offset: within a group of registers, 0 for the first.
     """
-    direction = 'input' if isinstance(register, InputInteger | InputDouble) else 'output'
+    inputs = InputInteger | InputDouble | OffsetInput
+    direction = 'input' if isinstance(register, inputs) else 'output'
     kind = 'int' if isinstance(register, InputInteger | OutputInteger) else 'double'
     return f'{direction}_{kind}_register_{register + offset}'
 
@@ -160,4 +192,18 @@ SERVO_OUTPUTS = (
             OutputInteger.OVERFLOWS,
         )
     ),
+)
+#: The input recipe of path offsets, in this order: sequence number, then the doubles of
+#: :class:`OffsetInput`.
+OFFSET_INPUTS = (
+    register_name(InputInteger.SEQUENCE_ID),
+    *(
+        register_name(OffsetInput.TARGET, i)
+        for i in range(OffsetInput.ACCELERATION - OffsetInput.TARGET + 1)
+    ),
+)
+#: Reports of the program about them, in this order.
+OFFSET_OUTPUTS = (
+    register_name(OutputInteger.LAST_SEQUENCE_ID),
+    *(register_name(OffsetOutput.VALUE, i) for i in range(6)),
 )

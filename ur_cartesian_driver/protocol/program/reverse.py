@@ -15,6 +15,7 @@ index  mode          meaning
 1 - 6  POSE          x y z rx ry rz [m, rad] x S
 1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
+3      FORWARD       START: 1 = the path gives way to offsets (:mod:`~.registers`)
 1      FREEDRIVE     freedrive action, unscaled
 1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
@@ -32,6 +33,7 @@ The sender must
 * end or cancel a stream before the next START; otherwise the stream takes the new points.
 
 ``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
+Word 3 of START is of our own program, too; the library's leaves it 0.
 Streams came with URCL 2.14 (see `wire_dialects`). Everything else here has had its place and scale
 since URCL 2.0.
 """
@@ -99,6 +101,8 @@ class FreedriveAction(IntEnum):
 
 MESSAGE_FIELDS = 8
 MESSAGE_SIZE = 4 * MESSAGE_FIELDS
+#: Word 3 of a START whose path gives way.
+TAKES_OFFSETS = 1
 #: Longest time that the robot may bridge between two set-points [ms].
 MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].
@@ -209,11 +213,13 @@ def trajectory(
     read_timeout: int = 200,
     step_time: int = DEFAULT_STEP_TIME,
     dialect: Dialect = NEWEST_DIALECT,
+    takes_offsets: bool = False,
 ) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
     :param count: number of points: START, STREAM_END, CANCEL of a stream.
+    :param takes_offsets: START: offsets of the path come through registers.
     :raises LocalProtocolError: the dialect has no such action; a program would ignore it.
     """
     if action in _STREAMS and not dialect.supports_append:
@@ -222,7 +228,7 @@ def trajectory(
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
         mode=mode,
-        payload=(action, count, 0, 0, 0, 0),
+        payload=(action, count, TAKES_OFFSETS * takes_offsets, 0, 0, 0),
     )
 
 

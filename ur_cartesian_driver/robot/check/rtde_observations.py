@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS
+from ur_cartesian_driver.protocol.program.registers import OFFSET_INPUTS, SERVO_INPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import max_frequency, RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.check.finding import (
@@ -36,6 +36,7 @@ INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'speed slider': ('speed_slider_mask', 'speed_slider_fraction'),
     'outputs': ('standard_digital_output_mask', 'standard_digital_output'),
     'SERVO registers': tuple(SERVO_INPUTS),
+    'path offset registers': tuple(OFFSET_INPUTS),
 }
 #: How long the inputs of a closed connection are tried for [s]; the driver tries for 0.2 s.
 RELEASE_TIMEOUT = 2.0

@@ -154,10 +154,18 @@ class ProgramSockets:
 
     # ---- what goes out ------------------------------------------------------------------------
 
-    def send_control(self, action: TrajectoryAction, count: int) -> None:
+    def send_control(
+        self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
+    ) -> None:
         """Send a trajectory action."""
         self._send(
-            reverse.trajectory(action, count, self._read_timeout, dialect=self._settings.dialect)
+            reverse.trajectory(
+                action,
+                count,
+                self._read_timeout,
+                dialect=self._settings.dialect,
+                takes_offsets=takes_offsets,
+            )
         )
 
     def send_points(self, data: bytes) -> None:

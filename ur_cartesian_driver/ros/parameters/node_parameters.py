@@ -33,6 +33,7 @@ from ur_cartesian_driver.ros.parameters.parameter_table import (
 _DETECTED_OPTIONS = (
     'calibration_known',
     'optimove_known',
+    'path_offset_known',
     'acceleration_known',
     'dialect',
     'prelude',

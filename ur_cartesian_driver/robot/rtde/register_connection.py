@@ -1,26 +1,35 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The RTDE connection for streamed set-points, open during one goal.
+The RTDE connection for the registers of the robot program, open during one goal.
 
 Inputs belong to the client that requested them, so they are held only while they are needed. The
 controller frees the inputs of a client (maybe of the goal before) when it finds the connection
 closed; until then the request is repeated for a short while.
 
-The feedback of the servo arrives on the same connection, so the packets of other goals stay as
-they are.
+What the program reports in registers arrives on the same connection, so the packets of other goals
+stay as they are.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
+from ur_cartesian_driver.motion.events import Event, OffsetReceived, ServoReceived
+from ur_cartesian_driver.motion.offset_band import OffsetFeedback
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.motion.servo_report import ServoFeedback
-from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, SERVO_OUTPUTS
+from ur_cartesian_driver.motion.vectors import vector3
+from ur_cartesian_driver.protocol.program.registers import (
+    OFFSET_INPUTS,
+    OFFSET_OUTPUTS,
+    SERVO_INPUTS,
+    SERVO_OUTPUTS,
+)
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
@@ -36,19 +45,23 @@ SERVO_FIELDS = (
 OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 
-class ServoConnection:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegisterExchange:
+    """What is reported and written on a connection, by the names of RTDE, and who takes it."""
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    take: Callable[[RtdeValues], None]
+
+
+class RegisterConnection:
     """Used once, from one event loop: run it, write to it, close it."""
 
-    def __init__(self, on_feedback: Callable[[ServoFeedback], None]) -> None:
-        """
-        Prepare a connection.
-
-        :param on_feedback: a packet came in.
-        """
-        self._on_feedback = on_feedback
+    def __init__(self, exchange: RegisterExchange) -> None:
+        """Prepare a connection."""
+        self._exchange = exchange
         self._is_open = True
         self._attempt: _Attempt | None = None
-        self._effective_speed = EffectiveSpeed()
 
     async def run(self, host: str, port: int, on_end: Callable[[str], None]) -> None:
         """
@@ -60,7 +73,7 @@ class ServoConnection:
         loop = asyncio.get_running_loop()
         give_up, reason = loop.time() + OPEN_TIMEOUT, ''
         while self._is_open:
-            self._attempt = attempt = _Attempt(self._on_row)
+            self._attempt = attempt = _Attempt(self._exchange, self._on_row)
             reason = await attempt.serve(host, port)
             if attempt.has_inputs or loop.time() >= give_up:
                 break
@@ -82,14 +95,19 @@ class ServoConnection:
 
     def _on_row(self, _: Sequence[str], values: RtdeValues) -> None:
         if self._is_open:
-            self._on_feedback(feedback_from_rtde(values, self._effective_speed))
+            self._exchange.take(values)
 
 
 class _Attempt(RtdeConnection):
     """One connection to the robot, which may refuse the inputs."""
 
-    def __init__(self, on_values: Callable[[Sequence[str], RtdeValues], None]) -> None:
-        super().__init__(RtdeClientCodec(outputs=SERVO_FIELDS, inputs=SERVO_INPUTS), on_values)
+    def __init__(
+        self,
+        exchange: RegisterExchange,
+        on_values: Callable[[Sequence[str], RtdeValues], None],
+    ) -> None:
+        codec = RtdeClientCodec(outputs=exchange.outputs, inputs=exchange.inputs)
+        super().__init__(codec, on_values)
         self._is_wanted = True
 
     @property
@@ -117,6 +135,31 @@ class _Attempt(RtdeConnection):
         """Close, after what was written is sent."""
         self._is_wanted = False
         super().close()
+
+
+def servo_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
+    """Return what is exchanged with the buffered servo."""
+    effective_speed = EffectiveSpeed()
+    return RegisterExchange(
+        outputs=SERVO_FIELDS,
+        inputs=SERVO_INPUTS,
+        take=lambda values: on_event(
+            ServoReceived(feedback=feedback_from_rtde(values, effective_speed))
+        ),
+    )
+
+
+def offset_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
+    """Return what is exchanged with a trajectory whose path may give way."""
+
+    def take(values: Sequence[Any]) -> None:
+        sequence, *numbers = values
+        feedback = OffsetFeedback(
+            last_sequence=sequence, offset=vector3(numbers[:3]), shift=vector3(numbers[3:])
+        )
+        on_event(OffsetReceived(feedback=feedback))
+
+    return RegisterExchange(outputs=OFFSET_OUTPUTS, inputs=OFFSET_INPUTS, take=take)
 
 
 def feedback_from_rtde(values: Sequence[Any], effective_speed: EffectiveSpeed) -> ServoFeedback:
