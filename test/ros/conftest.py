@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cell to test in: a simulated robot, the node, a client, one executor for both."""
 
+import contextlib
 import threading
 from time import monotonic
 
@@ -99,6 +100,23 @@ class Cell:
             assert monotonic() < deadline, 'it did not happen in time'
             self.executor.spin_once(timeout_sec=0.02)
         return value
+
+    @contextlib.contextmanager
+    def spun(self):
+        """Spin in another thread, so that this one can wait for a client."""
+        ended = threading.Event()
+
+        def spin():
+            while not ended.is_set():
+                self.executor.spin_once(timeout_sec=0.05)
+
+        thread = threading.Thread(target=spin)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
 
     def wait_ready(self):
         self.spin_until(lambda: self.node.driver.status.state is ConnectionState.READY)

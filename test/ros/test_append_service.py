@@ -7,7 +7,8 @@ from rclpy.duration import Duration
 from unique_identifier_msgs.msg import UUID
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.ros.client import in_flat_arrays
+from ur_cartesian_driver.path import ExecutionMode, Path
+from ur_cartesian_driver.ros.client import GoalClient, in_flat_arrays
 from ur_cartesian_driver.srv import AppendPoints
 
 pytestmark = pytest.mark.slow
@@ -98,3 +99,38 @@ def test_nobody_waits_for_a_goal_whose_time_is_to_come(single_cell):
     cell.await_(handle.cancel_goal_async())
     _, result = cell.result(handle)
     assert result.error_code == ErrorCode.CANCELLED
+
+
+def test_a_client_replaces_the_tail_of_its_goal_and_appends_to_it(single_cell):
+    cell, answers = single_cell, []
+    (x, y, z), start = cell.T_base_tcp.position, cell.T_base_tcp
+
+    def path(*points):
+        whole, before = Path(start), 0.0
+        for time, dy in points:
+            whole, before = whole.spline((x, y + dy, z), duration=time - before), time
+        return whole
+
+    def act(_feedback):
+        if not answers:
+            answers.append(client.append(path((3.0, 0.02)), replace_from_time=0.0))
+            answers.append(client.append(path((3.0, 0.04), (3.5, 0.05)), replace_from_point=2))
+            answers.append(client.append(path((3.8, 0.04), (4.1, 0.03))))
+            answers.append(client.append(last=True))
+
+    whole = path((1.0, 0.01), (2.5, 0.02), (4.0, 0.0))
+    with cell.spun(), GoalClient() as client:
+        with pytest.raises(RuntimeError, match='No goal runs'):
+            client.append(whole)
+        outcome = client.execute(whole.executed_as(ExecutionMode.SPLINE).keep_open(), act)
+        with pytest.raises(RuntimeError, match='No goal runs'):
+            client.append(last=True)
+    assert outcome.succeeded, outcome.text
+    late, replaced, appended, closed = [answer.result() for answer in answers]
+    assert not late.accepted
+    assert late.first_index >= 1, late.message
+    assert 0.0 < late.first_time < 2.5, late.message
+    assert (replaced.accepted, replaced.first_index) == (True, 2), replaced.message
+    assert (appended.accepted, appended.first_index) == (True, 4), appended.message
+    assert (closed.accepted, closed.points_received) == (True, 6), closed.message
+    assert cell.T_base_tcp.position == pytest.approx((x, y + 0.03, z), abs=1e-4)

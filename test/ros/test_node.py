@@ -162,27 +162,15 @@ def test_prefix_and_namespace_are_in_all_names(no_thread_left, sim, make_cell):
 
 def test_ctrl_c_at_the_client_cancels_the_goal(single_cell):
     cell = single_cell
-    ended = threading.Event()
+    with cell.spun(), GoalClient() as client:
+        sent = []
 
-    def serve():
-        while not ended.is_set():
-            cell.executor.spin_once(timeout_sec=0.05)
+        def interrupt(feedback):
+            if not sent and feedback.progress > 0.02:
+                sent.append(feedback)
+                signal.raise_signal(signal.SIGINT)
 
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        with GoalClient() as client:
-            sent = []
-
-            def interrupt(feedback):
-                if not sent and feedback.progress > 0.02:
-                    sent.append(feedback)
-                    signal.raise_signal(signal.SIGINT)
-
-            _, result = client.send(cell.goal((5.0, 0.2, 0.2, 0.0)), interrupt)
-    finally:
-        ended.set()
-        thread.join()
+        _, result = client.send(cell.goal((5.0, 0.2, 0.2, 0.0)), interrupt)
     assert result.error_code == ErrorCode.CANCELLED
 
 

@@ -704,19 +704,28 @@ class PressGoal(BlendGoal):
 
 
 @lru_cache
-def half_circle_to_append(start):
+def half_circle_to_append(start, execution):
     """Return the plan of the first three points of a half circle, and the last one to append."""
-    whole = half_circle_goal(start.state, ExecutionMode.SPLINE)
+    whole = half_circle_goal(start.state, execution)
     goal = replace(whole, waypoints=whole.waypoints[:-1], keep_open=True)
     part = plan_first_part(plan(goal, start.state, ARM, OPTIONS), ARM, OPTIONS)
     return part, AppendedPoints(waypoints=whole.waypoints[-1:], last=True)
 
 
 @lru_cache
-def rest_of_half_circle(start, *, from_rest):
+def rest_of_half_circle(start, execution, *, from_rest):
     """Return the append plan of the last point of a half circle."""
-    part, appended = half_circle_to_append(start)
+    part, appended = half_circle_to_append(start, execution)
     return plan_append(part.next_goal, appended, ARM, OPTIONS, from_rest=from_rest)
+
+
+@lru_cache
+def new_tail_of_half_circle(start):
+    """Return the append plan of the last two points, of which one replaces that which is known."""
+    part, appended = half_circle_to_append(start, ExecutionMode.SERVO)
+    known = half_circle_goal(start.state, ExecutionMode.SERVO).waypoints[2:3]
+    tail = replace(appended, waypoints=(*known, *appended.waypoints), replace_from_point=2)
+    return plan_append(part.next_goal, tail, ARM, OPTIONS, from_rest=False)
 
 
 class AppendGoal(SplineGoal):
@@ -724,10 +733,10 @@ class AppendGoal(SplineGoal):
 
     def plan_from(self, start):
         self._beginning = start
-        return half_circle_to_append(start)[0].plan
+        return half_circle_to_append(start, self.execution)[0].plan
 
     def send_motion(self):
-        part, _ = half_circle_to_append(self._beginning)
+        part, _ = half_circle_to_append(self._beginning, self.execution)
         self.motion = self.cell.owner.run(*encode_plan(part, NEWEST_DIALECT))
 
     def is_in(self, phase):
@@ -741,17 +750,41 @@ class AppendGoal(SplineGoal):
         return super().is_in(phase)
 
     def paths(self):
-        rest = rest_of_half_circle(self._beginning, from_rest=False)
-        return [self.plan.reference, rest.plan.reference]
+        return [self.plan.reference, self._rest('moving').plan.reference]
+
+    def _rest(self, phase):
+        """Return the append plan of what comes after the fault."""
+        return rest_of_half_circle(
+            self._beginning,
+            self.execution,
+            from_rest=phase in ('running out', 'awaiting points'),
+        )
 
     def send_remaining_points(self, phase):
-        part = rest_of_half_circle(
-            self._beginning, from_rest=phase in ('running out', 'awaiting points')
-        )
+        part = self._rest(phase)
         points, job = encode_plan(part, NEWEST_DIALECT)
         self.cell.owner.append(
-            points, AppendJob(number=1, records_before=part.records_before, job=job)
+            points,
+            AppendJob(
+                number=1, records_before=part.records_before, job=job, cut_time=part.cut_time
+            ),
         )
+
+
+class ReplacedTailGoal(AppendGoal, ServoGoal):
+    """The same as set-points; what comes while the arm moves replaces the last known point."""
+
+    execution = ExecutionMode.SERVO
+
+    def is_in(self, phase):
+        if phase == 'running out':
+            return self.fraction() > 0.85  # behind the third point
+        return super().is_in(phase)
+
+    def _rest(self, phase):
+        if phase == 'moving':
+            return new_tail_of_half_circle(self._beginning)
+        return super()._rest(phase)
 
 
 class FreedriveGoal(FaultGoal):
@@ -791,6 +824,7 @@ GOALS = {
     'Path offset': OffsetGoal,
     'Path offset, PRIMITIVES': OffsetMoveGoal,
     'Appendable goals': AppendGoal,
+    'Replaced tails': ReplacedTailGoal,
     'Outputs': OutputGoal,
     'At a point': RestGoal,
     'At a point, SERVO': ServoRestGoal,

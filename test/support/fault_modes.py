@@ -524,6 +524,30 @@ APPEND = _mode(
     ),
 )
 
+REPLACED_TAILS = _mode(
+    'Replaced tails',
+    'The same as set-points (SERVO). After a fault while the arm moves the tail is replaced, '
+    'after one behind the last known point the last point is appended.',
+    {
+        'moving': 'on the path, before the part that is replaced',
+        'running out': 'the set-points decelerate behind the last known point',
+        'awaiting points': 'the arm is at rest, the goal waits for more points',
+    },
+    2.5,
+    {},
+    faults=(
+        'protective stop',
+        'an operator stops the program',
+        'an operator pauses the program',
+        'the speed slider is moved to 0',
+        'the network cable is cut',
+        'RTDE is cut',
+        'the pose is measured 6 mm off',
+        'the node is silent',
+    ),
+    pendant=('protective stop',),
+)
+
 FREEDRIVE = replace(
     _mode(
         'Freedrive',
@@ -558,6 +582,7 @@ MODES = (
     PATH_OFFSET,
     PATH_OFFSET_MOVES,
     APPEND,
+    REPLACED_TAILS,
     OUTPUTS,
     AT_A_POINT,
     SERVO_AT_A_POINT,

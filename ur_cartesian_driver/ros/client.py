@@ -26,6 +26,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from std_msgs.msg import Header
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
@@ -44,6 +45,7 @@ from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.goal_messages import goal_message, message_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_points
+from ur_cartesian_driver.srv import AppendPoints
 
 Message: TypeAlias = Any
 
@@ -176,6 +178,11 @@ class GoalClient:
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
         self._offsets: Any = None
+        self._appends: Any = None
+        #: Id of the goal that runs, its points so far, and the answer to the newest append.
+        self._goal_id: Any = None
+        self._points = 0
+        self._newest_answer: Future | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
         #: None: another one spins the node.
         self._executor: SingleThreadedExecutor | None = None
@@ -204,6 +211,8 @@ class GoalClient:
             # An executor that is about to wait would fail on a client that is destroyed meanwhile;
             # this one goes with its last reference.
             self._node.remove_waitable(self._client)
+        if self._appends is not None:
+            self._node.destroy_client(self._appends)
         if self._own_context is not None:
             self._node.destroy_node()
             rclpy.shutdown(context=self._own_context)
@@ -232,7 +241,13 @@ class GoalClient:
         :raises ConnectionError: the driver is gone; how the goal ended is not known.
         """
         self._find_server(timeout)
+        if goal.keep_open:
+            if self._appends is None:
+                service = f'{self._driver}/append_points'
+                self._appends = self._node.create_client(AppendPoints, service)
+            self._appends.wait_for_service(timeout_sec=timeout)
         self.signal_number = 0
+        points = len(goal.trajectory.points) or len(goal.packed.times)
         if len(goal.trajectory.points) >= MANY_POINTS:
             goal = in_flat_arrays(goal)
         failures: list[BaseException] = []
@@ -252,6 +267,7 @@ class GoalClient:
                     f'{self.action} did not accept the goal; this driver accepts all goals, so '
                     'another node serves the action, or the driver is shutting down.'
                 )
+            self._goal_id, self._points, self._newest_answer = handle.goal_id, points, None
             cancelled = False
 
             def check_end() -> None:
@@ -262,7 +278,10 @@ class GoalClient:
                     cancelled = True
                     handle.cancel_goal_async()
 
-            response = self._spin_until(handle.get_result_async(), check_end)
+            try:
+                response = self._spin_until(handle.get_result_async(), check_end)
+            finally:
+                self._goal_id = None
         if failures:
             failures[0].add_note(
                 f'the goal ended {STATUS_NAMES[response.status]}: {response.result.error_string}'
@@ -303,6 +322,69 @@ class GoalClient:
         header = Header(stamp=self._node.get_clock().now().to_msg())
         vector = Vector3(x=along, y=across, z=normal)
         self._offsets.publish(Vector3Stamped(header=header, vector=vector))
+
+    def append(
+        self,
+        path: Path | None = None,
+        *,
+        last: bool = False,
+        replace_from_point: int | None = None,
+        replace_from_time: float | None = None,
+    ) -> Future:
+        """
+        Append the points of a path to the goal that runs (``keep_open``), or replace its tail.
+
+        May be called from anywhere while the goal runs, also from the callback of :meth:`send`,
+        and does not wait; requests leave one after the other.
+
+        :param path: with times from the start of the goal; None = no point, with ``last``.
+        :param last: nothing follows.
+        :param replace_from_point: the first point whose place the new ones take, and that of all
+            points behind it.
+        :param replace_from_time: or the time from which on they do [s].
+        :return: a future of the response of ``~/append_points``. A refusal is such a response,
+            too: ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
+        :raises RuntimeError: no goal of this client runs.
+        :raises ValueError: both places are given.
+        """
+        if self._goal_id is None or self._appends is None:
+            raise RuntimeError(
+                'No goal runs to which points could be appended: send one with keep_open, and '
+                'append while send or execute waits for its end.'
+            )
+        if replace_from_point is not None and replace_from_time is not None:
+            raise ValueError('Give replace_from_point or replace_from_time, not both.')
+        request = AppendPoints.Request(goal_id=self._goal_id, last=last)
+        if path is not None:
+            goal = path.to_message()
+            if len(goal.trajectory.points) >= MANY_POINTS:
+                goal = in_flat_arrays(goal)
+            request.points, request.segments = goal.trajectory.points, goal.segments
+            request.io_commands, request.packed = goal.io_commands, goal.packed
+        if replace_from_point is not None:
+            request.replace, request.first_index = request.REPLACE_FROM_POINT, replace_from_point
+        elif replace_from_time is not None:
+            request.replace = request.REPLACE_FROM_TIME
+            request.replace_from_time = replace_from_time
+        answer = Future()
+
+        def ask(_: Future | None = None) -> None:
+            if request.replace == request.APPEND:  # where, is known once those before are taken
+                request.first_index = self._points
+            self._appends.call_async(request).add_done_callback(take)
+
+        def take(done: Future) -> None:
+            response = done.result()
+            if response.accepted:
+                self._points = response.points_received
+            answer.set_result(response)
+
+        before, self._newest_answer = self._newest_answer, answer
+        if before is None:
+            ask()
+        else:
+            before.add_done_callback(ask)
+        return answer
 
     def wait_ready(self, timeout: float) -> None:
         """
