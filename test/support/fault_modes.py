@@ -534,7 +534,7 @@ REPLACED_TAILS = _mode(
         'awaiting points': 'the arm is at rest, the goal waits for more points',
     },
     2.5,
-    {},
+    {'the network cable is cut': {'': {'steps': (*_PLUGGED_IN, 'resend')}}},
     faults=(
         'protective stop',
         'an operator stops the program',
