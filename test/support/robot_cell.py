@@ -195,9 +195,10 @@ class RobotCell:
         descriptor = state_memory.create()
         self.memory = state_memory.StateMemory(descriptor)
         os.close(descriptor)
-        self.loop_task = asyncio.create_task(
-            RobotLoop(Configure(config=self.config), self.memory, self._pipe).run(reader)
-        )
+        robot_loop = RobotLoop(Configure(config=self.config), self.memory, self._pipe)
+        # Not drawn, so that the robots of all cells get the same program, which is parsed once.
+        robot_loop._link.program.program_number = 1
+        self.loop_task = asyncio.create_task(robot_loop.run(reader))
         if not self.headless:
             await self.until(lambda: self.status.state is ConnectionState.CONNECTED)
             await self.load_pendant_program()

@@ -210,6 +210,8 @@ class ProgramRunner:
             self._builtins,
             thread_delay=self._thread_delay,
             interleaving=self._interleaving,
+            # In a thread of its own all of it can be done at once, and no cycle waits later.
+            lazily=self.compile_aside is _compile_at_once,
         )
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:

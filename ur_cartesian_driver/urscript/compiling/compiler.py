@@ -38,17 +38,20 @@ def compile_program(
     builtins: Mapping[str, Builtin],
     runtime: Runtime,
     procedures: dict[int, CompiledFunction],
+    *,
+    lazily: bool = False,
 ) -> CompiledFunction:
     """
     Compile a checked program and return the body of its main thread.
 
     :param procedures: existing functions by the identity of their scopes; the program's functions
         are added.
+    :param lazily: compile each function when it is called for the first time.
     """
     procedures |= {id(scope): _procedure(scope, runtime.interleaves) for scope in root.walk()}
     for scope in root.walk():
         compiler = _Compiler(scope, builtins, runtime, procedures)
-        compiler.fill(procedures[id(scope)])
+        compiler.fill(procedures[id(scope)], lazily=lazily)
     return procedures.pop(id(root))
 
 
@@ -64,13 +67,29 @@ def _procedure(scope: Scope, interleaves: bool) -> CompiledFunction:
 class _Compiler(ExpressionCompiler):
     """Compiles the body of one function."""
 
-    def fill(self, procedure: CompiledFunction) -> None:
+    def fill(self, procedure: CompiledFunction, *, lazily: bool) -> None:
         """Compile body and defaults into a procedure."""
-        procedure.body = self._block(self._scope.body, self._scope.owner)
+        procedure.body = self._body_of_first_call(procedure) if lazily else self._body()
         parameters = self._scope.definition.parameters if self._scope.definition else ()
         for slot, parameter in enumerate(parameters, FIRST_LOCAL):
             if parameter.default is not None:
                 procedure.defaults[slot] = self.copied_expression(parameter.default)
+
+    def _body(self) -> CompiledNode:
+        return self._block(self._scope.body, self._scope.owner)
+
+    def _body_of_first_call(self, procedure: CompiledFunction) -> CompiledNode:
+        """Return code that puts the body in its own place, and runs it."""
+
+        def plain(frame: StackFrame) -> Any:
+            procedure.body = self._body()
+            return procedure.body.run(frame)
+
+        def steps(frame: StackFrame) -> ScriptSteps:
+            body = procedure.body = self._body()
+            return (yield from body.run(frame)) if body.suspends else body.run(frame)
+
+        return CompiledNode(steps if procedure.suspends else plain, procedure.suspends)
 
     def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> CompiledNode:
         """Compile consecutive statements, and pay for them at the beginning."""

@@ -90,6 +90,8 @@ class ScriptInterpreter:
     :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
     :param thread_delay: frames after which a new thread begins.
     :param interleaving: draws where threads are switched; None = only where one takes time.
+    :param lazily: compile each function when it is called for the first time: much sooner ready,
+        but a cycle with such a call takes longer.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -101,6 +103,7 @@ class ScriptInterpreter:
         instruction_budget: int = 100_000,
         thread_delay: int = 0,
         interleaving: Random | None = None,
+        lazily: bool = False,
     ) -> None:
         #: Called with the id of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
@@ -121,7 +124,7 @@ class ScriptInterpreter:
             self._global_names = scope.globals
             self.globals: list[Any] = [UNSET] * len(scope.globals)
             procedures: dict[int, CompiledFunction] = {}
-            main = compile_program(scope, builtins, self, procedures)
+            main = compile_program(scope, builtins, self, procedures, lazily=lazily)
         except RecursionError:
             text = f'syntax_error_on_line:{program.line}:{program.name}:'
             reason = 'the program is nested too deeply'
