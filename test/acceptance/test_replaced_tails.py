@@ -73,8 +73,9 @@ def test_an_arm_whose_tail_is_replaced_again_and_again_neither_stops_nor_jumps(m
     assert speeds[between].min() > 0.8 * SPEED
     jumps = np.abs(np.diff(readings.accelerations, axis=0)).max(axis=1)
     assert jumps.max() < MAX_JUMP
-    # What the cell itself keeps grows by ten in a second.
-    assert max(blocks[1:]) - blocks[1] < 500 + 5 * SECONDS, 'of hundreds of thousands'
+    # A plan has thousands.
+    half = len(blocks) // 2
+    assert max(blocks[half:]) - max(blocks[:half]) < 1000, 'of hundreds of thousands'
 
 
 async def moves_around(cell, mode, **options):
