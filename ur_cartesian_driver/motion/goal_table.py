@@ -40,6 +40,8 @@ T = TypeVar('T')
 R = TypeVar('R', bound='Rows[Any]')
 
 NO_POSTURE = Posture()
+#: How many rows are made plain numbers at a time.
+_BLOCK = 4096
 
 
 def rows_where(mask: NDArray[np.bool_] | np.bool_) -> list[int]:
@@ -74,8 +76,10 @@ class Rows(Sequence[T]):
         return [(name, getattr(self, name)) for name in type(self).__slots__]
 
     def _numbers(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """Return the rows of some columns as plain numbers."""
-        return zip(*(getattr(self, name).tolist() for name in names), strict=True)
+        """Yield the rows of some columns as plain numbers, which take much more memory."""
+        for first in range(0, len(self), _BLOCK):
+            rows = slice(first, first + _BLOCK)
+            yield from zip(*(getattr(self, name)[rows].tolist() for name in names), strict=True)
 
     def take(self: R, rows: slice) -> R:
         """Return some of the rows."""

@@ -66,15 +66,14 @@ class MoveRows(Rows[Primitive]):
             'has_q_near',
             'velocities',
             'accelerations',
+            'durations',
             'blend_radii',
         )
-        times = self.durations.tolist()
-        for i, (kind, target, q_near, has_q_near, velocity, acceleration, radius) in enumerate(
-            numbers
-        ):
+        for i, row in enumerate(numbers):
             if i in self.others:
                 yield self.others[i]
                 continue
+            kind, target, q_near, has_q_near, velocity, acceleration, duration, radius = row
             move = MOVES[kind]
             yield move(
                 target=pose_from_row(target),
@@ -82,7 +81,7 @@ class MoveRows(Rows[Primitive]):
                 velocity=velocity,
                 acceleration=acceleration,
                 blend_radius=radius,
-                **({'duration': times[i]} if move in (MoveJ, MoveL) else {}),
+                **({'duration': duration} if move in (MoveJ, MoveL) else {}),
             )
 
 
