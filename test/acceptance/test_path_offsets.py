@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 from math import hypot, pi, sin
+import os
 from pathlib import Path as FilePath
 from runpy import run_path
 
@@ -31,6 +32,8 @@ pytestmark = [pytest.mark.acceptance]
 TIME, LENGTH, BEND = 4.0, 0.16, 0.005
 #: Time between two offsets [s].
 PERIOD = 0.02
+#: How many seams get random offsets; 100 take two minutes.
+SEAMS = int(os.environ.get('OFFSET_SEAMS', '1'))
 EXAMPLE = FilePath(__file__).resolve().parents[2] / 'examples' / 'tracked_seam.py'
 
 
@@ -108,13 +111,14 @@ def test_a_seam_bent_by_5_mm_is_followed_within_the_stated_lag(mode):
         assert progress.desired_pose.distance_to(progress.actual_pose) < 0.001
 
 
+@pytest.mark.parametrize('seed', range(1, 1 + SEAMS))
 @both_modes
-def test_jumps_and_nonsense_move_the_tool_within_the_bounds(mode):
+def test_jumps_and_nonsense_move_the_tool_within_the_bounds(mode, seed):
     limits, speed, acceleration = (0.0, 0.006, 0.006), 0.02, 0.2
 
     async def scenario(cell):
         seam = start(cell, mode, tolerance=0.003)
-        rng = np.random.default_rng(1)
+        rng = np.random.default_rng(seed)
 
         def sensor(place):
             offset = rng.choice((-1.0, 1.0, 0.004, np.nan, np.inf, 0.0), 2)
@@ -130,7 +134,6 @@ def test_jumps_and_nonsense_move_the_tool_within_the_bounds(mode):
     speeds = np.diff(beside, axis=0) / np.diff(seam.times)[:, None]
     assert np.abs(speeds).max() < 1.1 * speed
     accelerations = np.diff(speeds, axis=0) / np.diff(seam.times)[1:, None]
-    print('MAX', mode, np.abs(beside).max(), np.abs(speeds).max(), np.abs(accelerations).max())
     assert np.abs(accelerations).max() < 2.0 * acceleration  # servoj smooths, and quantises
     assert np.abs(seam.target[-1] - (0.0, LENGTH, 0.0)).max() < 2e-5
     assert any('were ignored' in line for line in outcome.report)
@@ -147,6 +150,44 @@ def test_a_sensor_that_fails_leaves_the_tool_where_the_goal_says(mode):
     late = seam.target[(seam.target[:, 1] > 0.7 * LENGTH) & (seam.target[:, 1] < 0.8 * LENGTH)]
     assert late[:, 0] == pytest.approx(-0.004, abs=5e-5)
     assert any('stale once' in line for line in outcome.report)
+
+
+def test_the_slider_slows_an_offset_of_the_controller_and_a_pause_holds_it():
+    slider = 0.3
+
+    async def scenario(cell):
+        seam = start(cell, ExecutionMode.PRIMITIVES, on_stale=StaleOffset.HOLD)
+        marks = []
+
+        def sensor(place):
+            aside = abs(place[0])
+            if not marks:
+                cell.robot.set_speed_slider(slider)
+                marks.append(0)
+            elif len(marks) == 1 and place[1] > 0.02:
+                seam.send(0.005)
+                if aside > 0.002:
+                    cell.robot.pause_program()
+                    marks.append(len(seam.states))
+            elif len(marks) == 2 and len(seam.states) > marks[1] + 100:
+                cell.robot.set_speed_slider(1.0)
+                cell.robot.play_program()
+                marks.append(len(seam.states))
+
+        outcome = await seam.end(sensor)
+        return seam, outcome, marks
+
+    seam, outcome, (_, paused, played) = run_cell(scenario)
+    assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+    beside, times = -seam.target[:, 0], seam.times
+    speeds = np.diff(beside) / np.diff(times)
+    slow = np.abs(speeds[:paused]).max()
+    assert 0.9 * slider * 0.02 < slow < 1.05 * slider * 0.02
+    held = beside[paused + 50 : played - 1]  # the controller's filter has settled
+    assert np.ptp(held) < 1e-6
+    assert 0.002 < held[0] < 0.003
+    assert beside.max() == pytest.approx(0.005, abs=5e-5)
+    assert np.abs(seam.target[-1] - (0.0, LENGTH, 0.0)).max() < 2e-5
 
 
 @both_modes
