@@ -35,6 +35,7 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import StaleOffset
 from ur_cartesian_driver.motion.offset_band import NO_OFFSET, OffsetBand, OffsetFeedback
 from ur_cartesian_driver.motion.plan import ReferencePath
@@ -135,6 +136,12 @@ def test_nothing_moves_before_the_inputs_are_there():
         1,
         True,
     )
+
+
+def test_only_our_own_program_takes_offsets():
+    job = replace(Cell().machine.job, offset_band=BAND)
+    assert job.own_program_needs == 'offsets of its path (path_offset)'
+    assert not replace(job, execution=ExecutionMode.SERVO).own_program_needs
 
 
 @pytest.mark.parametrize('last', [-5, MAX_SEQUENCE, 2**31 - 1])

@@ -46,7 +46,7 @@ def test_it_lasts_until_the_tool_is_back_on_its_path():
     assert press('z', release=inf).contains(1e9)
 
 
-def test_what_takes_offsets_along_the_axes_of_the_tool_is_left_out():
+def test_what_gives_way_along_the_axes_of_the_tool_is_left_out():
     assert press('z').without_yield(PLANNED, off(0.003, -0.004, 0.002)).position == pytest.approx(
         (0.103, 0.2, 0.302)
     )
@@ -69,7 +69,7 @@ def test_speeds_along_compliant_axes_are_those_of_the_target():
     assert stiff.actual_tcp_twist == pytest.approx((0.02, 0.0, 0.1, 0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_a_tool_that_takes_offsets_too_far_is_a_fault_while_it_presses():
+def test_a_tool_that_gives_way_too_far_is_a_fault_while_it_presses():
     window = press(('z', 'rx'))
     assert window.excess(PLANNED, state(off(0.02, -0.009, 0.0)), 1.5) is None
     assert window.excess(PLANNED, state(off(0.0, -0.011, 0.0)), 1.5) == (

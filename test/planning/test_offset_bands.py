@@ -177,7 +177,7 @@ def test_a_path_that_can_give_way_nowhere_is_refused(cell, changes, time, text):
         plan(goal(there), cell.state, cell.arm, OPTIONS)
 
 
-def test_in_a_blend_the_path_takes_offsets_only_if_it_turns_slowly(cell):
+def test_in_a_blend_the_path_gives_way_only_if_it_turns_slowly(cell):
     def gaps(radius, speed):
         segments = (
             Segment(velocity=speed, blend_radius=radius),
