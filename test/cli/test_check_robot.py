@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
 from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import EXPERIMENTS
-from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, Verdict
+from ur_cartesian_driver.robot.check.finding import Finding, RobotAddress, skipped, Verdict
 from ur_cartesian_driver.robot.check.rtde_observations import INPUT_GROUPS
 
 pytestmark = pytest.mark.slow
@@ -206,6 +206,23 @@ def test_each_experiment_is_asked_for_moves_and_returns(ur_sim):
 def test_the_other_generations_move_too(ur_sim, generation):
     findings, _ = run_experiments(ur_sim, lambda motion: motion == EXPERIMENTS[0].motion)
     assert findings['joint_move'].verdict is Verdict.OK
+
+
+@pytest.mark.parametrize(('version', 'asked'), [('5.21.0.0', 6), ('10.12.0.0', 5)])
+def test_what_the_software_is_not_known_to_have_is_not_tried(version, asked, monkeypatch):
+    def experiment(address, experiment, agrees, recordings):
+        tried.append(experiment.check)
+        return skipped(experiment.check, 'Not wanted')
+
+    tried = []
+    monkeypatch.setattr(check_robot, '_experiment', experiment)
+    observed = [Finding(check='software', verdict=Verdict.OK, text='', data={'version': version})]
+    findings = check_robot.experiment_findings(
+        RobotAddress(host='127.0.0.1'), observed, lambda _: True, {}
+    )
+    assert len(findings) == 6
+    assert len(tried) == asked
+    assert ('path_offset' in tried) == (asked == 6)
 
 
 def test_nothing_moves_without_a_yes(ur_sim):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The experiments tell the laws apart by which a controller may move."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -163,3 +165,33 @@ def test_programs_are_indented_and_move_slowly():
         assert all(line.startswith('  ') for line in body)
     assert experiments.JOINT_SPEED <= 0.2
     assert experiments.TOOL_SPEED <= 0.05
+
+
+def rests(*heights, off=0.0):
+    """Return the samples of a tool that rests at some distances one after the other [mm]."""
+    parts = []
+    for before, height in zip((0.0, *heights), (*heights, heights[-1]), strict=True):
+        parts += [np.full(int(0.4 / CYCLE), before), np.linspace(before, height, 50)]
+    distance = 1e-3 * np.concatenate(parts)
+    made = samples(distance)
+    padded = 1e-3 * made.target_q[:, 5] * 1e3
+    return replace(made, target_distance=padded, actual_distance=padded + off)
+
+
+@pytest.mark.parametrize(
+    ('made', 'missing'),
+    [
+        (rests(4.0, 8.0), []),
+        (rests(8.0), ['it is applied at rest']),
+        (rests(4.0, 8.0, 4.0), ['the arm stays there after path_offset_disable']),
+        (rests(4.0, 8.0, off=0.004), ['the reported target contains it']),
+        (
+            rests(4.0),
+            ['and in motion', 'the arm stays there after path_offset_disable'],
+        ),
+    ],
+)
+def test_a_path_offset_shows_where_and_how_long_it_is_applied(made, missing):
+    finding = ANALYSES['path_offset'](made)
+    assert finding.data['missing'] == missing
+    assert finding.verdict is (Verdict.NOTE if missing else Verdict.OK)

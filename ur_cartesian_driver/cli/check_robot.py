@@ -15,6 +15,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.check.experiment_runner import motion_refusal, run_experiment
 from ur_cartesian_driver.robot.check.experiments import Experiment, EXPERIMENTS, MotionSamples
@@ -77,9 +78,23 @@ def experiment_findings(
         print(f'\n{WARNING}')
         findings = []
         for experiment in EXPERIMENTS:
-            findings.append(_experiment(address, experiment, agrees, recordings))
+            if _is_known_by(experiment, observed):
+                findings.append(_experiment(address, experiment, agrees, recordings))
+            else:
+                findings.append(skipped(experiment.check, 'The software is not known to have it'))
             show(findings[-1])
     return findings
+
+
+def _is_known_by(experiment: Experiment, observed: list[Finding]) -> bool:
+    """Tell whether the robot's software has what an experiment needs, as far as it was found."""
+    if not experiment.feature:
+        return True
+    versions = [finding.data['version'] for finding in observed if finding.check == 'software']
+    numbers = [int(part) for version in versions for part in str(version).split('.')[:3]]
+    return len(numbers) < 3 or has_feature(
+        experiment.feature, (numbers[0], numbers[1], numbers[2])
+    )
 
 
 def _experiment(

@@ -10,6 +10,7 @@ from math import dist
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
@@ -33,7 +34,7 @@ from ur_cartesian_driver.robot.services.rtde_input_writer import speed_slider_wr
 from ur_cartesian_driver.robot.services.service_calls import SetSpeedSliderCall
 
 RECORDED = (
-    'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'target_TCP_speed',
+    'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'actual_TCP_pose', 'target_TCP_speed',
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
 )  # fmt: skip
 #: How long a program may take to move the arm, and to end [s].
@@ -162,4 +163,13 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
         scaling=recorder.column('speed_scaling'),
         fraction=recorder.column('target_speed_fraction'),
         stop_sent=stop_sent,
+        target_distance=_distance(recorder, 'target_TCP_pose'),
+        actual_distance=_distance(recorder, 'actual_TCP_pose'),
     )
+
+
+def _distance(recorder: RtdeRecorder, name: str) -> NDArray[np.float64]:
+    """Return how far a pose is from where it was at first (n,) [m]."""
+    positions = recorder.column(name)[:, :3]
+    distances: NDArray[np.float64] = np.linalg.norm(positions - positions[0], axis=1)
+    return distances

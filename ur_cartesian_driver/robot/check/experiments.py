@@ -10,7 +10,7 @@ The analyses are pure: samples in, a sentence and numbers out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import degrees, radians
 from typing import Any, TypeAlias
 
@@ -31,6 +31,11 @@ STOP_DISTANCE = 0.06
 MAX_START_COST = 0.1
 #: The slider in its experiment.
 SLIDER = 0.5
+#: How far a path offset goes, and then a line [m]; how fast both go [m/s], and how long the arm
+#: rests after each [s].
+OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
+#: Two heights are the same [m]; a filtered offset is at rest when it is slower [m/s].
+SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +59,9 @@ class MotionSamples:
     scaling: Array
     fraction: Array
     stop_sent: float = float('nan')
+    #: How far the target TCP and the measured one are from where they were at first (n,) [m].
+    target_distance: Array = field(default_factory=lambda: np.empty(0))
+    actual_distance: Array = field(default_factory=lambda: np.empty(0))
 
     def as_lists(self) -> dict[str, Any]:
         """Return everything as JSON has it, to the microradian."""
@@ -85,6 +93,7 @@ class Experiment:
     :param slider: the speed slider during the motion; None = as it is.
     :param stop_after: the program is stopped so long after the arm begins to move [s], on the
         clock of the controller.
+    :param feature: of ``program.render.FEATURES``, which the software has to have; empty = none.
     """
 
     check: str
@@ -93,6 +102,7 @@ class Experiment:
     analyse: Callable[[MotionSamples], Finding]
     slider: float | None = None
     stop_after: float | None = None
+    feature: str = ''
 
 
 def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:
@@ -184,6 +194,42 @@ def _program_stop(samples: MotionSamples) -> Finding:
     )
 
 
+def _path_offset(samples: MotionSamples) -> Finding:
+    """Tell where the tool rests with an offset, with a line beside it, and after both."""
+    heights = _resting_heights(samples)
+    both = 2.0 * OFFSET
+    off = np.abs(samples.target_distance - samples.actual_distance)
+    laws = {
+        'it is applied at rest': any(abs(height - OFFSET) < SAME_HEIGHT for height in heights),
+        'and in motion': any(abs(height - both) < SAME_HEIGHT for height in heights),
+        'the reported target contains it': bool(off.max(initial=0.0) < 2.0 * SAME_HEIGHT),
+        'the arm stays there after path_offset_disable': abs([0.0, *heights][-1] - both)
+        < SAME_HEIGHT,
+    }
+    shown = ', '.join(f'{1e3 * height:.1f}' for height in heights)
+    missing = [law for law, holds in laws.items() if not holds]
+    text = (
+        f'A path offset of {1e3 * OFFSET:g} mm, then a line of as much, rested at {shown} mm: '
+        + (f'not as assumed: {"; ".join(missing)}.' if missing else f'{", ".join(laws)}.')
+    )
+    return (note if missing else ok)('path_offset', text, heights=heights, missing=missing)
+
+
+def _resting_heights(samples: MotionSamples) -> list[float]:
+    """Return how far the target is from its start wherever it rests, in their order [m]."""
+    speeds = np.abs(np.gradient(samples.target_distance, samples.time))
+    moving = np.flatnonzero(speeds > RESTING_SPEED)
+    ends = np.append(moving, len(samples.time))
+    begins = np.append(0, moving + 1)
+    heights: list[float] = []
+    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+        if end > begin and samples.time[end - 1] - samples.time[begin] > 0.5 * OFFSET_REST:
+            height = float(samples.target_distance[end - 1])
+            if not heights or abs(height - heights[-1]) > SAME_HEIGHT:
+                heights.append(height)
+    return heights
+
+
 def _nearest(value: float, laws: dict[str, float]) -> str:
     """Return the law that predicts a value within 15 %; empty = none does."""
     name = min(laws, key=lambda law: abs(value / laws[law] - 1.0))
@@ -201,6 +247,31 @@ _THERE_AND_BACK = f"""start = get_target_joint_positions()
 goal = [start[0], start[1], start[2], start[3], start[4], start[5] + {WRIST_TURN:.6f}]
 movej(goal, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})
 movej(start, a={JOINT_ACCELERATION:g}, v={JOINT_SPEED:g})"""
+_BESIDE = f"""start = get_target_tcp_pose()
+away = pose_trans(start, p[0, 0, -1, 0, 0, 0])
+size = 0.0
+thread follow():
+  while True:
+    if size < {OFFSET:g}:
+      size = size + {OFFSET_SPEED:g} * get_steptime()
+    end
+    x = size * (away[0] - start[0])
+    y = size * (away[1] - start[1])
+    z = size * (away[2] - start[2])
+    path_offset_set([x, y, z, 0, 0, 0], 1)
+    sync()
+  end
+end
+path_offset_set_max_offset({2.0 * OFFSET:g}, 0.52)
+path_offset_set_alpha_filter(get_steptime() / (get_steptime() + 0.018))
+path_offset_enable()
+run follow()
+sleep({OFFSET / OFFSET_SPEED + OFFSET_REST:g})
+goal = pose_trans(start, p[0, 0, {-OFFSET:g}, 0, 0, 0])
+movel(goal, a={TOOL_ACCELERATION:g}, v={OFFSET_SPEED:g})
+sleep({OFFSET_REST:g})
+path_offset_disable(2)
+sleep({OFFSET_REST:g})"""
 _SLOW = f'a={TOOL_ACCELERATION:g}, v={TOOL_SPEED:g}'
 _WRIST = f'Wrist 3 turns by {degrees(WRIST_TURN):.0f} degrees and back, at up to'
 _RETRACT = 'mm against its z axis, away from the work'
@@ -254,6 +325,16 @@ EXPERIMENTS = (
         script=_tool_line(-STOP_DISTANCE, _SLOW),
         analyse=_program_stop,
         stop_after=0.6,
+    ),
+    Experiment(
+        check='path_offset',
+        motion=(
+            f'The tool moves {2e3 * OFFSET:g} {_RETRACT}, half of that by a path offset, at '
+            f'{1e3 * OFFSET_SPEED:g} mm/s, and back at {1e3 * TOOL_SPEED:g} mm/s.'
+        ),
+        script=_BESIDE,
+        analyse=_path_offset,
+        feature='path_offset',
     ),
 )
 
