@@ -60,6 +60,7 @@ def sim_parameters(sim, **more):
         'robot_loop': 'thread',
         # Robot, driver and client share this interpreter, which may be busy for longer.
         'max_state_age': 0.0,
+        'robot_receive_timeout': 2.0,
         **more,
     }
 

@@ -9,6 +9,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 import pytest
 from std_srvs.srv import Trigger
 
+from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.robot_state import RobotMode
@@ -125,7 +126,7 @@ def test_a_service_that_takes_its_time_holds_up_nobody(cell):
     assert cell.sim.state().robot_mode is RobotMode.IDLE
 
 
-def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
+def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell, capsys):
     cell, call = single_cell, ServiceClient(single_cell)
     cell.sim.protective_stop()
     cell.spin_until(lambda: cell.node.driver.status.state is ConnectionState.STOPPED)
@@ -138,9 +139,9 @@ def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
     assert cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))[1].error_code == 0
     cell.sim.emergency_stop()
     cell.spin_until(lambda: cell.node.driver.status.state is ConnectionState.STOPPED)
-    answer = call('recover', Recover.Request())
-    assert not answer.success
-    assert 'release the button' in answer.message
+    with cell.spun():
+        assert main(['recover']) == 1
+    assert 'release the button' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     _add_demo(sub)
     _add_sim(sub)
     _add_send(sub)
+    _add_recover(sub)
     _add_validate(sub)
     _add_show(sub)
     _add_sweep(sub)
@@ -129,16 +130,32 @@ def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
     )
 
 
+def _add_driver(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        '--driver',
+        default='ur_cartesian_driver',
+        help='name of the driver node, with its namespace if it has one',
+    )
+
+
+def _add_recover(sub: Commands[argparse.ArgumentParser]) -> None:
+    recover = _add(
+        sub, 'recover', commands.recover, 'bring a stopped robot back to where it takes goals'
+    )
+    _add_driver(recover)
+    recover.add_argument(
+        '--unlock',
+        action='store_true',
+        help='unlock a protective stop, whose cause you have found and removed',
+    )
+
+
 def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     send = _add(
         sub, 'send', commands.send, 'send a goal to a running driver and wait for its result'
     )
     _add_goal(send)
-    send.add_argument(
-        '--driver',
-        default='ur_cartesian_driver',
-        help='name of the driver node, with its namespace if it has one',
-    )
+    _add_driver(send)
     send.add_argument(
         '--wait',
         type=argument_types.seconds,

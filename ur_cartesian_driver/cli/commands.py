@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands ``demo``, ``send`` and ``where``."""
+"""The commands ``demo``, ``send``, ``recover`` and ``where``."""
 
 from __future__ import annotations
 
@@ -87,6 +87,16 @@ def send(arguments: argparse.Namespace) -> int:
     if status == 'SUCCEEDED':
         return 0
     return SIGNAL_STATUS + sender.signal_number if sender.signal_number else 1
+
+
+def recover(arguments: argparse.Namespace) -> int:
+    """Bring a stopped robot back to where it takes goals; say what a person has to do."""
+    from ur_cartesian_driver.ros import client
+
+    with client.GoalClient(arguments.driver) as caller:
+        response = caller.recover(unlock_protective_stop=arguments.unlock)
+    print(response.message)
+    return 0 if response.success else 1
 
 
 def _named_file(arguments: argparse.Namespace) -> Path:

@@ -79,7 +79,8 @@ class MotionHandle:
         :param waypoints: with times from the start of the goal, in its frame.
         :param segments: none, or one for each point.
         :param io_commands: their waypoints are numbered from the start of the goal.
-        :param last: nothing follows; without points: the goal ends at its last point.
+        :param last: nothing follows, the arm comes to rest at the last point; without points: at
+            the ending that was planned, a spline behind its last point.
         :param replace_from_point: the first point whose place the new ones take, and that of all
             points behind it (SPLINE and SERVO).
         :param replace_from_time: or the time from which on they do, as those of points [s]; the

@@ -45,7 +45,7 @@ from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.goal_messages import goal_message, message_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_points
-from ur_cartesian_driver.srv import AppendPoints
+from ur_cartesian_driver.srv import AppendPoints, Recover
 
 Message: TypeAlias = Any
 
@@ -385,6 +385,25 @@ class GoalClient:
         else:
             before.add_done_callback(ask)
         return answer
+
+    def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
+        """
+        Bring a stopped robot back to READY, as far as software may; return the response.
+
+        :param unlock_protective_stop: a person has looked at the cause of a protective stop and
+            removed it; otherwise the stop is left to a person.
+        :param timeout: how long to look for the driver [s].
+        :raises TimeoutError: no driver answers.
+        :raises ConnectionError: the driver is gone.
+        """
+        self._find_server(timeout)
+        service = self._node.create_client(Recover, f'{self._driver}/recover')
+        try:
+            service.wait_for_service(timeout_sec=timeout)
+            request = Recover.Request(unlock_protective_stop=unlock_protective_stop)
+            return self._spin_until(service.call_async(request), lambda: None)
+        finally:
+            self._node.destroy_client(service)
 
     def wait_ready(self, timeout: float) -> None:
         """
