@@ -25,6 +25,7 @@ LEFT_OUT = (
     'Press',
     'Path offset',
     'Path offset, PRIMITIVES',
+    'Replaced tails',
 )
 for left_out in LEFT_OUT:
     del KINDS[left_out]

@@ -251,6 +251,12 @@ def test_a_place_on_the_rest_is_a_place_on_the_whole():
     ('of', 'place', 'numbers', 'text'),
     [
         (goal(keep_open=True), at(1, 0.5), {}, 'keep_open is true, so the goal does not hold'),
+        (
+            goal(frame_id='left_tool0'),
+            at(1, 0.5),
+            {},
+            'is left_tool0, which has moved with the arm',
+        ),
         (goal(), at(4, 0.5), {}, 'stopped_point, stopped_fraction are 4 and 0.5'),
         (goal(), at(1, nan), {}, 'are 1 and nan'),
         (goal(), at(1, 0.5), {'overlap': -0.1}, 'overlap is -0.1 m, but must be from 0 to 1 m'),

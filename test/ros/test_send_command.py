@@ -111,6 +111,14 @@ def test_a_goal_that_was_stopped_is_taken_up_again(senders, tmp_path):
     output, errors = again.communicate(timeout=60.0)
     assert again.returncode == 0, output + errors
     assert not note.exists()
+    frame = 'trajectory: {header: {frame_id: tool0}, points: [{time_from_start: {sec: 5}, '
+    goal.write_text(frame + 'pose: {position: {z: 0.1}}}]}')
+    relative = senders.command(goal)
+    wait_for(lambda: senders.moving or relative.poll() is not None, 30.0)
+    relative.send_signal(signal.SIGINT)
+    output, _ = relative.communicate(timeout=10.0)
+    assert 'it cannot be taken up again: ' in output, output
+    assert not note.exists()
 
 
 def test_a_sender_whose_output_is_closed_cancels_its_goal(senders):

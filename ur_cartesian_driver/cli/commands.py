@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 from ur_cartesian_driver.cli.stopped_place import read_place, write_place
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
+from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.resources import share_path
@@ -55,12 +56,7 @@ def send(arguments: argparse.Namespace) -> int:
     if arguments.resume:
         place = read_place(_named_file(arguments))
         try:
-            goal, left = client.resumed_goal(
-                goal,
-                place,
-                overlap=1e-3 * arguments.overlap,
-                approach=1e-3 * arguments.approach,
-            )
+            goal, left = _resumed(goal, place, arguments)
         except InvalidGoal as refusal:
             print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
             return 1
@@ -105,6 +101,18 @@ def _named_file(arguments: argparse.Namespace) -> Path:
     return goal_file(arguments.file)
 
 
+def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tuple[Any, Any]:
+    """
+    Return what is left of a goal, as a message and in our own terms.
+
+    :raises InvalidGoal: it cannot be taken up again.
+    """
+    from ur_cartesian_driver.ros import client
+
+    overlap, approach = 1e-3 * arguments.overlap, 1e-3 * arguments.approach
+    return client.resumed_goal(goal, place, overlap=overlap, approach=approach)
+
+
 def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
     """Note where a goal was stopped, and say how it is taken up again."""
     from ur_cartesian_driver.ros.messages.action_messages import outcome_of
@@ -115,6 +123,12 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
         return  # nothing has moved: what was known before still holds
     if place is not None and left is not None:
         place = left.original(place)
+    if place is not None:
+        try:
+            _resumed(read_goal(arguments), place, arguments)
+        except InvalidGoal as refusal:
+            print(f'it cannot be taken up again: {refusal}')
+            place = None
     try:
         written = write_place(_named_file(arguments), place)
     except OSError as error:

@@ -107,6 +107,9 @@ def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
         'robot_ip': '127.0.0.1',
         'ur_type': arm.model,
         'headless_mode': 'true',
+        # The robot is simulated here, and a busy computer may be late.
+        'robot_receive_timeout': 2.0,
+        'max_state_age': 0.0,
         'rtde_port': rtde,
         'primary_port': primary,
         'dashboard_port': dashboard,

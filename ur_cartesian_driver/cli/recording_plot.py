@@ -236,7 +236,7 @@ def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
             rows.append((name.replace(' digital output', ''), is_on.astype(np.float64)))
     for channel, values in enumerate(np.nan_to_num(recording.analog_output).T):
         if np.ptp(values) > 0.0:
-            rows.append((f'analog {channel}, to {values.max():.3g}', values / values.max()))
+            rows.append((f'analog {channel}, to {values.max():.3g} A or V', values / values.max()))
     paused = recording.runtime_state == RuntimeState.PAUSED
     return [*rows, ('paused', paused.astype(np.float64))] if paused.any() else rows
 

@@ -36,7 +36,7 @@ T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 T_TOOL0_FLANGE = Pose((0.0, 0.0, 0.0), (-0.5, -0.5, -0.5, 0.5))
 
 BASE, BASE_LINK = 'base', 'base_link'
-TOOL0, FLANGE, TCP = 'tool0', 'flange', 'tool0_controller'
+TOOL0, FLANGE, TCP = FRAMES_OF_TOOL = 'tool0', 'flange', 'tool0_controller'
 
 _UNIT_TOLERANCE = 1e-3
 _FRAME_ID, _CONTROLLED = 'trajectory.header.frame_id', 'trajectory.controlled_frame'

@@ -298,7 +298,8 @@ class Path(PathWithEvents):
 
         As :func:`~.resumption.resume`: overlap and approach are lengths [m].
 
-        :raises InvalidGoal: the path is kept open, or a number is out of its range.
+        :raises InvalidGoal: the path is kept open, its frame moves with the arm, or a number is
+            out of its range.
         """
         left = resume(self._table(), place, overlap=overlap, approach=approach, start=self.start)
         return Path.from_goal(left.goal)

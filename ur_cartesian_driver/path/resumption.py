@@ -37,6 +37,7 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
@@ -99,7 +100,8 @@ def resume(
         axis [m]; 0 = straight to the path.
     :param start: where the tool was when the goal began, in the frame of the goal. Only a spline
         needs it whose first twist is NaN.
-    :raises InvalidGoal: the goal is kept open, or a number is out of its range.
+    :raises InvalidGoal: the goal is kept open, its frame moves with the arm, or a number is out of
+        its range.
     """
     return _Resumption(goal, place, overlap, approach, start).resumed()
 
@@ -512,6 +514,14 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             'keep_open',
             'is true, so the goal does not hold all points of its path',
             'send what is left of the path as a goal of its own',
+        )
+    # The name may have a prefix. A goal that knows the pose of its frame keeps it.
+    if goal.frame_id.endswith(FRAMES_OF_TOOL) and goal.T_base_frame == IDENTITY:
+        raise InvalidGoal(
+            'trajectory.header.frame_id',
+            f'is {goal.frame_id}, which has moved with the arm since the goal began, and the path '
+            'with it',
+            'give the path in base, or in another frame that stays',
         )
     for k, segment in enumerate(goal.segments):
         if segment.dwell and resolve_execution_mode(goal_table(goal)).traits.is_spline:

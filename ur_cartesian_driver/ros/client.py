@@ -420,7 +420,7 @@ class GoalClient:
             deadline = monotonic() + timeout
             while not latest or latest[-1].state < DriverStatus.READY:
                 if monotonic() > deadline:
-                    needed = latest[-1].message if latest else 'It publishes no status.'
+                    needed = latest[-1].message if latest else self._how_to_find()
                     raise TimeoutError(
                         f'The driver {self._driver} is not ready after {timeout:g} s: {needed}'
                     )
@@ -430,11 +430,15 @@ class GoalClient:
 
     def _find_server(self, timeout: float) -> None:
         if not self._client.wait_for_server(timeout_sec=timeout):
-            domain = os.environ.get('ROS_DOMAIN_ID', '0')
             raise TimeoutError(
-                f'No driver serves {self.action} (searched for {timeout:g} s): start it, with '
-                f'the same ROS_DOMAIN_ID as here, which is {domain}.'
+                f'No driver serves {self.action} (searched for {timeout:g} s): '
+                f'{self._how_to_find()}'
             )
+
+    @staticmethod
+    def _how_to_find() -> str:
+        domain = os.environ.get('ROS_DOMAIN_ID', '0')
+        return f'start it, with the same ROS_DOMAIN_ID as here, which is {domain}.'
 
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
         """Spin until a future is done."""
