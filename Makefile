@@ -25,7 +25,7 @@ setup: $(stamp)  ## Make .venv with ROS 2, the tools and this package (PYTHON=py
 # Modules of the package count at once; only what is built or installed asks for another set-up.
 $(stamp): $(wildcard msg/* srv/* action/* cmake/*) CMakeLists.txt setup.py package.xml \
 		pyproject.toml requirements-dev.txt scripts/setup.sh
-	@echo 'Setting up $(VENV): about a minute the first time.'
+	@echo 'Setting up $(VENV): about two minutes the first time.'
 	VENV=$(VENV) scripts/setup.sh
 	@touch $@
 

@@ -84,3 +84,18 @@ def test_the_page_names_every_method_of_a_path():
     known |= {'from_message', 'from_yaml', 'to_yaml'}
     missing = [name for name in methods if not re.search(rf'\b{name}\b', page)]
     assert set(missing) <= known
+
+
+def test_the_goal_of_the_page_on_outputs_is_the_glue_example(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (CHECKOUT / 'doc' / 'outputs.md').read_text('utf-8')
+    (program,) = re.findall(r'^```python\n(.*?)^```$', page, re.DOTALL | re.MULTILINE)
+    exec(program, {})
+
+    def content(file):
+        goal = Path.load(file).goal()
+        motions = [(row.velocity, row.acceleration, row.blend_radius) for row in goal.segments]
+        places = [waypoint.pose.position for waypoint in goal.waypoints]
+        return places, motions, goal.io_commands, goal.safe_outputs
+
+    assert content('glue.yaml') == content(CHECKOUT / 'config' / 'examples' / 'glue.yaml')
