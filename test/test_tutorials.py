@@ -3,6 +3,7 @@
 """The tutorials, followed: what a reader saves runs, and prints what the pages show."""
 
 import re
+from runpy import run_path
 import subprocess
 import sys
 
@@ -12,6 +13,13 @@ from robot_cell import run_cell
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.cli.plan_commands import GoalPlanning
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+from ur_cartesian_driver.path import Frames, Pose, StaticFrame
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.sim.simulator_config import HOME
 
 pytestmark = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
@@ -86,6 +94,23 @@ def test_the_seam_of_the_page_is_that_of_the_example():
         and line not in ('seam = (', "Path(frame='part', tool='nozzle')")
         and not line.startswith('from ')
     ] == []
+
+
+def test_the_margins_of_the_seam_before_and_after_the_part_is_moved_are_those_of_the_page():
+    example = run_path(str(CHECKOUT / 'examples' / 'seam.py'))
+    page = SEAM.read_text('utf-8')
+    (moved,) = re.findall(r'move the part by 5 cm: `Pose\(\((.*?)\)\)`', page)
+    part, nozzle = example['FRAMES']
+    arm = Arm(robot_model('ur5e'))
+    state = state_at_rest(arm, HOME)
+    margins = []
+    for x, y, z in part.T_parent_frame.position, map(float, moved.split(',')):
+        at = StaticFrame('part', 'base', Pose((x, y, z)))
+        frames = Frames(static_frames=[at, nozzle])
+        goal = example['seam']().goal(frames, ArmSnapshot.of(state))
+        report = '\n'.join(plan(goal, state, arm, PlanningOptions()).report)
+        margins += re.findall(r'tightest margin: (\S+) rad', report)
+    assert f'from {margins[0]} to {margins[1]} rad' in page
 
 
 @pytest.mark.slow
