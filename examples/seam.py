@@ -18,8 +18,7 @@ def seam(start: Pose | None = None) -> Path:
         .joint((-0.55, -0.28, 0.40), tilted(deg(20)), posture={'elbow_joint': 1.6})
         .line((-0.55, -0.20, 0.25), blend=mm(5))
         .set(TORCH, True)  # at the end of the line before it, where the seam begins
-        .at(speed=0.05)
-        .process((-0.55, 0, 0.25))
+        .at(speed=0.05).process((-0.55, 0, 0.25))
         .arc((-0.47, 0.08, 0.25), via=(-0.527, 0.057, 0.25))
         .process((-0.35, 0.08, 0.25)).set(TORCH, False)
     )  # fmt: skip

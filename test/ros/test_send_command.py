@@ -7,7 +7,6 @@ import signal
 import subprocess
 from subprocess import PIPE
 import sys
-import threading
 
 import pytest
 from waiting import wait_for
@@ -68,24 +67,14 @@ class Senders:
 @pytest.fixture
 def senders(no_thread_left, sim, make_cell, tmp_path):
     """Start senders for a node that runs in a thread."""
-    # Robot, driver and test share one interpreter, and the cores with a process that starts.
-    cell = make_cell(sim, robot_receive_timeout=1.0, max_state_age=0.0)
+    cell = make_cell(sim)
     cell.wait_ready()
-    ended = threading.Event()
-
-    def serve():
-        while not ended.is_set():
-            cell.executor.spin_once(timeout_sec=0.05)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
     made = Senders(cell, tmp_path)
     hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # senders inherit that of nohup
-    yield made
+    with cell.spun():
+        yield made
+        made.close()
     signal.signal(signal.SIGHUP, hangup)
-    made.close()
-    ended.set()
-    thread.join()
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
