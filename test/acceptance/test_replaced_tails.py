@@ -16,6 +16,7 @@ from runpy import run_path
 import sys
 
 from append_goals import AppendMotion, moved, retained_sizes
+from example_goals import example_goal
 import numpy as np
 import pytest
 from replanner import PERIOD, RADIUS, Readings, replan, Replanner
@@ -183,3 +184,24 @@ def test_the_chunks_of_the_example_are_one_motion():
     x, y, z = (ARM.forward_rows(readings.moving[:, 1:7])[:, :3] - home.position).T
     assert np.hypot(x, y - 0.05) == pytest.approx(0.05, abs=1e-3)
     assert 0.003 < z.max() < 0.006, 'where the later plans have it'
+
+
+def test_the_goal_file_takes_the_tail_of_the_other_file():
+    async def scenario(cell):
+        readings = Readings(cell, 15.0)
+        await readings.connect()
+        state = cell.memory.read()
+        motion = AppendMotion(cell, example_goal('replanned', state))
+        assert await motion.until(lambda: motion.motion.progress and motion.progress.time > 4.0)
+        points = example_goal('replanned_tail', state).waypoints
+        await motion.append(points, replace_from_time=6.0, last=True)
+        return motion.home, points, await motion.ended(), readings
+
+    home, points, end, readings = run_cell(scenario)
+    assert end.succeeded, end.text
+    assert end.report == (), 'it was never brought to rest'
+    tool = ARM.forward_rows(readings.moving[:, 1:7])[:, :3]
+    assert tool[:, 1].max() - home.position[1] == pytest.approx(0.08, abs=1e-4)
+    assert np.linalg.norm(tool - points[0].pose.position, axis=1).min() < 1e-4
+    assert tool[-1] == pytest.approx(home.position, abs=1e-4)
+    assert np.abs(np.diff(readings.accelerations, axis=0)).max() < MAX_JUMP

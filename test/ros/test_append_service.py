@@ -6,6 +6,7 @@ import pytest
 from rclpy.duration import Duration
 from unique_identifier_msgs.msg import UUID
 
+from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.path import ExecutionMode, Path
 from ur_cartesian_driver.ros.client import GoalClient, in_flat_arrays
@@ -134,3 +135,38 @@ def test_a_client_replaces_the_tail_of_its_goal_and_appends_to_it(single_cell):
     assert (appended.accepted, appended.first_index) == (True, 4), appended.message
     assert (end.accepted, end.points_received) == (True, 6), end.message
     assert cell.T_base_tcp.position == pytest.approx((x, y + 0.03, z), abs=1e-4)
+
+
+def test_a_shell_appends_to_the_goal_of_another_client(single_cell, tmp_path, capsys):
+    cell = single_cell
+    (x, y, z), start = cell.T_base_tcp.position, cell.T_base_tcp
+    tail = tmp_path / 'tail.yaml'
+    Path(start).spline((x, y + 0.01, z), duration=2.0).save(tail)
+
+    def append(*options):
+        return main(['append', *options]), *capsys.readouterr()
+
+    with cell.spun():
+        status, _, said = append('--last')
+    assert status == 1
+    assert said == 'No goal runs to which points could be appended: send one with keep_open.\n'
+    whole = Path(start).spline((x, y + 0.02, z), duration=1.0).executed_as(ExecutionMode.SPLINE)
+    handle = cell.send(whole.keep_open().to_message())
+    with cell.spun():
+        for place in ('--replace-from-time', '--replace-from-point'):
+            status, _, said = append(str(tail), place, '0')
+            assert status == 1
+            assert said.startswith('What is to be replaced has been sent to the robot; replace')
+        status, said, _ = append(str(tail), '--last')
+        assert status == 0
+        assert said.startswith('1 point appended, the goal has 2')
+    _, result = cell.result(handle)
+    assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string
+    assert cell.T_base_tcp.position == pytest.approx((x, y + 0.01, z), abs=1e-4)
+
+
+def test_a_shell_is_asked_for_the_points(capsys):
+    assert main(['append']) == 1
+    assert capsys.readouterr().err == (
+        'ur-cartesian append: which points? Name a file, or end the goal with --last\n'
+    )

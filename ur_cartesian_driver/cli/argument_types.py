@@ -61,6 +61,14 @@ def count(text: str) -> int:
     return number
 
 
+def point_index(text: str) -> int:
+    """Return the index of a point of a goal, which may be endless."""
+    number = int(text)
+    if not 0 <= number < 2**32:
+        raise argparse.ArgumentTypeError(f'{text} is not an index from 0')
+    return number
+
+
 def factor(text: str) -> float:
     """Return a number above 0."""
     number = float(text)

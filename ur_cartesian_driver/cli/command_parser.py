@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     _add_demo(sub)
     _add_sim(sub)
     _add_send(sub)
+    _add_append(sub)
     _add_recover(sub)
     _add_validate(sub)
     _add_show(sub)
@@ -135,6 +136,36 @@ def _add_driver(command: argparse.ArgumentParser) -> None:
         '--driver',
         default='ur_cartesian_driver',
         help='name of the driver node, with its namespace if it has one',
+    )
+
+
+def _add_append(sub: Commands[argparse.ArgumentParser]) -> None:
+    append = _add(
+        sub,
+        'append',
+        commands.append,
+        'append points to the running goal, which was sent with keep_open, or replace its tail',
+    )
+    _add_goal(append, optional=True)
+    _add_driver(append)
+    append.add_argument(
+        '--last',
+        action='store_true',
+        help='nothing follows: the goal ends with these points, or without a file with those '
+        'that it has',
+    )
+    place = append.add_mutually_exclusive_group()
+    place.add_argument(
+        '--replace-from-point',
+        type=argument_types.point_index,
+        metavar='N',
+        help='first point, counted from 0, that is replaced, with all behind it',
+    )
+    place.add_argument(
+        '--replace-from-time',
+        type=argument_types.seconds,
+        metavar='SECONDS',
+        help='time from the start of the goal from which on its points are replaced',
     )
 
 

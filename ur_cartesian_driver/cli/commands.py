@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands ``demo``, ``send``, ``recover`` and ``where``."""
+"""The commands ``demo``, ``send``, ``append``, ``recover`` and ``where``."""
 
 from __future__ import annotations
 
@@ -83,6 +83,23 @@ def send(arguments: argparse.Namespace) -> int:
     if status == 'SUCCEEDED':
         return 0
     return SIGNAL_STATUS + sender.signal_number if sender.signal_number else 1
+
+
+def append(arguments: argparse.Namespace) -> int:
+    """Append points to the goal that runs, or replace its tail; print what the driver says."""
+    from ur_cartesian_driver.ros import client
+
+    if not arguments.file and not arguments.last:
+        raise ValueError('which points? Name a file, or end the goal with --last')
+    with client.GoalClient(arguments.driver) as caller:
+        response = caller.append_to_running(
+            read_goal(arguments) if arguments.file else None,
+            last=arguments.last,
+            replace_from_point=arguments.replace_from_point,
+            replace_from_time=arguments.replace_from_time,
+        )
+    print(response.message, file=sys.stdout if response.accepted else sys.stderr)
+    return 0 if response.accepted else 1
 
 
 def recover(arguments: argparse.Namespace) -> int:

@@ -18,14 +18,18 @@ from time import monotonic
 from types import FrameType
 from typing import Any, TypeAlias
 
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import (
+    DurabilityPolicy,
+    qos_profile_action_status_default,
+    QoSProfile,
+)
 from rclpy.task import Future
 from std_msgs.msg import Header
 
@@ -57,6 +61,10 @@ STATUS_NAMES = {
 }
 #: Time without a server after which the driver counts as gone [s].
 SERVER_TIMEOUT = 3.0
+#: How long to wait for the list of goals; a driver that has had none publishes none [s].
+GOALS_TIMEOUT = 2.0
+#: An index that no goal has: the refusal of it says how many points the goal has.
+UNKNOWN_POINT = 2**32 - 1
 #: From so many points on a goal is sent in flat arrays.
 MANY_POINTS = 200
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -181,7 +189,7 @@ class GoalClient:
         self._appends: Any = None
         #: Id of the goal that runs, its points so far, and the answer to the newest append.
         self._goal_id: Any = None
-        self._points = 0
+        self._points: int | None = 0  # None: another client sent it
         self._newest_answer: Future | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
         #: None: another one spins the node.
@@ -242,10 +250,7 @@ class GoalClient:
         """
         self._find_server(timeout)
         if goal.keep_open:
-            if self._appends is None:
-                service = f'{self._driver}/append_points'
-                self._appends = self._node.create_client(AppendPoints, service)
-            self._appends.wait_for_service(timeout_sec=timeout)
+            self._find_append_service(timeout)
         self.signal_number = 0
         points = len(goal.trajectory.points) or len(goal.packed.times)
         if len(goal.trajectory.points) >= MANY_POINTS:
@@ -325,7 +330,7 @@ class GoalClient:
 
     def append(
         self,
-        path: Path | None = None,
+        path: Path | FollowCartesianTrajectory.Goal | None = None,
         *,
         last: bool = False,
         replace_from_point: int | None = None,
@@ -337,7 +342,8 @@ class GoalClient:
         May be called from anywhere while the goal runs, also from the callback of :meth:`send`,
         and does not wait; requests leave one after the other.
 
-        :param path: with times from the start of the goal; None = no point, with ``last``.
+        :param path: with times from the start of the goal; of a message count the points, segments
+            and outputs. None = no point, with ``last``.
         :param last: nothing follows.
         :param replace_from_point: the first point whose place the new ones take, and that of all
             points behind it.
@@ -356,7 +362,7 @@ class GoalClient:
             raise ValueError('Give replace_from_point or replace_from_time, not both.')
         request = AppendPoints.Request(goal_id=self._goal_id, last=last)
         if path is not None:
-            goal = path.to_message()
+            goal = path.to_message() if isinstance(path, Path) else path
             if len(goal.trajectory.points) >= MANY_POINTS:
                 goal = in_flat_arrays(goal)
             request.points, request.segments = goal.trajectory.points, goal.segments
@@ -370,14 +376,18 @@ class GoalClient:
 
         def ask(_: Future | None = None) -> None:
             if request.replace == request.APPEND:  # where, is known once those before are taken
-                request.first_index = self._points
+                request.first_index = UNKNOWN_POINT if self._points is None else self._points
             self._appends.call_async(request).add_done_callback(take)
 
         def take(done: Future) -> None:
             response = done.result()
-            if response.accepted:
+            was_unknown = self._points is None
+            if response.accepted or was_unknown:
                 self._points = response.points_received
-            answer.set_result(response)
+            if was_unknown and request.replace == request.APPEND:
+                ask()  # the refusal said how many points the goal has
+            else:
+                answer.set_result(response)
 
         before, self._newest_answer = self._newest_answer, answer
         if before is None:
@@ -385,6 +395,57 @@ class GoalClient:
         else:
             before.add_done_callback(ask)
         return answer
+
+    def append_to_running(
+        self,
+        path: Path | FollowCartesianTrajectory.Goal | None = None,
+        *,
+        timeout: float = 10.0,
+        **where: Any,
+    ) -> AppendPoints.Response:
+        """
+        Append to the goal that moves the arm, whoever sent it; return the response.
+
+        :param path: as ``where`` (``last``, ``replace_from_point``, ``replace_from_time``) and the
+            response, see :meth:`append`. That no goal runs is such a refusal, too.
+        :param timeout: how long to look for the driver [s].
+        :raises TimeoutError: no driver answers.
+        :raises ConnectionError: the driver is gone.
+        """
+        self._find_server(timeout)
+        self._find_append_service(timeout)
+        self._goal_id, self._points, self._newest_answer = self._running_goal(), None, None
+        if self._goal_id is None:
+            return AppendPoints.Response(
+                message='No goal runs to which points could be appended: send one with keep_open.'
+            )
+        try:
+            return self._spin_until(self.append(path, **where), lambda: None)
+        finally:
+            self._goal_id = None
+
+    def _running_goal(self) -> Any:
+        """Return the id of the goal that moves the arm, the oldest one: others wait or preempt."""
+        latest: list[GoalStatusArray] = []
+        subscription = self._node.create_subscription(
+            GoalStatusArray,
+            f'{self.action}/_action/status',
+            latest.append,
+            qos_profile_action_status_default,
+        )
+        try:
+            deadline = monotonic() + GOALS_TIMEOUT
+            while not latest and monotonic() < deadline:
+                self._spin_or_wait()
+        finally:
+            self._node.destroy_subscription(subscription)
+        running = [
+            status.goal_info
+            for status in (latest[-1].status_list if latest else ())
+            if status.status == GoalStatus.STATUS_EXECUTING
+        ]
+        running.sort(key=lambda goal: (goal.stamp.sec, goal.stamp.nanosec))
+        return running[0].goal_id if running else None
 
     def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
         """
@@ -427,6 +488,12 @@ class GoalClient:
                 self._spin_or_wait()
         finally:
             self._node.destroy_subscription(subscription)
+
+    def _find_append_service(self, timeout: float) -> None:
+        if self._appends is None:
+            service = f'{self._driver}/append_points'
+            self._appends = self._node.create_client(AppendPoints, service)
+        self._appends.wait_for_service(timeout_sec=timeout)
 
     def _find_server(self, timeout: float) -> None:
         if not self._client.wait_for_server(timeout_sec=timeout):
