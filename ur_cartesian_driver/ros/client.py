@@ -62,9 +62,9 @@ STATUS_NAMES = {
 #: Time without a server after which the driver counts as gone [s].
 SERVER_TIMEOUT = 3.0
 #: How long to wait for the list of goals; a driver that has had none publishes none [s].
-GOALS_TIMEOUT = 2.0
+_GOALS_TIMEOUT = 2.0
 #: An index that no goal has: the refusal of it says how many points the goal has.
-UNKNOWN_POINT = 2**32 - 1
+_UNKNOWN_POINT = 2**32 - 1
 #: From so many points on a goal is sent in flat arrays.
 MANY_POINTS = 200
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -376,7 +376,7 @@ class GoalClient:
 
         def ask(_: Future | None = None) -> None:
             if request.replace == request.APPEND:  # where, is known once those before are taken
-                request.first_index = UNKNOWN_POINT if self._points is None else self._points
+                request.first_index = _UNKNOWN_POINT if self._points is None else self._points
             self._appends.call_async(request).add_done_callback(take)
 
         def take(done: Future) -> None:
@@ -434,7 +434,7 @@ class GoalClient:
             qos_profile_action_status_default,
         )
         try:
-            deadline = monotonic() + GOALS_TIMEOUT
+            deadline = monotonic() + _GOALS_TIMEOUT
             while not latest and monotonic() < deadline:
                 self._spin_or_wait()
         finally:
