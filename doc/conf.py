@@ -31,7 +31,7 @@ autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 
 html_theme = 'furo'
-html_title = 'ur_cartesian_driver'
+html_title = 'UR Cartesian Driver'
 html_copy_source = False
 html_show_sphinx = False
 # Nothing is fetched from elsewhere: the site is read and searched without a network.

@@ -8,7 +8,10 @@ the source tree.
 """
 
 import ast
+from importlib import import_module
 from pathlib import Path
+import subprocess
+import sys
 
 import pytest
 
@@ -104,3 +107,28 @@ def test_the_package_has_no_relative_imports():
         if isinstance(node, ast.ImportFrom) and node.level
     ]
     assert relative == []
+
+
+@pytest.mark.parametrize('package', ['driver', 'planning', 'sim'])
+def test_a_package_has_each_name_that_it_offers(package):
+    module = import_module(f'{NAME}.{package}')
+    assert all(hasattr(module, name) for name in module.__all__)
+    with pytest.raises(AttributeError, match=f"'{NAME}.{package}' has no attribute 'nothing'"):
+        _ = module.nothing
+
+
+@pytest.mark.parametrize(
+    ('start', 'without'),
+    [
+        ('driver.loop.loop_host', ('planning', 'path', 'ros', 'sim')),
+        ('cli', ('planning', 'path', 'ros', 'driver', 'sim.controller', 'sim.simulated_robot')),
+        ('path', ('planning.planner', 'driver', 'robot', 'sim')),
+    ],
+)
+def test_what_has_to_start_fast_imports_no_more_than_it_needs(start, without):
+    program = f'import sys, {NAME}.{start}; print(*sys.modules)'
+    loaded = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert f'{NAME}.{start}' in loaded
+    assert not [name for name in without if f'{NAME}.{name}' in loaded]

@@ -24,7 +24,15 @@ pytestmark = pytest.mark.skipif(
 )
 NAME, DRIVER = 'ur_controller_sim', 'ur_cartesian_driver'
 #: Beside the files that only this package has.
-ROOMS = {'kinematics', 'motion', 'protocol', 'sim', 'simulator_fixture.py', 'urscript'}
+ROOMS = {
+    'kinematics',
+    'lazy_names.py',
+    'motion',
+    'protocol',
+    'sim',
+    'simulator_fixture.py',
+    'urscript',
+}
 #: What a controller does not know of the driver's goals, plans and robot program.
 OF_THE_DRIVER = {'motion/goal.py', 'motion/plan.py', 'protocol/program', 'protocol/robot_api.py'}
 OWN = {'__init__.py', '__main__.py', 'py.typed', 'pytest_plugin.py'}

@@ -5,32 +5,36 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ur_cartesian_driver.cli import sweep_command
-from ur_cartesian_driver.importing.import_options import (
-    CodeOutput,
-    parse_code_output,
-    parse_length,
-)
 from ur_cartesian_driver.kinematics.robot_models import MAX_JOINT_VALUE
 from ur_cartesian_driver.robot.services.service_calls import MAX_TOOL_OFFSET
 from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_numbers
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.importing import CodeOutput
 
 #: Of options that are times [s].
 MAX_SECONDS = 86400.0
 #: Of offsets of a goal [m], [rad].
 MAX_OFFSET = 50.0
+#: A grid of more variants is a mistake.
+MAX_VARIANTS = 100_000
 
 
 def length(text: str) -> float:
     """Return a length with its unit [m]."""
+    from ur_cartesian_driver.importing import parse_length
+
     return parsed(parse_length, text)
 
 
 def code_output(text: str) -> tuple[str, CodeOutput]:
     """Return a code of a G-code file, and the output that it sets."""
+    from ur_cartesian_driver.importing import parse_code_output
+
     return parsed(parse_code_output, text)
 
 
@@ -54,10 +58,8 @@ def offsets(text: str) -> tuple[float, ...]:
 def count(text: str) -> int:
     """Return a number of things, such as variants of a sweep."""
     number = int(text)
-    if not 0 <= number <= sweep_command.MAX_VARIANTS:
-        raise argparse.ArgumentTypeError(
-            f'{text} is not within 0 and {sweep_command.MAX_VARIANTS}'
-        )
+    if not 0 <= number <= MAX_VARIANTS:
+        raise argparse.ArgumentTypeError(f'{text} is not within 0 and {MAX_VARIANTS}')
     return number
 
 

@@ -5,23 +5,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-from ur_cartesian_driver.cli import (
-    argument_types,
-    check_robot,
-    commands,
-    export_command,
-    import_command,
-    plan_commands,
-    recording_plot,
-    sweep_command,
-    teach_command,
-)
-from ur_cartesian_driver.importing.import_options import LENGTH_UNITS, ToolOrientation
+from ur_cartesian_driver.cli import argument_types
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.sim.command_line.simulate import simulate
 from ur_cartesian_driver.sim.command_line.simulator_options import (
     add_calibration,
     add_model,
@@ -33,50 +22,60 @@ from ur_cartesian_driver.sim.command_line.simulator_options import (
 )
 
 
+class CommandParser(argparse.ArgumentParser):
+    """
+    The parser of one command.
+
+    It gets its arguments when it is used, and they import the module of the command. So `where`
+    starts without a planner, `sim` without ROS, and all of them fast.
+    """
+
+    def __init__(
+        self, *args: Any, add_arguments: Callable[[CommandParser], None], **fields: Any
+    ) -> None:
+        """Take the function that adds the arguments and sets what is run."""
+        super().__init__(*args, **fields)
+        self._add_arguments: Callable[[CommandParser], None] | None = add_arguments
+
+    def _complete(self) -> None:
+        add_arguments, self._add_arguments = self._add_arguments, None
+        if add_arguments is not None:
+            take_negative_numbers(self)
+            add_arguments(self)
+
+    def parse_known_args(  # type: ignore[override]  # as argparse calls it
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Add the arguments first."""
+        self._complete()
+        return super().parse_known_args(args, namespace)
+
+    def format_help(self) -> str:
+        """Add the arguments first."""
+        self._complete()
+        return super().format_help()
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     top = argparse.ArgumentParser(
         prog='ur-cartesian', description='Cartesian trajectories for Universal Robots arms.'
     )
-    sub = top.add_subparsers(dest='command', required=True, metavar='COMMAND')
-    _add_demo(sub)
-    _add_sim(sub)
-    _add_send(sub)
-    _add_append(sub)
-    _add_recover(sub)
-    _add_validate(sub)
-    _add_show(sub)
-    _add_sweep(sub)
-    _add_import(sub)
-    _add_teach(sub)
-    _add_where(sub)
-    _add_check_robot(sub)
-    _add_plot(sub)
-    _add_export(sub)
+    sub = top.add_subparsers(
+        dest='command', required=True, metavar='COMMAND', parser_class=CommandParser
+    )
+    for name, (text, add_arguments) in COMMANDS.items():
+        sub.add_parser(
+            name,
+            help=text,
+            description=text[0].upper() + text[1:] + '.',
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            add_arguments=add_arguments,
+        )
     return top
 
 
-Commands = argparse._SubParsersAction  # argparse has no public name for it
-
-
-def _add(
-    sub: Commands[argparse.ArgumentParser],
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    text: str,
-) -> argparse.ArgumentParser:
-    command = sub.add_parser(
-        name,
-        help=text,
-        description=text[0].upper() + text[1:] + '.',
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    command.set_defaults(run=run)
-    take_negative_numbers(command)
-    return command
-
-
-def _add_tcp(command: argparse.ArgumentParser, text: str) -> None:
+def _add_tcp(command: CommandParser, text: str) -> None:
     command.add_argument(
         '--tcp',
         type=argument_types.tcp,
@@ -85,41 +84,40 @@ def _add_tcp(command: argparse.ArgumentParser, text: str) -> None:
     )
 
 
-def _add_demo(sub: Commands[argparse.ArgumentParser]) -> None:
-    demo = _add(
-        sub,
-        'demo',
-        commands.demo,
-        'run simulator, driver and client, a process each, with one goal',
-    )
-    demo.add_argument(
+def _add_demo(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import commands
+
+    command.set_defaults(run=commands.demo)
+    command.add_argument(
         'goal',
         nargs='?',
         default='seam',
         help='goal file, or the name of an example in config/examples',
     )
-    demo.add_argument(
+    command.add_argument(
         '--picture', default='demo.png', help='picture of the planned and executed path'
     )
-    demo.add_argument(
+    command.add_argument(
         '--arms',
         type=int,
         choices=(1, 2),
         default=1,
         help='2 = a second robot, driver and client beside the first',
     )
-    demo.add_argument(
+    command.add_argument(
         '--second-goal', default='square', metavar='GOAL', help='goal of the second arm'
     )
-    add_model(demo, '--model')
+    add_model(command, '--model')
 
 
-def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
-    sim = _add(sub, 'sim', simulate, 'run a simulated controller on the ports of a real one')
-    add_simulator_options(sim)
+def _add_sim(command: CommandParser) -> None:
+    from ur_cartesian_driver.sim.command_line.simulate import simulate
+
+    command.set_defaults(run=simulate)
+    add_simulator_options(command)
 
 
-def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
+def _add_goal(command: CommandParser, optional: bool = False) -> None:
     command.add_argument(
         'file',
         nargs='?' if optional else None,
@@ -131,7 +129,7 @@ def _add_goal(command: argparse.ArgumentParser, optional: bool = False) -> None:
     )
 
 
-def _add_driver(command: argparse.ArgumentParser) -> None:
+def _add_driver(command: CommandParser) -> None:
     command.add_argument(
         '--driver',
         default='ur_cartesian_driver',
@@ -139,22 +137,19 @@ def _add_driver(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_append(sub: Commands[argparse.ArgumentParser]) -> None:
-    append = _add(
-        sub,
-        'append',
-        commands.append,
-        'append points to the running goal, which was sent with keep_open, or replace its tail',
-    )
-    _add_goal(append, optional=True)
-    _add_driver(append)
-    append.add_argument(
+def _add_append(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import commands
+
+    command.set_defaults(run=commands.append)
+    _add_goal(command, optional=True)
+    _add_driver(command)
+    command.add_argument(
         '--last',
         action='store_true',
         help='nothing follows: the goal ends with these points, or without a file with those '
         'that it has',
     )
-    place = append.add_mutually_exclusive_group()
+    place = command.add_mutually_exclusive_group()
     place.add_argument(
         '--replace-from-point',
         type=argument_types.point_index,
@@ -169,63 +164,63 @@ def _add_append(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_recover(sub: Commands[argparse.ArgumentParser]) -> None:
-    recover = _add(
-        sub, 'recover', commands.recover, 'bring a stopped robot back to where it takes goals'
-    )
-    _add_driver(recover)
-    recover.add_argument(
+def _add_recover(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import commands
+
+    command.set_defaults(run=commands.recover)
+    _add_driver(command)
+    command.add_argument(
         '--unlock',
         action='store_true',
         help='unlock a protective stop, whose cause you have found and removed',
     )
 
 
-def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
-    send = _add(
-        sub, 'send', commands.send, 'send a goal to a running driver and wait for its result'
-    )
-    _add_goal(send)
-    _add_driver(send)
-    send.add_argument(
+def _add_send(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import commands
+
+    command.set_defaults(run=commands.send)
+    _add_goal(command)
+    _add_driver(command)
+    command.add_argument(
         '--wait',
         type=argument_types.seconds,
         default=10.0,
         metavar='SECONDS',
         help='time until the driver must be ready; 0 = do not check',
     )
-    send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
-    send.add_argument(
+    command.add_argument('--validate-only', action='store_true', help='plan, but do not move')
+    command.add_argument(
         '--resume',
         action='store_true',
         help='go on where the goal of this file was stopped (noted in FILE.stopped)',
     )
-    send.add_argument(
+    command.add_argument(
         '--overlap',
         type=float,
         default=5.0,
         metavar='MM',
         help='how far before that place the path is taken up again (5 mm)',
     )
-    send.add_argument(
+    command.add_argument(
         '--approach',
         type=float,
         default=30.0,
         metavar='MM',
         help='from how far behind the path, along the z axis of the tool (30 mm)',
     )
-    send.add_argument(
+    command.add_argument(
         '--report', action='store_true', help='print the report: what was done, and why'
     )
-    send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
-    send.add_argument(
+    command.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
+    command.add_argument(
         '--no-cancel',
         action='store_true',
         help='let the goal go on if a signal, a closed output or a full disk ends this command',
     )
 
 
-def _add_planning(command: argparse.ArgumentParser, optional: bool = False) -> None:
+def _add_planning(command: CommandParser, optional: bool = False) -> None:
     """Add the goal, which may be optional, and what the driver reads from the robot."""
     _add_goal(command, optional)
     command.add_argument(
@@ -259,48 +254,42 @@ def _add_planning(command: argparse.ArgumentParser, optional: bool = False) -> N
     add_calibration(command)
 
 
-def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
-    validate = _add(
-        sub,
-        'validate',
-        plan_commands.validate,
-        'check and plan a goal without a robot, and print the plan',
-    )
-    _add_planning(validate)
-    validate.add_argument(
+def _add_validate(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import plan_commands
+
+    command.set_defaults(run=plan_commands.validate)
+    _add_planning(command)
+    command.add_argument(
         '--postures',
         action='store_true',
         help='print the joint positions at each point',
     )
 
 
-def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
-    show = _add(
-        sub,
-        'show',
-        plan_commands.show,
-        'plan a goal without a robot, and show the arm on its path in the browser',
-    )
-    _add_planning(show, optional=True)
-    show.add_argument(
+def _add_show(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import plan_commands
+
+    command.set_defaults(run=plan_commands.show)
+    _add_planning(command, optional=True)
+    command.add_argument(
         '-o', '--output', metavar='PAGE', help='HTML file to write instead of opening a browser'
     )
-    show.add_argument(
+    command.add_argument(
         '--live',
         metavar='ROBOT_IP',
         help='follow this robot: plan the goal, if one is given, from where the arm stands, and '
         'serve a page with where it is',
     )
-    show.add_argument(
+    command.add_argument(
         '--rtde-port', type=port_number, default=30004, help='RTDE port of that robot'
     )
-    show.add_argument(
+    command.add_argument(
         '--host',
         default=plan_commands.LOOPBACK,
         help='address on which the page of --live is served; others than the default let others '
         'of the network look',
     )
-    show.add_argument(
+    command.add_argument(
         '--port',
         type=port_number,
         default=8080,
@@ -308,13 +297,10 @@ def _add_show(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_sweep(sub: Commands[argparse.ArgumentParser]) -> None:
-    command = _add(
-        sub,
-        'sweep',
-        sweep_command.sweep_goal,
-        'plan a goal at other places, on other robots and calibrations, and print the margins',
-    )
+def _add_sweep(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import sweep_command
+
+    command.set_defaults(run=sweep_command.sweep_goal)
     _add_planning(command)
     for name, unit in (('x', 'm'), ('y', 'm'), ('z', 'm'), ('rz', 'rad')):
         command.add_argument(
@@ -358,51 +344,49 @@ def _add_sweep(sub: Commands[argparse.ArgumentParser]) -> None:
     command.add_argument('--picture', help='heat maps of all margins')
 
 
-def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
-    bring = _add(
-        sub,
-        'import',
-        import_command.import_goal,
-        'make a goal of a file of others: CSV, G-code, DXF, ROS messages, recordings, URScript',
-    )
-    bring.add_argument('file', help='what is read; doc/importing.md says what of each format')
-    bring.add_argument('-o', '--output', help='goal file; by default standard output')
-    bring.add_argument(
+def _add_import(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import import_command
+    from ur_cartesian_driver.importing.import_options import LENGTH_UNITS, ToolOrientation
+
+    command.set_defaults(run=import_command.import_goal)
+    command.add_argument('file', help='what is read; doc/importing.md says what of each format')
+    command.add_argument('-o', '--output', help='goal file; by default standard output')
+    command.add_argument(
         '--format',
         default='',
         choices=import_command.FORMATS,
         help='by default as the suffix of the name says',
     )
-    bring.add_argument(
+    command.add_argument(
         '--frame', default='', help='frame of the points; by default that of the file, else base'
     )
-    bring.add_argument(
+    command.add_argument(
         '--origin',
         type=argument_types.tcp,
         metavar='X,Y,Z,RX,RY,RZ',
         help='where the origin of the file is in that frame [m, rad]',
     )
-    bring.add_argument(
+    command.add_argument(
         '--unit', default='', choices=sorted(LENGTH_UNITS), help='of lengths without a unit'
     )
-    bring.add_argument(
+    command.add_argument(
         '--scale', type=argument_types.factor, default=1.0, help='factor on all lengths'
     )
-    bring.add_argument(
+    command.add_argument(
         '--orientation',
         default='file',
         choices=[each.value for each in ToolOrientation],
         help='of the tool: as the file has it, against its normals, or straight down',
     )
-    bring.add_argument(
+    command.add_argument(
         '--speed',
         type=argument_types.factor,
         help='[m/s]; by default that of the file, else of the driver',
     )
-    bring.add_argument(
+    command.add_argument(
         '--travel-speed', type=argument_types.factor, help='of G0, and between contours [m/s]'
     )
-    bring.add_argument(
+    command.add_argument(
         '--acceleration', type=argument_types.factor, help='[m/s^2]; by default as the speed'
     )
     for name, default, text in (
@@ -415,14 +399,14 @@ def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
         ('tolerance', 5e-5, 'of the lines that take the place of splines, ellipses and helices'),
         ('lift', 0.0, 'go back between contours'),
     ):
-        bring.add_argument(
+        command.add_argument(
             f'--{name}',
             type=argument_types.length,
             default=default,
             metavar='LENGTH',
             help=text,
         )
-    bring.add_argument(
+    command.add_argument(
         '--output-of',
         type=argument_types.code_output,
         action='append',
@@ -431,18 +415,15 @@ def _add_import(sub: Commands[argparse.ArgumentParser]) -> None:
         help='output of an M-code, like M3=standard:2:1, or of S with the number that means 1, '
         'like S=analog:0:10000; may be given several times',
     )
-    add_model(bring)  # for joint positions
-    _add_tcp(bring, ', for joint positions [m, rad]')
-    add_calibration(bring)
+    add_model(command)  # for joint positions
+    _add_tcp(command, ', for joint positions [m, rad]')
+    add_calibration(command)
 
 
-def _add_teach(sub: Commands[argparse.ArgumentParser]) -> None:
-    command = _add(
-        sub,
-        'teach',
-        teach_command.teach_path,
-        'guide the arm by hand, take points with Enter, and write them as a goal to edit',
-    )
+def _add_teach(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import teach_command
+
+    command.set_defaults(run=teach_command.teach_path)
     command.add_argument('-o', '--output', default='path.yaml', help='goal file')
     command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
     add_model(command)
@@ -461,54 +442,46 @@ def _add_teach(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
-    where = _add(
-        sub,
-        'where',
-        commands.where,
-        'print the pose of the robot, as a point to paste into a goal',
-    )
-    where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
-    add_ports(where, 'its RTDE port', rtde=30004)
+def _add_where(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import commands
+
+    command.set_defaults(run=commands.where)
+    command.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    add_ports(command, 'its RTDE port', rtde=30004)
 
 
-def _add_check_robot(sub: Commands[argparse.ArgumentParser]) -> None:
-    check = _add(
-        sub,
-        'check-robot',
-        check_robot.check_robot,
-        'tell what works with a robot and how it differs from what is assumed; moves nothing '
-        'without being asked',
+def _add_check_robot(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import check_robot
+
+    command.set_defaults(run=check_robot.check_robot)
+    command.add_argument(
+        '--robot-ip', required=True, metavar='ADDRESS', help='address of the robot'
     )
-    check.add_argument('--robot-ip', required=True, metavar='ADDRESS', help='address of the robot')
-    add_ports(check, 'its port', rtde=30004, primary=30001, dashboard=29999, robot_api=80)
-    check.add_argument(
+    add_ports(command, 'its port', rtde=30004, primary=30001, dashboard=29999, robot_api=80)
+    command.add_argument(
         '--seconds',
         type=argument_types.seconds,
         default=5.0,
         help='how long the RTDE stream is recorded [s]',
     )
-    check.add_argument(
+    command.add_argument(
         '--with-motion',
         action='store_true',
         help='also move the arm a little, after asking on the terminal before each motion',
     )
-    check.add_argument(
+    command.add_argument(
         '--report', default='robot_report.json', metavar='FILE', help='report to send in'
     )
 
 
-def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
-    draw = _add(
-        sub,
-        'plot',
-        recording_plot.plot,
-        'draw a recorded motion: path, deviation, speed, lag, outputs and events',
-    )
-    draw.add_argument(
+def _add_plot(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import recording_plot
+
+    command.set_defaults(run=recording_plot.plot)
+    command.add_argument(
         'file', help='recording, or a directory, of which the newest recording is drawn'
     )
-    draw.add_argument(
+    command.add_argument(
         '-o',
         '--output',
         metavar='PICTURE',
@@ -516,22 +489,60 @@ def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
     )
 
 
-def _add_export(sub: Commands[argparse.ArgumentParser]) -> None:
-    export = _add(
-        sub,
-        'export',
-        export_command.export,
-        'write a recorded motion for other programs: MCAP with messages of ROS 2, or CSV',
-    )
-    export.add_argument(
+def _add_export(command: CommandParser) -> None:
+    from ur_cartesian_driver.cli import export_command
+
+    command.set_defaults(run=export_command.export)
+    command.add_argument(
         'file', help='recording, or a directory, of which the newest recording is taken'
     )
-    export.add_argument(
+    command.add_argument(
         '-o',
         '--output',
         metavar='FILE',
         help='its suffix is the format, .mcap or .csv; by default beside the recording, as .mcap',
     )
-    export.add_argument(
+    command.add_argument(
         '--tf-prefix', default='', help='prefix for the names of frames and joints in MCAP'
     )
+
+
+#: By name: what the command does, and its arguments.
+COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
+    'demo': ('run simulator, driver and client, a process each, with one goal', _add_demo),
+    'sim': ('run a simulated controller on the ports of a real one', _add_sim),
+    'send': ('send a goal to a running driver and wait for its result', _add_send),
+    'append': (
+        'append points to the running goal, which was sent with keep_open, or replace its tail',
+        _add_append,
+    ),
+    'recover': ('bring a stopped robot back to where it takes goals', _add_recover),
+    'validate': ('check and plan a goal without a robot, and print the plan', _add_validate),
+    'show': (
+        'plan a goal without a robot, and show the arm on its path in the browser',
+        _add_show,
+    ),
+    'sweep': (
+        'plan a goal at other places, on other robots and calibrations, and print the margins',
+        _add_sweep,
+    ),
+    'import': (
+        'make a goal of a file of others: CSV, G-code, DXF, ROS messages, recordings, URScript',
+        _add_import,
+    ),
+    'teach': (
+        'guide the arm by hand, take points with Enter, and write them as a goal to edit',
+        _add_teach,
+    ),
+    'where': ('print the pose of the robot, as a point to paste into a goal', _add_where),
+    'check-robot': (
+        'tell what works with a robot and how it differs from what is assumed; moves nothing '
+        'without being asked',
+        _add_check_robot,
+    ),
+    'plot': ('draw a recorded motion: path, deviation, speed, lag, outputs and events', _add_plot),
+    'export': (
+        'write a recorded motion for other programs: MCAP with messages of ROS 2, or CSV',
+        _add_export,
+    ),
+}

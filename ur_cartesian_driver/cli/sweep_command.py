@@ -13,6 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path as FilePath
 import sys
 
+from ur_cartesian_driver.cli.argument_types import MAX_VARIANTS
 from ur_cartesian_driver.cli.commands import read_goal
 from ur_cartesian_driver.cli.progress import counted
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -38,8 +39,6 @@ from ur_cartesian_driver.sweep import (
 
 #: What a map can show.
 MARGINS = tuple(COLUMNS)
-#: A grid of more variants is a mistake.
-MAX_VARIANTS = 100_000
 
 
 def sweep_goal(arguments: argparse.Namespace) -> int:

@@ -11,10 +11,27 @@ Plan, execute and stop Cartesian motions of one robot, from plain Python.
         print(outcome.code.name, outcome.text)
 """
 
-from ur_cartesian_driver.driver.api import Driver
-from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
-from ur_cartesian_driver.driver.motion_handle import MotionHandle
-from ur_cartesian_driver.robot.connection_status import ConnectionStatus
-from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.driver.api import Driver
+    from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+    from ur_cartesian_driver.driver.motion_handle import MotionHandle
+    from ur_cartesian_driver.robot.connection_status import ConnectionStatus
+    from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 __all__ = ['ConnectionState', 'ConnectionStatus', 'Driver', 'DriverConfig', 'MotionHandle']
+
+# The robot process imports packages in here, too, and needs no planner.
+__getattr__ = lazy_names(
+    __name__,
+    {
+        'ur_cartesian_driver.driver.api': 'Driver',
+        'ur_cartesian_driver.driver.ipc.driver_config': 'DriverConfig',
+        'ur_cartesian_driver.driver.motion_handle': 'MotionHandle',
+        'ur_cartesian_driver.robot.connection_status': 'ConnectionStatus',
+        'ur_cartesian_driver.robot.lifecycle': 'ConnectionState',
+    },
+)

@@ -27,13 +27,13 @@ from ur_cartesian_driver.motion.declared_types import with_declared_types, Wrong
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, SafeOutput, Waypoint
+from ur_cartesian_driver.motion.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.robot_state import RobotState
 from ur_cartesian_driver.motion.vectors import Joints, vector6
 from ur_cartesian_driver.motion.workspace import parse_planes
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.output_names import parse_safe_outputs
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3

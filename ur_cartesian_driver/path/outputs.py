@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal import (
     SafeOutput,
 )
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.planning.output_names import output_fault, output_name
+from ur_cartesian_driver.motion.output_names import output_fault, output_name
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,25 @@ both for a joint goal. A goal that passes becomes a
 :class:`~ur_cartesian_driver.motion.plan.Plan`. Nothing here moves a robot.
 """
 
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.planner import plan
-from ur_cartesian_driver.planning.request.validate import check
-from ur_cartesian_driver.planning.spline.joint_goal_planner import plan_joint_goal
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.planning.options import PlanningOptions
+    from ur_cartesian_driver.planning.planner import plan
+    from ur_cartesian_driver.planning.request.validate import check
+    from ur_cartesian_driver.planning.spline.joint_goal_planner import plan_joint_goal
 
 __all__ = ['PlanningOptions', 'check', 'plan', 'plan_joint_goal']
+
+# Who composes a path or sends a goal needs the rules for its fields, and no planner.
+__getattr__ = lazy_names(
+    __name__,
+    {
+        'ur_cartesian_driver.planning.options': 'PlanningOptions',
+        'ur_cartesian_driver.planning.planner': 'plan',
+        'ur_cartesian_driver.planning.request.validate': 'check',
+        'ur_cartesian_driver.planning.spline.joint_goal_planner': 'plan_joint_goal',
+    },
+)

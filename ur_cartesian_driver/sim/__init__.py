@@ -7,11 +7,16 @@ A simulated UR controller: it interprets the URScript it is sent and knows nothi
 its :class:`Controller` without network and clock, for tests that count cycles.
 """
 
-from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.controller_assembly import assemble
-from ur_cartesian_driver.sim.simulated_robot import Ports, RobotSnapshot, SimulatedRobot
-from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
-from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+    from ur_cartesian_driver.sim.controller_assembly import assemble
+    from ur_cartesian_driver.sim.simulated_robot import Ports, RobotSnapshot, SimulatedRobot
+    from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
+    from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 
 __all__ = [
     'HOME',
@@ -23,3 +28,15 @@ __all__ = [
     'SimulatorConfig',
     'assemble',
 ]
+
+# Every command imports the options of the simulator, and few need the simulator.
+__getattr__ = lazy_names(
+    __name__,
+    {
+        'ur_cartesian_driver.sim.controller': 'Controller',
+        'ur_cartesian_driver.sim.controller_assembly': 'assemble',
+        'ur_cartesian_driver.sim.simulated_robot': 'Ports RobotSnapshot SimulatedRobot',
+        'ur_cartesian_driver.sim.simulator_config': 'HOME SimulatorConfig',
+        'ur_cartesian_driver.sim.sockets.script_sockets': 'MemorySockets',
+    },
+)

@@ -21,7 +21,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 import threading
 from time import sleep
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -33,7 +33,9 @@ from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.io_signals import Signals
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.planning import PlanningOptions
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.planning.options import PlanningOptions
 
 #: Rows of a buffer, number of buffers, and the longest time until one is written [s]: a killed
 #: process loses as much.

@@ -15,14 +15,14 @@ from ur_cartesian_driver.motion.goal import (
     SafeOutput,
 )
 from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.primitive import SwitchOutput
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.output_names import (
+from ur_cartesian_driver.motion.output_names import (
     output_fault,
     output_name,
     parse_safe_outputs,
     repeated_output,
 )
+from ur_cartesian_driver.motion.primitive import SwitchOutput
+from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 
 #: Maximum time after a point [s].

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 import sys
 
 from ur_cartesian_driver.sim.command_line.console import run_command
-from ur_cartesian_driver.sim.command_line.simulate import simulate
 from ur_cartesian_driver.sim.command_line.simulator_options import add_simulator_options
 
 NAME = 'ur-controller-sim'
@@ -33,5 +32,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a simulated controller until it is interrupted; return the exit status."""
+    from ur_cartesian_driver.sim.command_line.simulate import simulate  # the whole simulator
+
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
     return run_command(NAME, simulate, arguments)

@@ -6,8 +6,8 @@ import pytest
 
 from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
 from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.output_names import parse_safe_outputs
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.output_names import parse_safe_outputs
 
 
 def test_a_text_has_kind_pin_value_domain_and_restore():

@@ -1,0 +1,31 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Names of a package that are imported when they are used.
+
+A module imports its packages, and with them what their ``__init__`` imports. So a command would
+wait for a simulator that it does not use, and the robot process for a planner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+
+def lazy_names(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
+    """
+    Return the ``__getattr__`` of a package.
+
+    :param modules: by the name of a module, the names that the package offers from it, apart by
+        spaces.
+    """
+    homes = {name: module for module, names in modules.items() for name in names.split()}
+
+    def __getattr__(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f'module {package!r} has no attribute {name!r}')
+        return getattr(import_module(homes[name]), name)
+
+    return __getattr__
