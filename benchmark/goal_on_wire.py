@@ -26,8 +26,8 @@ from ur_cartesian_driver.motion.known_frames import Frames
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
-from ur_cartesian_driver.ros.client import in_flat_arrays
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+from ur_cartesian_driver.ros.messages.packed_points import in_flat_arrays
 
 POINTS = 1_000
 #: The most that a goal may have.

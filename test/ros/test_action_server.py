@@ -10,8 +10,8 @@ from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import MotionSegment
-from ur_cartesian_driver.ros.client import in_flat_arrays
 from ur_cartesian_driver.ros.goals import action_server
+from ur_cartesian_driver.ros.messages.packed_points import in_flat_arrays
 
 pytestmark = pytest.mark.slow
 SUCCEEDED, ABORTED, CANCELED = (

@@ -9,7 +9,8 @@ from unique_identifier_msgs.msg import UUID
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.path import ExecutionMode, Path
-from ur_cartesian_driver.ros.client import GoalClient, in_flat_arrays
+from ur_cartesian_driver.ros.client import GoalClient
+from ur_cartesian_driver.ros.messages.packed_points import in_flat_arrays
 from ur_cartesian_driver.srv import AppendPoints
 
 pytestmark = pytest.mark.slow

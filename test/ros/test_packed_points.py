@@ -22,11 +22,12 @@ from ur_cartesian_driver.msg import (
     PackedPoints,
 )
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.ros.client import add_tf_prefix, in_flat_arrays, load_goal
+from ur_cartesian_driver.ros.client import add_tf_prefix, load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import (
     appended_points_from_message,
     goal_from_message,
 )
+from ur_cartesian_driver.ros.messages.packed_points import in_flat_arrays
 from ur_cartesian_driver.srv import AppendPoints
 
 TYPES = (MotionSegment.LINEAR, MotionSegment.JOINT, MotionSegment.CIRCULAR, MotionSegment.PROCESS)

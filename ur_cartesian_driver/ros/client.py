@@ -37,18 +37,15 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
 from ur_cartesian_driver.goal_files.goal_reading import (
     goal_from_fields,
-    is_packed,
-    point_rows,
-    segment_rows,
 )
 from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
-from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome, PathPlace
-from ur_cartesian_driver.msg import CartesianTrajectory, DriverStatus
+from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.path import Path, resume, ResumedGoal
+from ur_cartesian_driver.ros.goal_appender import GoalAppender
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 from ur_cartesian_driver.ros.messages.goal_messages import goal_message, message_of
-from ur_cartesian_driver.ros.messages.packed_points import packed_points
+from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.srv import AppendPoints, Recover
 
 Message: TypeAlias = Any
@@ -63,10 +60,6 @@ STATUS_NAMES = {
 SERVER_TIMEOUT = 3.0
 #: How long to wait for the list of goals; a driver that has had none publishes none [s].
 _GOALS_TIMEOUT = 2.0
-#: An index that no goal has: the refusal of it says how many points the goal has.
-_UNKNOWN_POINT = 2**32 - 1
-#: From so many points on a goal is sent in flat arrays.
-MANY_POINTS = 200
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -117,35 +110,6 @@ def resumed_goal(
     return goal_message(fields_of_goal(left.goal)), left
 
 
-def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
-    """
-    Return a goal with its points and segments packed, the same goal if it cannot be.
-
-    That is one with a jerk, which no motion takes, or one that will be refused anyway.
-    """
-    trajectory = goal.trajectory
-    try:
-        segments = segment_rows(goal.segments)
-    except InvalidGoal:
-        return goal
-    if len(segments) not in (0, len(trajectory.points)) or is_packed(goal.packed):
-        return goal
-    packed = packed_points(point_rows(trajectory.points), segments)
-    if packed is None:
-        return goal
-    fields = {name: getattr(goal, name) for name in goal.get_fields_and_field_types()}
-    return FollowCartesianTrajectory.Goal(
-        **fields
-        | {
-            'trajectory': CartesianTrajectory(
-                header=trajectory.header, controlled_frame=trajectory.controlled_frame
-            ),
-            'segments': [],
-            'packed': packed,
-        }
-    )
-
-
 # ---- sending ----------------------------------------------------------------------------------
 
 
@@ -186,11 +150,9 @@ class GoalClient:
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
         self._offsets: Any = None
-        self._appends: Any = None
-        #: Id of the goal that runs, its points so far, and the answer to the newest append.
-        self._goal_id: Any = None
-        self._points: int | None = 0  # None: another client sent it
-        self._newest_answer: Future | None = None
+        self._append_service: Any = None
+        #: Of the goal that runs.
+        self._appender: GoalAppender | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
         #: None: another one spins the node.
         self._executor: SingleThreadedExecutor | None = None
@@ -219,8 +181,8 @@ class GoalClient:
             # An executor that is about to wait would fail on a client that is destroyed meanwhile;
             # this one goes with its last reference.
             self._node.remove_waitable(self._client)
-        if self._appends is not None:
-            self._node.destroy_client(self._appends)
+        if self._append_service is not None:
+            self._node.destroy_client(self._append_service)
         if self._own_context is not None:
             self._node.destroy_node()
             rclpy.shutdown(context=self._own_context)
@@ -236,7 +198,7 @@ class GoalClient:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
-        A goal of many points is sent in flat arrays (:func:`in_flat_arrays`).
+        A goal of many points is sent in flat arrays.
 
         The first SIGINT, SIGTERM or SIGHUP cancels the goal and waits for its result, and
         :attr:`signal_number` is set; the second one gives up.
@@ -253,8 +215,7 @@ class GoalClient:
             self._find_append_service(timeout)
         self.signal_number = 0
         points = len(goal.trajectory.points) or len(goal.packed.times)
-        if len(goal.trajectory.points) >= MANY_POINTS:
-            goal = in_flat_arrays(goal)
+        goal = packed_if_long(goal)
         failures: list[BaseException] = []
 
         def take(message: Any) -> None:
@@ -272,7 +233,8 @@ class GoalClient:
                     f'{self.action} did not accept the goal; this driver accepts all goals, so '
                     'another node serves the action, or the driver is shutting down.'
                 )
-            self._goal_id, self._points, self._newest_answer = handle.goal_id, points, None
+            if goal.keep_open:
+                self._appender = GoalAppender(self._append_service, handle.goal_id, points)
             cancelled = False
 
             def check_end() -> None:
@@ -286,7 +248,7 @@ class GoalClient:
             try:
                 response = self._spin_until(handle.get_result_async(), check_end)
             finally:
-                self._goal_id = None
+                self._appender = None
         if failures:
             failures[0].add_note(
                 f'the goal ended {STATUS_NAMES[response.status]}: {response.result.error_string}'
@@ -353,48 +315,17 @@ class GoalClient:
         :raises RuntimeError: no goal of this client runs.
         :raises ValueError: both places are given.
         """
-        if self._goal_id is None or self._appends is None:
+        if self._appender is None:
             raise RuntimeError(
                 'No goal runs to which points could be appended: send one with keep_open, and '
                 'append while send or execute waits for its end.'
             )
-        if replace_from_point is not None and replace_from_time is not None:
-            raise ValueError('Give replace_from_point or replace_from_time, not both.')
-        request = AppendPoints.Request(goal_id=self._goal_id, last=last)
-        if path is not None:
-            goal = path.to_message() if isinstance(path, Path) else path
-            if len(goal.trajectory.points) >= MANY_POINTS:
-                goal = in_flat_arrays(goal)
-            request.points, request.segments = goal.trajectory.points, goal.segments
-            request.io_commands, request.packed = goal.io_commands, goal.packed
-        if replace_from_point is not None:
-            request.replace, request.first_index = request.REPLACE_FROM_POINT, replace_from_point
-        elif replace_from_time is not None:
-            request.replace = request.REPLACE_FROM_TIME
-            request.replace_from_time = replace_from_time
-        answer = Future()
-
-        def ask(_: Future | None = None) -> None:
-            if request.replace == request.APPEND:  # where, is known once those before are taken
-                request.first_index = _UNKNOWN_POINT if self._points is None else self._points
-            self._appends.call_async(request).add_done_callback(take)
-
-        def take(done: Future) -> None:
-            response = done.result()
-            was_unknown = self._points is None
-            if response.accepted or was_unknown:
-                self._points = response.points_received
-            if was_unknown and request.replace == request.APPEND:
-                ask()  # the refusal said how many points the goal has
-            else:
-                answer.set_result(response)
-
-        before, self._newest_answer = self._newest_answer, answer
-        if before is None:
-            ask()
-        else:
-            before.add_done_callback(ask)
-        return answer
+        return self._appender.append(
+            path.to_message() if isinstance(path, Path) else path,
+            last=last,
+            replace_from_point=replace_from_point,
+            replace_from_time=replace_from_time,
+        )
 
     def append_to_running(
         self,
@@ -414,15 +345,16 @@ class GoalClient:
         """
         self._find_server(timeout)
         self._find_append_service(timeout)
-        self._goal_id, self._points, self._newest_answer = self._running_goal(), None, None
-        if self._goal_id is None:
+        goal_id = self._running_goal()
+        if goal_id is None:
             return AppendPoints.Response(
                 message='No goal runs to which points could be appended: send one with keep_open.'
             )
+        self._appender = GoalAppender(self._append_service, goal_id)
         try:
             return self._spin_until(self.append(path, **where), lambda: None)
         finally:
-            self._goal_id = None
+            self._appender = None
 
     def _running_goal(self) -> Any:
         """Return the id of the goal that moves the arm, the oldest one: others wait or preempt."""
@@ -490,10 +422,11 @@ class GoalClient:
             self._node.destroy_subscription(subscription)
 
     def _find_append_service(self, timeout: float) -> None:
-        if self._appends is None:
-            service = f'{self._driver}/append_points'
-            self._appends = self._node.create_client(AppendPoints, service)
-        self._appends.wait_for_service(timeout_sec=timeout)
+        if self._append_service is None:
+            self._append_service = self._node.create_client(
+                AppendPoints, f'{self._driver}/append_points'
+            )
+        self._append_service.wait_for_service(timeout_sec=timeout)
 
     def _find_server(self, timeout: float) -> None:
         if not self._client.wait_for_server(timeout_sec=timeout):

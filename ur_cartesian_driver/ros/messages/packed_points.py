@@ -9,12 +9,52 @@ one object, and one copy.
 
 from __future__ import annotations
 
+from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
+from ur_cartesian_driver.goal_files.goal_reading import is_packed, point_rows, segment_rows
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal_table import SegmentRows, WaypointRows
-from ur_cartesian_driver.msg import PackedPoints
+from ur_cartesian_driver.msg import CartesianTrajectory, PackedPoints
+
+#: From so many points on clients send flat arrays.
+MANY_POINTS = 200
 
 
 def packed_points(points: WaypointRows, segments: SegmentRows) -> PackedPoints | None:
     """Return points and segments as a message; None as by :func:`packed_fields`."""
     fields = packed_fields(points, segments)
     return None if fields is None else PackedPoints(**fields)
+
+
+def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
+    """
+    Return a goal with its points and segments packed, the same goal if it cannot be.
+
+    That is one with a jerk, which no motion takes, or one that will be refused anyway.
+    """
+    trajectory = goal.trajectory
+    try:
+        segments = segment_rows(goal.segments)
+    except InvalidGoal:
+        return goal
+    if len(segments) not in (0, len(trajectory.points)) or is_packed(goal.packed):
+        return goal
+    packed = packed_points(point_rows(trajectory.points), segments)
+    if packed is None:
+        return goal
+    fields = {name: getattr(goal, name) for name in goal.get_fields_and_field_types()}
+    return FollowCartesianTrajectory.Goal(
+        **fields
+        | {
+            'trajectory': CartesianTrajectory(
+                header=trajectory.header, controlled_frame=trajectory.controlled_frame
+            ),
+            'segments': [],
+            'packed': packed,
+        }
+    )
+
+
+def packed_if_long(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
+    """Return a goal of many points in flat arrays, and any other as it is."""
+    return in_flat_arrays(goal) if len(goal.trajectory.points) >= MANY_POINTS else goal

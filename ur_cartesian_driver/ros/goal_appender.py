@@ -1,0 +1,83 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The client's side of ``~/append_points``, for one goal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.task import Future
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
+from ur_cartesian_driver.srv import AppendPoints
+
+#: An index that no goal has: the refusal of it says how many points the goal has.
+UNKNOWN_POINT = 2**32 - 1
+
+
+class GoalAppender:
+    """Appends points to a goal, or replaces its tail; requests leave one after the other."""
+
+    def __init__(self, client: Any, goal_id: Any, points: int | None = None) -> None:
+        """
+        Take the client of the service and the id of a goal that was accepted.
+
+        :param points: how many points it has; None = not known, because another client sent it.
+        """
+        self._client = client
+        self._goal_id = goal_id
+        self._points = points
+        self._newest_answer: Future | None = None
+
+    def append(
+        self,
+        goal: FollowCartesianTrajectory.Goal | None,
+        *,
+        last: bool,
+        replace_from_point: int | None,
+        replace_from_time: float | None,
+    ) -> Future:
+        """
+        Request it once the requests before are answered; return a future of the response.
+
+        :param goal: with the points, segments and outputs; for this and the others see
+            :meth:`~ur_cartesian_driver.ros.client.GoalClient.append`.
+        :raises ValueError: both places are given.
+        """
+        if replace_from_point is not None and replace_from_time is not None:
+            raise ValueError('Give replace_from_point or replace_from_time, not both.')
+        request = AppendPoints.Request(goal_id=self._goal_id, last=last)
+        if goal is not None:
+            goal = packed_if_long(goal)
+            request.points, request.segments = goal.trajectory.points, goal.segments
+            request.io_commands, request.packed = goal.io_commands, goal.packed
+        if replace_from_point is not None:
+            request.replace, request.first_index = request.REPLACE_FROM_POINT, replace_from_point
+        elif replace_from_time is not None:
+            request.replace = request.REPLACE_FROM_TIME
+            request.replace_from_time = replace_from_time
+        answer = Future()
+        before, self._newest_answer = self._newest_answer, answer
+        if before is None:
+            self._ask(request, answer)
+        else:
+            before.add_done_callback(lambda _: self._ask(request, answer))
+        return answer
+
+    def _ask(self, request: AppendPoints.Request, answer: Future) -> None:
+        is_appended = request.replace == request.APPEND
+        is_known = self._points is not None
+        if is_appended:  # where, is known once the requests before are taken
+            request.first_index = self._points if is_known else UNKNOWN_POINT
+
+        def take(done: Future) -> None:
+            response = done.result()
+            if response.accepted or not is_known:
+                self._points = response.points_received
+            if is_appended and not is_known:
+                self._ask(request, answer)  # the refusal said how many points there are
+            else:
+                answer.set_result(response)
+
+        self._client.call_async(request).add_done_callback(take)
