@@ -25,11 +25,12 @@ from ur_cartesian_driver.motion.robot_state import (
     SafetyMode,
     SafetyStatus,
 )
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import add, dot, Vector3, Vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.contact_motion import ArmState, ContactMotion
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership
+from ur_cartesian_driver.sim.motion.point_motion import point_motion
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
@@ -211,6 +212,20 @@ class Controller:
     def tcp_wrench(self) -> Vector6:
         """The wrench on the TCP as the robot reports it, in base axes [N, Nm]."""
         return self.io.external_force if self.external_ft else self.contact.measured
+
+    @property
+    def tool_accelerometer(self) -> Vector3:
+        """What a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
+        motion = self.motion
+        frames = self.arm.frames(motion.q)
+        acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
+        error = self.actual.acceleration_error[:3]
+        specific_force = add(add(acceleration, error), self.gravity)
+        return (
+            dot(specific_force, frames.x),
+            dot(specific_force, frames.y),
+            dot(specific_force, frames.z),
+        )
 
     @property
     def takes_scripts(self) -> bool:

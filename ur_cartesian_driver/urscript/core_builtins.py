@@ -17,11 +17,13 @@ from typing import Any
 
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import (
+    bounded,
     copy,
     INT_MAX,
     INT_MIN,
     is_number,
     Matrix,
+    MAX_STRING,
     ScriptPose,
     Struct,
     to_text,
@@ -31,9 +33,6 @@ from ur_cartesian_driver.urscript.script_values import (
 from ur_cartesian_driver.urscript.script_values import (
     make_list as make_list_value,
 )
-
-#: Longest string that a controller makes.
-MAX_STRING = 1023
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
 _HEXADECIMAL = re.compile(r'[+-]?0[xX][0-9a-fA-F]+')
@@ -79,23 +78,17 @@ def _int_range(value: int) -> int:
     return value
 
 
-def _bounded(text: str) -> str:
-    if len(text) > MAX_STRING:
-        raise RuntimeException(f'The string is longer than {MAX_STRING} characters.')
-    return text
-
-
 # Text
 
 
 def str_cat(op1: Value, op2: Value) -> str:
     """Return the texts of two values, one after the other."""
-    return _bounded(to_text(op1) + to_text(op2))
+    return bounded(to_text(op1) + to_text(op2))
 
 
 def to_str(val: Value) -> str:
     """Return the text of a value."""
-    return _bounded(to_text(val))
+    return bounded(to_text(val))
 
 
 def str_len(str: Value) -> int:

@@ -30,6 +30,8 @@ NESTED_LIST = 'Type error: a list holds lists only as the rows of a matrix'
 
 INT_MIN = -(2**31)
 INT_MAX = 2**31 - 1
+#: Longest string that a controller makes.
+MAX_STRING = 1023
 
 
 class ScriptPose(NamedTuple):
@@ -79,6 +81,19 @@ class RemoteObject(ABC):
     @abstractmethod
     def call(self, method: str, arguments: Sequence[Value]) -> Value:
         """Call a method; may return a generator, which then takes frames like a builtin."""
+
+    def part(self, name: str) -> RemoteObject:
+        """Return the object whose methods are `name.method` of this one."""
+        return _RemotePart(self, name)
+
+
+@dataclass(frozen=True, slots=True)
+class _RemotePart(RemoteObject):
+    whole: RemoteObject
+    name: str
+
+    def call(self, method: str, arguments: Sequence[Value]) -> Value:
+        return self.whole.call(f'{self.name}.{method}', arguments)
 
 
 def type_name(value: Value) -> str:
@@ -158,6 +173,20 @@ def _unsupported(symbol: str, a: Value, b: Value) -> RuntimeException:
     return RuntimeException(
         f'Type error: {symbol!r} is not defined for {type_name(a)} and {type_name(b)}'
     )
+
+
+def bounded(text: str) -> str:
+    """Return a computed string if a controller makes one of that length."""
+    if len(text) > MAX_STRING:
+        raise RuntimeException(f'The string is longer than {MAX_STRING} characters.')
+    return text
+
+
+def _add(a: Value, b: Value) -> Value:
+    """Return a sum, or two strings, one after the other."""
+    if type(a) is str and type(b) is str:
+        return bounded(a + b)
+    return _sum(a, b)
 
 
 def _checked(result: int | float) -> int | float:
@@ -269,8 +298,10 @@ def identity(value: Value) -> Value:
     raise RuntimeException(f"Type error: '+' is not defined for {type_name(value)}")
 
 
+_sum = _arithmetic('+', operator.add)
+
 BINARY: dict[str, Callable[[Value, Value], Value]] = {
-    '+': _arithmetic('+', operator.add),
+    '+': _add,
     '-': _arithmetic('-', operator.sub),
     '*': _arithmetic('*', operator.mul),
     '/': _arithmetic('/', _divide),
@@ -305,7 +336,11 @@ Key = tuple[Value, ...] | str
 def get_part(container: Value, key: Key) -> Value:
     """Return `container[key]` or `container.key`; not a copy."""
     if isinstance(key, str):
+        if isinstance(container, RemoteObject):
+            return container.part(key)
         return _fields(container, key)[key]
+    if type(container) is Struct:
+        return container.fields[_field(container, key)]
     if type(container) is Matrix:
         row: list[Value] = container.rows[_position(key[0], container.shape[0])]
         return row if len(key) == 1 else row[_position(key[1], container.shape[1])]
@@ -323,6 +358,9 @@ def set_part(container: Value, path: Sequence[Key], value: Value) -> Value:
         value = set_part(get_part(container, key), path[1:], value)
     if isinstance(key, str):
         _fields(container, key)[key] = value
+        return container
+    if type(container) is Struct:
+        container.fields[_field(container, key)] = value
         return container
     if type(container) is ScriptPose:
         items = list(container)
@@ -353,6 +391,14 @@ def _fields(container: Value, name: str) -> dict[str, Value]:
     if name not in container.fields:
         raise RuntimeException(f'the struct has no field {name!r}')
     return container.fields
+
+
+def _field(struct: Struct, key: tuple[Value, ...]) -> str:
+    """Return the name of a field that is given by its number."""
+    names = list(struct.fields)
+    if len(key) != 1:
+        raise RuntimeException('Type error: struct has one index, not two')
+    return names[_position(key[0], len(names))]
 
 
 def _items(container: Value, key: tuple[Value, ...]) -> Value:

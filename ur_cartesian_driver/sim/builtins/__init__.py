@@ -13,6 +13,11 @@ function that takes time is a generator, which yields once per controller cycle.
 from __future__ import annotations
 
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.builtins.conveyor_builtins import ConveyorBuiltins
+from ur_cartesian_driver.sim.builtins.installation_builtins import (
+    EuromapBuiltins,
+    InstallationBuiltins,
+)
 from ur_cartesian_driver.sim.builtins.io_builtins import (
     AnalogBuiltins,
     DigitalBuiltins,
@@ -20,6 +25,7 @@ from ur_cartesian_driver.sim.builtins.io_builtins import (
     RegisterBuiltins,
 )
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import KinematicsBuiltins
+from ur_cartesian_driver.sim.builtins.modbus_builtins import ModbusBuiltins
 from ur_cartesian_driver.sim.builtins.motion_builtins import ModeBuiltins, MotionBuiltins
 from ur_cartesian_driver.sim.builtins.pose_builtins import PoseBuiltins
 from ur_cartesian_driver.sim.builtins.process_builtins import PathOffsetBuiltins, ProcessBuiltins
@@ -28,6 +34,7 @@ from ur_cartesian_driver.sim.builtins.robot_builtins import (
     RobotBuiltins,
     TimeBuiltins,
 )
+from ur_cartesian_driver.sim.builtins.rpc_builtins import RpcBuiltins
 from ur_cartesian_driver.sim.builtins.socket_builtins import SocketBuiltins
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins
@@ -35,8 +42,12 @@ from ur_cartesian_driver.urscript import core_builtins
 
 BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
     AnalogBuiltins,
+    ConveyorBuiltins,
     DigitalBuiltins,
+    EuromapBuiltins,
+    InstallationBuiltins,
     KinematicsBuiltins,
+    ModbusBuiltins,
     ModeBuiltins,
     MotionBuiltins,
     PathOffsetBuiltins,
@@ -46,6 +57,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
     ProcessBuiltins,
     RegisterBuiltins,
     RobotBuiltins,
+    RpcBuiltins,
     SocketBuiltins,
     TimeBuiltins,
 )

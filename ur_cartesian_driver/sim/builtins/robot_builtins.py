@@ -144,6 +144,14 @@ class RobotBuiltins(BuiltinGroup):
         """Return room temperature."""
         return 25.0
 
+    def get_tool_current(self) -> float:
+        """Return the current of the tool [A], which has none."""
+        return 0.0
+
+    def get_tool_accelerometer_reading(self) -> list[float]:
+        """Return what a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
+        return list(self._controller.tool_accelerometer)
+
     def zero_ftsensor(self) -> None:
         """Let the sensor read zero as it is."""
         self._controller.contact.zero()
@@ -164,6 +172,16 @@ class RobotBuiltins(BuiltinGroup):
         """Set mass [kg] and centre of gravity [m]; the inertia becomes zero."""
         centre = (0.0, 0.0, 0.0) if cog is None else three(cog, 'cog')
         self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=centre)
+
+    def set_payload_mass(self, m: Value) -> None:
+        """Set the mass [kg] alone; the inertia becomes zero."""
+        payload = self._controller.payload
+        self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=payload.cog)
+
+    def set_payload_cog(self, CoG: Value) -> None:
+        """Set the centre of gravity [m] alone; the inertia becomes zero."""
+        payload = self._controller.payload
+        self._controller.payload = Payload(mass=payload.mass, cog=three(CoG, 'CoG'))
 
     def set_target_payload(
         self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0

@@ -17,7 +17,7 @@ from typing import Any
 
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.robot_state import RobotMode
-from ur_cartesian_driver.motion.vectors import add, add6, dot, scale, Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import add, add6, scale, Vector3, Vector6, ZERO6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
     flange_point,
@@ -60,20 +60,6 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
         frames, motion.qd, motion.qdd, flange_point(frames, motion.T_flange_tcp.position)
     )
     return (*tcp.acceleration, *tcp.angular_acceleration)
-
-
-def _accelerometer(controller: Controller) -> Vector3:
-    """Return what a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
-    motion = controller.motion
-    frames = controller.arm.frames(motion.q)
-    acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
-    error = controller.actual.acceleration_error[:3]
-    specific_force = add(add(acceleration, error), controller.gravity)
-    return (
-        dot(specific_force, frames.x),
-        dot(specific_force, frames.y),
-        dot(specific_force, frames.z),
-    )
 
 
 def _payload_moments(controller: Controller) -> Vector6:
@@ -162,7 +148,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'actual_current_as_torque': _payload_moments,
         'target_TCP_acceleration': _tcp_acceleration,
         'actual_TCP_acceleration': _actual_acceleration,
-        'actual_tool_accelerometer': _accelerometer,
+        'actual_tool_accelerometer': lambda c: c.tool_accelerometer,
         'elbow_velocity': _elbow_velocity,
         'actual_momentum': _scaled_momentum,
         'payload': lambda c: c.payload.mass,

@@ -69,14 +69,15 @@ class ExpressionParser(TokenReader):
         return tree.UnaryExpression(operator='not', operand=operand, **source_position(token))
 
     def _unary(self) -> tree.Expression:
-        """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
-        if not self._at('-', '+', 'run'):
+        """Read ("-" | "+" | "!") unary | "run" NAME "(" ")" | postfix."""
+        if not self._at('-', '+', '!', 'run'):
             return self._postfix()
-        if token := self._match('-', '+'):
+        if token := self._match('-', '+', '!'):
             with self._nested():
                 operand = self._unary()
+            operator = 'not' if token.text == '!' else token.text
             return tree.UnaryExpression(
-                operator=token.text, operand=operand, **source_position(token)
+                operator=operator, operand=operand, **source_position(token)
             )
         self._expect('run')
         name = self._expect_kind(TokenKind.NAME)

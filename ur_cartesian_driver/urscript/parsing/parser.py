@@ -33,7 +33,7 @@ exceptions: the value of `return` and the texts of a label must be on the same l
     comparison  = sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }
     sum         = product { ( "+" | "-" ) product }
     product     = unary { ( "*" | "/" | "%" ) unary }
-    unary       = ( "-" | "+" ) unary | "run" NAME "(" ")" | postfix
+    unary       = ( "-" | "+" | "!" ) unary | "run" NAME "(" ")" | postfix
     postfix     = primary { "(" arguments ")" | "[" expression [ "," expression ] "]" | "." NAME }
     arguments   = [ argument { "," argument } ]
     argument    = [ NAME "=" ] expression
@@ -269,7 +269,7 @@ class Parser(ExpressionParser):
 
     def _starts_expression(self) -> bool:
         if self._token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL):
-            return self._at('(', '[', '-', '+', 'not', 'run', *CONSTANTS)
+            return self._at('(', '[', '-', '+', '!', 'not', 'run', *CONSTANTS)
         return self._token.kind is not TokenKind.END
 
     def _jump(self) -> tree.Statement:

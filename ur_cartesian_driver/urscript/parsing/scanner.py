@@ -23,7 +23,7 @@ KEYWORDS = frozenset({
 })  # fmt: skip
 
 #: Longest first, so that `<=` is not read as `<`.
-SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$')
+SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$!')
 
 #: Integers of the controller have 32 bits; a longer literal is read as a float.
 INT_LIMIT = 2**31

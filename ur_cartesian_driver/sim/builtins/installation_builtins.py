@@ -1,0 +1,133 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Settings of the installation, which PolyScope writes at the head of each program that it saves.
+
+They are checked; what they would do has no place here: buttons, wires and machines beside the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ur_cartesian_driver.sim.builtins.arguments import index, one_of, text
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
+
+#: What an input can do besides being read.
+INPUT_ACTIONS = ('default', 'freedrive')
+EUROMAP_PINS = 33
+
+
+def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
+    """Return the function of a program that gives one of some inputs an action."""
+
+    def choose(_: Any, port: Value, action: Value) -> None:
+        index(port, 'port', count)
+        if text(action, 'action') not in INPUT_ACTIONS:
+            raise RuntimeException(f'action is {action!r}; it must be "default" or "freedrive"')
+
+    return choose
+
+
+def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
+    """Return the function of a program that ties one of some outputs to the state of programs."""
+
+    def choose(_: Any, outputId: Value, state: Value) -> None:
+        index(outputId, 'outputId', count)
+        one_of(state, 'state', (0, 1, 2, 3))
+
+    return choose
+
+
+def _runstate_list(count: int) -> Callable[[Any, Value], None]:
+    """Return the older function for a list of outputs that are high while a program runs."""
+
+    def choose(_: Any, outputs: Value) -> None:
+        if type(outputs) is not list:
+            raise RuntimeException(
+                f'Type error: outputs must be a list, not a {type_name(outputs)}'
+            )
+        for i, output in enumerate(outputs):
+            index(output, f'outputs[{i}]', count)
+
+    return choose
+
+
+class InstallationBuiltins(BuiltinGroup):
+    """Actions of inputs, outputs that tell whether a program runs, and modes of the tool."""
+
+    set_standard_digital_input_action = _input_action(8)
+    set_configurable_digital_input_action = _input_action(8)
+    set_tool_digital_input_action = _input_action(2)
+    set_gp_boolean_input_action = _input_action(128)
+
+    set_runstate_standard_digital_output_to_value = _runstate(8)
+    set_runstate_configurable_digital_output_to_value = _runstate(8)
+    set_runstate_tool_digital_output_to_value = _runstate(2)
+    set_runstate_gp_boolean_output_to_value = _runstate(128)
+    set_runstate_standard_analog_output_to_value = _runstate(2)
+    set_runstate_outputs = _runstate_list(10)
+    set_runstate_standard_digital_outputs = _runstate_list(8)
+
+    def set_input_actions_to_default(self) -> None:
+        """Let inputs do nothing but be read."""
+
+    def set_tool_analog_input_domain(self, port: Value, domain: Value) -> None:
+        """Choose 0 = current, 1 = voltage."""
+        index(port, 'port', 2)
+        index(domain, 'domain', 2)
+
+    def set_analog_inputrange(self, port: Value, range: Value) -> None:
+        """Choose the range of an input in the old numbering: standard 0-1, tool 2-3."""
+        index(port, 'port', 4)
+        index(range, 'range', 5)
+
+    def set_tool_output_mode(self, mode: Value) -> None:
+        """Choose 0 = digital outputs, 1 = power with both pins."""
+        index(mode, 'mode', 2)
+
+    def set_tool_digital_output_mode(self, n: Value, mode: Value) -> None:
+        """Choose 1 = sinking, 2 = sourcing, 3 = both."""
+        index(n, 'n', 2)
+        one_of(mode, 'mode', (1, 2, 3))
+
+    def set_safety_mode_transition_hardness(self, type: Value) -> None:
+        """Choose 0 = hard, 1 = soft."""
+        index(type, 'type', 2)
+
+    def motion_version_set(self, version: Value) -> None:
+        """Choose the motion generator, of which there is one here."""
+        one_of(version, 'version', (1, 2))
+
+
+class EuromapBuiltins(BuiltinGroup):
+    """The interface to an injection moulding machine, without the machine."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Begin with all outputs low."""
+        super().__init__(controller)
+        self._outputs = [False] * EUROMAP_PINS
+
+    def get_euromap_input(self, port_number: Value) -> bool:
+        """Return low."""
+        index(port_number, 'port_number', EUROMAP_PINS)
+        return False
+
+    def get_euromap_output(self, port_number: Value) -> bool:
+        """Return what was set."""
+        return self._outputs[index(port_number, 'port_number', EUROMAP_PINS)]
+
+    def set_euromap_output(self, port_number: Value, signal_value: Value) -> None:
+        """Set an output."""
+        self._outputs[index(port_number, 'port_number', EUROMAP_PINS)] = truth(signal_value)
+
+    def set_euromap_runstate_dependent_choice(
+        self, port_number: Value, runstate_choice: Value
+    ) -> None:
+        """Tie an output to the state of programs."""
+        index(port_number, 'port_number', EUROMAP_PINS)
+        one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3))
