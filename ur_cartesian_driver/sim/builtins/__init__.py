@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.builtins.conveyor_builtins import ConveyorBuiltins
+from ur_cartesian_driver.sim.builtins.dynamics_builtins import DynamicsBuiltins
 from ur_cartesian_driver.sim.builtins.installation_builtins import (
     EuromapBuiltins,
     InstallationBuiltins,
@@ -44,6 +45,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
     AnalogBuiltins,
     ConveyorBuiltins,
     DigitalBuiltins,
+    DynamicsBuiltins,
     EuromapBuiltins,
     InstallationBuiltins,
     KinematicsBuiltins,
