@@ -4,10 +4,11 @@
 Points as older robot programs read them.
 
 The library's own bytes (golden/trajectory_points.json) are those of 2.14. Arcs and splines never
-changed but for the time scale, so they are golden for all dialects; the moves of before 2.12 are
-written here word by word, from the table of the format.
+changed but for the time scale, so they are golden for all dialects; the moves of before 2.12, and
+how the programs of that time read an arc, are written here word by word.
 """
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import struct
@@ -143,6 +144,26 @@ def test_moves_repeat_velocity_and_acceleration_before_2_12(name, scale, move, k
     assert sent[18:] == (round(duration * scale), round(0.02 * scale), kind)
     back = decode_point(struct.pack('>21i', *sent), DIALECTS[name])
     assert (back.velocity, back.acceleration, back.blend_radius) == (0.7, 0.9, 0.02)
+
+
+@pytest.mark.parametrize(
+    ('name', 'speeds'),
+    [
+        ('2.0', (900_000, 700_000)),
+        ('2.10', (900_000, 700_000)),
+        ('2.12', (700_000, 900_000)),
+        ('2.14', (700_000, 900_000)),
+    ],
+)
+def test_programs_before_2_12_read_the_acceleration_of_an_arc_first(name, speeds):
+    """Published programs do: their movec takes word 12 for a and word 13 for v."""
+    arc = MoveC(target=POSE, via=POSE, velocity=0.7, acceleration=0.9)
+    sent = words(arc, name)
+    assert sent[12:14] == speeds
+    back = decode_point(struct.pack('>21i', *sent), DIALECTS[name])
+    assert (back.velocity, back.acceleration) == (0.7, 0.9)
+    with pytest.raises(LocalProtocolError, match='velocity is 3000000'):
+        encode_point(replace(arc, velocity=3e6), DIALECTS[name])
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ index    meaning                                                                
 12 - 17  SPLINE: joint accelerations [rad/s^2], zeros when cubic                S
 6 - 11   before 2.12, all but MOVEC* and SPLINE: the velocity, six times        S
 12 - 17  before 2.12, all but MOVEC* and SPLINE: the acceleration, six times    S
+12, 13   before 2.12, MOVEC*: acceleration, velocity                            S
 18       duration [s]; 0 = determined by velocity and acceleration              T
 19       blend radius [m]; SPLINE: its kind, unscaled                           T
 20       motion type                                                            1
@@ -213,7 +214,6 @@ _E = TypeVar('_E', bound=IntEnum)
 
 _TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
 _MOVE_END_NAMES = ('duration', 'blend_radius', 'motion type')
-_ARC_NAMES = (*_TARGET_NAMES, *NEWEST_DIALECT.move_word_names, *_MOVE_END_NAMES)
 _SPLINE_NAMES = (
     *_TARGET_NAMES,
     *(f'velocities[{i}]' for i in range(6)),
@@ -313,7 +313,7 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
     target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
         via, mode, radius = _numbers(primitive.via), primitive.mode, primitive.blend_radius
-        return (*target, *via, v, a, mode, 0, 0, 0, 0, radius, kind)
+        return (*target, *via, *dialect.arc_speeds(v, a), mode, 0, 0, 0, 0, radius, kind)
     q_near = primitive.q_near
     if q_near is not None and not isinstance(primitive.target, Pose):
         raise LocalProtocolError(
@@ -482,7 +482,7 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> I
         return _output(fields)
     if kind in _STOPS.values():
         return _stop(fields, kind)
-    return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind, dialect)
+    return _arc(fields, *_ARCS[kind], dialect) if kind in _ARCS else _move(fields, kind, dialect)
 
 
 def _spline(fields: Sequence[float]) -> Spline:
@@ -521,12 +521,15 @@ def _output(fields: Sequence[float]) -> OutputRecord:
     )
 
 
-def _arc(fields: Sequence[float], target_is_pose: bool, via_is_pose: bool) -> MoveC:
+def _arc(
+    fields: Sequence[float], target_is_pose: bool, via_is_pose: bool, dialect: Dialect
+) -> MoveC:
+    velocity_word, acceleration_word = dialect.arc_speed_words
     return MoveC(
         target=_target(fields[:6], target_is_pose),
         via=_target(fields[6:12], via_is_pose),
-        velocity=fields[12],
-        acceleration=fields[13],
+        velocity=fields[velocity_word],
+        acceleration=fields[acceleration_word],
         blend_radius=fields[19],
         mode=_enum_member(ArcMode, fields[14], 'arc mode (word 14)'),
     )
@@ -560,7 +563,7 @@ def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None
         raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
-    v_at, a_at = NEWEST_DIALECT.speed_words if kind in _ARCS else dialect.speed_words
+    v_at, a_at = dialect.arc_speed_words if kind in _ARCS else dialect.speed_words
     velocity, acceleration = fields[v_at], fields[a_at]
     if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
         name, value = next(
@@ -599,7 +602,9 @@ def field_names(kind: float, dialect: Dialect) -> Sequence[str]:
     if kind == MotionType.SWITCH_OUTPUT:
         return _OUTPUT_NAMES
     if kind in _ARCS:
-        return _ARC_NAMES
+        words = list(NEWEST_DIALECT.move_word_names)
+        words[6:8] = dialect.arc_speeds('velocity', 'acceleration')
+        return (*_TARGET_NAMES, *words, *_MOVE_END_NAMES)
     return (*_TARGET_NAMES, *dialect.move_word_names, *_MOVE_END_NAMES)
 
 

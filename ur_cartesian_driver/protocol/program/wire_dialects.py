@@ -20,9 +20,12 @@ dialect  library        time scale  motion types         words 6 - 17 of moves  
 Types from 200 on switch outputs and do what is done while the arm stands. Only our own robot
 program knows them; the library's programs skip them silently.
 
-"Moves" are all types except MOVEC* and SPLINE, whose words never changed. Blend radii have the
-time scale, too. With a scale of 1000, times are whole milliseconds and radii whole millimetres.
-(The library of that time truncated times; we round them, which no program can notice.)
+"Moves" are all types except MOVEC* and SPLINE, whose words never changed. But programs before
+2.12 take the velocity of an arc for its acceleration and the reverse, though the library of their
+time wrote them in the order of today; so the driver sends them as these programs read them. Blend
+radii have the time scale, too. With a scale of 1000, times are whole milliseconds and radii whole
+millimetres. (The library of that time truncated times; we round them, which no program can
+notice.)
 
 Types 4 and 5 came with 2.2, so 2.0 omits them: a program silently skips a type that it does not
 know. On the reverse socket only the stream actions differ. It is not recorded which library
@@ -36,10 +39,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import floor
 from types import MappingProxyType
+from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
+
+_V = TypeVar('_V', float, str)
 
 _LINES_AND_ARCS = frozenset(range(4))
 _OPTIMOVES = frozenset((4, 5))
@@ -84,6 +90,8 @@ class Dialect:
     min_duration: float = field(init=False)
     #: Words that hold the velocity and the acceleration of a move.
     speed_words: tuple[int, int] = field(init=False)
+    #: The same of an arc, as the program reads them.
+    arc_speed_words: tuple[int, int] = field(init=False)
     #: Names of words 6 to 17 of a move, for errors.
     move_word_names: tuple[str, ...] = field(init=False)
 
@@ -94,6 +102,7 @@ class Dialect:
             ('max_duration', INT32_MAX / self.time_scale),
             ('min_duration', 0.5 / self.time_scale),
             ('speed_words', (12, 13) if with_q_near else (6, 12)),
+            ('arc_speed_words', (12, 13) if with_q_near else (13, 12)),
             ('move_word_names', _NAMES_WITH_Q_NEAR if with_q_near else _NAMES_WITHOUT_Q_NEAR),
         ):
             object.__setattr__(self, name, value)
@@ -135,6 +144,11 @@ class Dialect:
             raise self.unsupported('q_near')
         v, a = velocity, acceleration
         return (v, v, v, v, v, v, a, a, a, a, a, a)
+
+    def arc_speeds(self, velocity: _V, acceleration: _V) -> tuple[_V, _V]:
+        """Return words 12 and 13 of an arc, unscaled, or their names."""
+        first = self.arc_speed_words[0] == 12
+        return (velocity, acceleration) if first else (acceleration, velocity)
 
     def has_q_near(self, fields: Sequence[float]) -> bool:
         """Tell whether the 21 numbers of a move contain q_near, in words 6 to 11."""
