@@ -94,5 +94,60 @@ def test_an_endless_program_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr('ur_cartesian_driver.importing.urscript_file.MAX_CYCLES', 50)
     q = '[0, -1.5, 1.5, -1.5, -1.5, 0]'
     with pytest.raises(BrokenFile, match='endless loop') as caught:
-        imported(tmp_path, f'def a():\n  while True:\n    movej({q})\n  end\nend\n')
-    assert caught.value.line == 3
+        imported(tmp_path, f'def a():\n  x = 1\n  while x:\n    movej({q})\n  end\nend\n')
+    assert caught.value.line == 4
+
+
+def test_the_loop_around_a_saved_program_runs_once(tmp_path):
+    """PolyScope writes it around the program, and threads with loops of their own before it."""
+    found = imported(
+        tmp_path,
+        """def saved():
+  set_input_actions_to_default()
+  thread Counter():
+    while (True):
+      sync()
+    end
+  end
+  run Counter()
+  while (True):
+    $ 1 "Robot Program"
+    movej([0, -1.5, 1.5, -1.5, -1.5, 0])
+    n = 0
+    while n < 9:
+      n = n + 1
+      if n == 2:
+        break
+      end
+    end
+    movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.01 * n, 0, 0, 0]))
+  end
+end
+""",
+    )
+    assert found.lines.tolist() == [11, 19]
+    said = [remark.text() for remark in found.remarks]
+    assert 'line 9: while: only the first round of this endless loop is taken' in said
+
+
+def test_a_loop_that_a_program_leaves_runs_to_its_end(tmp_path):
+    q = '[0.1 * n, -1.5, 1.5, -1.5, -1.5, 0]'
+    text = 'def a():\n  n = 0\n  while True:\n    movej({})\n    n = n + 1\n    {}\n  end\nend\n'
+    for leave in ('if n == 3: break end', 'if n == 3: halt end', 'if n == 3: return None end'):
+        found = imported(tmp_path, text.format(q, leave))
+        assert found.lines.tolist() == [4, 4, 4]
+
+
+@pytest.mark.parametrize(
+    'waits',
+    [
+        'stopj(2)',
+        'stopl(5.0)',
+        'speedl([0.1, 0, 0, 0, 0, 0], 0.5, t=0.2)',
+        'popup("Ready?", blocking=True)',
+        'pause',
+    ],
+)
+def test_nothing_waits_for_the_arm_or_for_a_person(tmp_path, waits):
+    q = '[0, -1.5, 1.5, -1.5, -1.5, 0]'
+    assert len(imported(tmp_path, f'movej({q})\n{waits}\nmovej({q[:-2]}1])\n').lines) == 2

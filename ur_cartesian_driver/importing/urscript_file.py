@@ -4,13 +4,15 @@
 URScript: the program runs in our interpreter, on a simulated arm that is at each target at once.
 
 So variables, loops, functions and poses relative to others are done as the controller does them,
-and what a move leads to is collected. Nothing waits: a program that waits for an input reads that
-of an arm without anything connected.
+and what a move leads to is collected. Nothing waits for the arm or for a person: a program that
+waits for an input reads that of an arm without anything connected. The endless loop with which
+programs of PolyScope end runs once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 import functools
 import inspect
 from math import pi
@@ -44,6 +46,17 @@ from ur_cartesian_driver.urscript import (
     ScriptInterpreter,
     ScriptProgram,
 )
+from ur_cartesian_driver.urscript.parsing.syntax_tree import (
+    BreakStatement,
+    children,
+    ConstantExpression,
+    ContinueStatement,
+    FunctionDefinition,
+    HaltStatement,
+    ReturnStatement,
+    SyntaxNode,
+    WhileStatement,
+)
 from ur_cartesian_driver.urscript.script_values import truth, Value
 
 #: A program that takes longer does not end: cycles, and moves.
@@ -56,6 +69,8 @@ FAR, MAX_ANGLE = 10.0, 4.0 * pi
 #: What only computes or reads; everything else is said to be left out.
 _SILENT = ('get_', 'is_', 'read_', 'pose_', 'interpolate_', 'point_', 'wrench_', 'rpy', 'rotvec')
 _SILENT_NAMES = {'inv', 'sync', 'time', 'tool_contact', 'end_freedrive_mode', 'stopj', 'stopl'}
+#: What waits for an arm that does not move here, or for a person.
+_WAIT = {'interpreter_mode', 'popup', 'servoc', 'speedj', 'speedl', 'stopj', 'stopl'}
 
 
 def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> None:
@@ -64,7 +79,7 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
 
     :raises BrokenFile: it is no program, fails, or does not end.
     """
-    program = _parsed(text)
+    program = _with_one_round(_parsed(text), into)
     config = SimulatorConfig(model=options.arm.model.name)
     controller = Controller(config, controller_builtins)
     controller.motion.T_flange_tcp = options.T_flange_tcp
@@ -79,6 +94,7 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
         interpreter.step()
         # The clock, for programs that wait; nothing moves.
         controller.cycles += 1
+        interpreter.resume()
         if interpreter.error is not None:
             failure = interpreter.error
             raise BrokenFile(failure.line, failure.text.rstrip('.'))
@@ -108,9 +124,52 @@ def _parsed(text: str) -> ScriptProgram:
         raise _broken(error) from None
 
 
+def _with_one_round(program: ScriptProgram, into: PathCollector) -> ScriptProgram:
+    """Return a program whose last statement, if it is a loop without an end, runs once."""
+    *before, last = program.body or (None,)
+    if not isinstance(last, WhileStatement) or not _is_endless(last):
+        return program
+    into.remarks.add(last.line, 'while', 'only the first round of this endless loop is taken')
+    leave = BreakStatement(line=last.line, column=last.column)
+    once = replace(last, body=(*last.body, leave))
+    return replace(program, body=(*before, once))
+
+
+def _is_endless(loop: WhileStatement) -> bool:
+    """Tell whether a loop has a constant condition, and nothing in it that ends it."""
+    condition = loop.condition
+    return (
+        isinstance(condition, ConstantExpression)
+        and truth(condition.value)
+        and not any(_may_end(statement) for statement in loop.body)
+    )
+
+
+def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
+    """Tell whether a statement can leave the loop around it, or begin its next round."""
+    if isinstance(node, FunctionDefinition):
+        return False
+    if isinstance(node, HaltStatement | ReturnStatement):
+        return True
+    if isinstance(node, BreakStatement | ContinueStatement):
+        return not in_loop
+    inner = in_loop or isinstance(node, WhileStatement)
+    return any(_may_end(child, inner) for child in children(node))
+
+
 def _broken(error: CompileError) -> BrokenFile:
     reason = error.reason or error.text.rstrip(':').replace('_', ' ')
     return BrokenFile(max(1, error.line), f'this is no URScript: {reason}')
+
+
+def _at_once(function: Any) -> Any:
+    """Return a function with the same parameters that does nothing and takes a cycle."""
+
+    @functools.wraps(function)
+    def pass_by(*_: Value, **__: Value) -> Any:
+        yield
+
+    return pass_by
 
 
 class _Moves:
@@ -136,7 +195,8 @@ class _Moves:
         found: dict[str, Any] = {}
         for name, function in controller_builtins(self._controller).items():
             silent = name in quiet or name in _SILENT_NAMES or name.startswith(_SILENT)
-            found[name] = function if silent else self._said(name, function)
+            does = _at_once(function) if name in _WAIT else function
+            found[name] = does if silent else self._said(name, does)
         return found | own
 
     def _said(self, name: str, function: Any) -> Any:

@@ -128,7 +128,7 @@ class ConveyorBuiltins(BuiltinGroup):
         number(ticks_per_revolution, 'ticks_per_revolution')
         self._belts.tracked = index(encoder_index, 'encoder_index', ENCODERS)
 
-    def stop_conveyor_tracking(self, a: Value = 20) -> None:
+    def stop_conveyor_tracking(self, a: Value = 20, aRot: Value = 'a') -> None:
         """Move relative to the base again."""
         positive(a, 'a')
         self._belts.tracked = None
