@@ -23,6 +23,7 @@ from ur_cartesian_driver.urscript.script_values import (
     INT_MIN,
     is_number,
     Matrix,
+    MAX_LIST_LENGTH,
     MAX_STRING,
     ScriptPose,
     Struct,
@@ -236,10 +237,6 @@ def length(v: Value) -> int:
 def get_list_length(v: Value) -> int:
     """Return the number of items; the older name of `length`."""
     return length(v)
-
-
-#: The manual names no limit; without one a program could take all the memory.
-MAX_LIST_LENGTH = 100_000
 
 
 def make_list(length: Value, initial_value: Value, capacity: Value = None) -> Value:

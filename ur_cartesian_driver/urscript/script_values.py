@@ -32,6 +32,8 @@ INT_MIN = -(2**31)
 INT_MAX = 2**31 - 1
 #: Longest string that a controller makes.
 MAX_STRING = 1023
+#: The manual names no limit; without one a program could take all the memory.
+MAX_LIST_LENGTH = 100_000
 
 
 class ScriptPose(NamedTuple):

@@ -27,6 +27,7 @@ from ur_cartesian_driver.urscript.compiling.closures import (
     UNSET,
 )
 from ur_cartesian_driver.urscript.compiling.scopes import bind, Builtin, Scope
+from ur_cartesian_driver.urscript.container_methods import call_method
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
@@ -360,13 +361,11 @@ class ExpressionCompiler:
 
         def finish(frame: StackFrame, found: list[Value]) -> Value:
             runtime.thread.location = call_location
-            if not isinstance(found[0], values.RemoteObject):
-                kind = values.type_name(found[0])
-                raise RuntimeException(
-                    f'Type error: {kind} has no method {node.method!r}', *call_location
-                )
+            target, arguments = found[0], found[1:]
             try:
-                return found[0].call(node.method, found[1:])
+                if isinstance(target, values.RemoteObject):
+                    return target.call(node.method, arguments)
+                return call_method(target, node.method, arguments)
             except Exception as error:
                 raise _from_builtin(node, error, node.method) from error
 
