@@ -87,7 +87,7 @@ def test_a_whole_connection():
     (ready,) = link.events
     assert isinstance(ready, HandshakeDone)
     assert (ready.protocol_version, ready.controller_version) == (2, VERSION)
-    (output,) = link.server.outputs
+    output = link.server.output
     assert output.frequency == ready.frequency == 125.0
     assert output.recipe == ready.outputs
     assert link.server.streaming
@@ -107,7 +107,7 @@ def test_all_names_can_be_streamed_at_once():
     link = Link(RtdeClientCodec(list(OUTPUT_TYPES)))
     (ready,) = link.events
     assert ready.frequency == 500.0
-    recipe = link.server.outputs[0].recipe
+    recipe = link.server.output.recipe
     link.to_client(recipe.pack(recipe.zeros()))
     assert link.events[1].values == recipe.zeros()
     assert ready.outputs.unpack(bytes(len(recipe.pack(recipe.zeros())) - 3)) == recipe.zeros()
@@ -129,7 +129,7 @@ def test_optional_outputs_that_are_unknown_are_left_out():
     (ready,) = link.events
     assert ready.outputs.names == ('timestamp', 'actual_q')
     assert ready.missing == ('payload', 'actual_current_as_torque')
-    assert [output.recipe.names for output in link.server.outputs] == [('timestamp', 'actual_q')]
+    assert link.server.output.recipe.names == ('timestamp', 'actual_q')
 
 
 def test_required_outputs_that_are_unknown_are_named():

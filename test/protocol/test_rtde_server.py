@@ -29,22 +29,19 @@ def server(**options):
     return RtdeServerCodec(VERSION, set(), **options)
 
 
-def test_a_client_may_have_several_output_recipes_with_their_own_frequencies():
+def test_a_new_output_recipe_takes_the_place_of_the_one_before():
     controller = server()
-    controller.feed(
-        SetupOutputs(names=('timestamp',), frequency=10.0).encode()
-        + SetupOutputs(names=('nonsense',), frequency=10.0).encode()
-        + SetupOutputs(names=('actual_q',), frequency=9999.0).encode()
-        + SetupOutputs(names=('robot_mode',), frequency=math.nan).encode()
-    )
-    assert [(o.recipe.recipe_id, o.recipe.names, o.frequency) for o in controller.outputs] == [
-        (1, ('timestamp',), 10.0),
-        (2, ('actual_q',), 500.0),
-        (3, ('robot_mode',), 500.0),
-    ]
+    for names, frequency in ((('timestamp',), 10.0), (('actual_q',), 9999.0)):
+        controller.feed(SetupOutputs(names=names, frequency=frequency).encode())
+        assert controller.output.recipe.names == names
+        assert controller.output.frequency == min(frequency, 500.0)
+    controller.feed(SetupOutputs(names=('robot_mode',), frequency=math.nan).encode())
+    assert controller.output.frequency == 500.0
+    controller.feed(SetupOutputs(names=('nonsense',), frequency=10.0).encode())
+    assert controller.output is None
     replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
-    assert [reply.recipe_id for reply in replies] == [1, 0, 2, 3]
-    assert replies[1].types == ('NOT_FOUND',)
+    assert [reply.recipe_id for reply in replies] == [1, 1, 1, 0]
+    assert replies[3].types == ('NOT_FOUND',)
 
 
 def test_in_version_1_there_is_one_output_recipe_without_id():
@@ -54,8 +51,7 @@ def test_in_version_1_there_is_one_output_recipe_without_id():
         + SetupOutputs(names=('timestamp',)).encode()
         + SetupOutputs(names=('actual_q',)).encode()
     )
-    (output,) = controller.outputs
-    assert len(output.recipe.pack(((0.0,) * 6,))) == 3 + 48
+    assert len(controller.output.recipe.pack(((0.0,) * 6,))) == 3 + 48
     assert controller.data_to_send().endswith(b'OVECTOR6D')
 
 
@@ -97,9 +93,9 @@ def test_inputs_before_their_recipe_are_an_error():
         server().feed(DataPackage(payload=bytes(5)).encode())
 
 
-def test_the_number_of_recipes_is_bounded():
+def test_the_number_of_input_recipes_is_bounded():
     controller = server()
-    request = SetupOutputs(names=('timestamp',), frequency=1.0).encode()
+    request = SetupInputs(names=('input_int_register_24',)).encode()
     controller.feed(request * 255)
     with pytest.raises(RemoteProtocolError, match='255'):
         controller.feed(request)

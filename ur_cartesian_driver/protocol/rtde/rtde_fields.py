@@ -1,15 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Names and types of everything that RTDE can stream, in one table.
+Names and types of everything that RTDE can stream, in one table, and what older software lacks.
 
-Older software has fewer; it answers ``NOT_FOUND``.
+Software answers ``NOT_FOUND`` for a field that it does not have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+import re
 from types import MappingProxyType
 
 
@@ -115,3 +116,29 @@ OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
         **_registers('output'),
     }
 )
+
+#: The first software with a field, CB3 (None = none) and e-Series, as far as the manufacturer's
+#: guide dates it. The registers that came later are for clients other than field buses.
+_INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
+    ((3, 5), (5, 0), r'elbow_(position|velocity)'),
+    ((3, 9), (5, 3), r'\w+_bit_register_\d+|\w+_(int|double)_register_(2[4-9]|[34]\d)'),
+    ((3, 10), (5, 4), r'safety_status'),
+    ((3, 11), (5, 5, 1), r'payload(_cog)?'),
+    ((3, 14), (5, 9), r'script_control_line'),
+    ((3, 15), (5, 11), r'payload_inertia'),
+    (None, (5, 9), r'ft_raw_wrench'),
+)
+
+
+def fields_of(types: Mapping[str, DataType], version: tuple[int, ...]) -> dict[str, DataType]:
+    """Return the outputs, or inputs, that a software version has."""
+    missing = [
+        re.compile(pattern)
+        for cb3, e_series, pattern in _INTRODUCED
+        if (first := e_series if version >= (5,) else cb3) is None or version < first
+    ]
+    return {
+        name: data_type
+        for name, data_type in types.items()
+        if not any(pattern.fullmatch(name) for pattern in missing)
+    }

@@ -323,7 +323,8 @@ def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeR
         case PackageType.DATA_PACKAGE:
             return DataPackage(payload=_require_min_size(data, payload, 1))
         case PackageType.TEXT_MESSAGE:
-            return _text_message(data, payload, version)
+            # Clients write the same form in both versions.
+            return _text_message(data, payload, LATEST_PROTOCOL_VERSION)
     _require_size(data, payload, 0)
     if kind is PackageType.GET_URCONTROL_VERSION:
         return GetControllerVersion()

@@ -7,11 +7,10 @@ It answers requests as a controller does and keeps the agreed recipes. Its owner
 and decides when to send data packages with which values::
 
     for data in socket: events = server.feed(data); socket.send(server.data_to_send())
-    if server.streaming:
-        for output in server.outputs: socket.send(output.recipe.pack(values))
+    if server.streaming and server.output: socket.send(server.output.recipe.pack(values))
 
-* A client may set up several output recipes; each has its own id and frequency. In version 1 it
-  has only one, without an id.
+* A client has one output recipe: the manufacturer's guide knows no more, in either version. A
+  new one takes its place.
 * An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
 * An input belongs to one client; the others receive ``IN_USE``. The client itself may use it in
   several recipes, one for each kind of command that it sends. All connections share the set of
@@ -20,7 +19,7 @@ and decides when to send data packages with which values::
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
@@ -49,7 +48,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: Recipe ids are bytes and 0 means invalid.
+#: Ids of input recipes are bytes and 0 means invalid.
 MAX_RECIPES = 255
 
 
@@ -85,9 +84,11 @@ class RtdeServerCodec:
 
         :param taken_inputs: inputs that any client writes; shared by all connections.
         :param frequency: rate of the controller [Hz], the highest that a client gets.
+        :param output_types: the outputs that this controller has.
+        :param input_types: its inputs.
         """
         self.streaming = False
-        self.outputs: list[OutputStream] = []
+        self.output: OutputStream | None = None
         self._inputs: list[Recipe] = []
         self._version = version
         self._protocol = LATEST_PROTOCOL_VERSION
@@ -163,16 +164,12 @@ class RtdeServerCodec:
         types = [self._output_types.get(name) for name in request.names]
         known = [data_type for data_type in types if data_type is not None]
         valid = len(known) == len(types) > 0
-        if self._protocol == 1:
-            self.outputs.clear()
-        recipe_id = None if self._protocol == 1 else len(self.outputs) + 1 if valid else 0
+        recipe_id = None if self._protocol == 1 else int(valid)
+        self.output = None
         if valid:
-            _check_number(self.outputs)
-            self.outputs.append(
-                OutputStream(
-                    recipe=Recipe(request.names, known, recipe_id),
-                    frequency=self._granted_frequency(request.frequency),
-                )
+            self.output = OutputStream(
+                recipe=Recipe(request.names, known, recipe_id),
+                frequency=self._granted_frequency(request.frequency),
             )
         return SetupOutputsReply(
             types=tuple(t.name if t else NOT_FOUND for t in types), recipe_id=recipe_id
@@ -198,7 +195,10 @@ class RtdeServerCodec:
             )
         recipe_id = 0
         if texts and NOT_FOUND not in texts and IN_USE not in texts:
-            _check_number(self._inputs)
+            if len(self._inputs) >= MAX_RECIPES:
+                raise RemoteProtocolError(
+                    f'An RTDE client set up more than {MAX_RECIPES} input recipes.'
+                )
             recipe_id = len(self._inputs) + 1
             types = [self._input_types[name] for name in request.names]
             self._inputs.append(Recipe(request.names, types, recipe_id))
@@ -216,8 +216,3 @@ class RtdeServerCodec:
             )
         recipe = self._inputs[number - 1]
         return InputReceived(recipe=recipe, values=recipe.unpack(data.payload))
-
-
-def _check_number(recipes: Sequence[object]) -> None:
-    if len(recipes) >= MAX_RECIPES:
-        raise RemoteProtocolError(f'An RTDE client set up more than {MAX_RECIPES} recipes.')
