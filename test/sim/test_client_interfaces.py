@@ -13,7 +13,7 @@ import time
 import pytest
 from robot_ports import FREE
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState
+from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     PrimaryDecoder,
     RobotStateFrame,
@@ -133,6 +133,44 @@ def test_local_control_makes_the_interface_read_only(interface):
         connection.sendall(b'set speed 0.5\n')
         until(lambda: any('C210' in line for line in robot.state().messages))
         assert robot.state().speed_slider == 1.0
+
+
+@pytest.fixture
+def robot_on_standard_ports():
+    for last in range(1, 255):
+        config = SimulatorConfig(host=f'127.0.19.{last}', rate=4.0)
+        with contextlib.suppress(OSError), SimulatedRobot(config) as robot:
+            yield robot
+            return
+    raise OSError('No address of 127.0.19.0/24 is free.')
+
+
+def test_the_read_only_ports_send_the_same_and_take_no_scripts(robot_on_standard_ports):
+    host = robot_on_standard_ports.config.host
+    for port in (30001, 30002, 30003):
+        with (
+            socket.create_connection((host, port + 10), 5) as reader,
+            socket.create_connection((host, port), 5) as writer,
+        ):
+            reader.sendall(b'set speed 0.25\nprotective_stop()\n')
+            writer.sendall(b'set speed 0.5\n')
+            until(lambda: robot_on_standard_ports.state().speed_slider == 0.5)
+            robot_on_standard_ports.set_speed_slider(1.0)
+            # The size at the start of a frame: of the version or of a real-time packet.
+            start = [wire.recv(4, socket.MSG_WAITALL) for wire in (reader, writer)]
+            assert start[0] == start[1]
+            robot_on_standard_ports.call(lambda c: setattr(c, 'remote_control', False))
+            with contextlib.suppress(ConnectionResetError):
+                while writer.recv(65536):
+                    pass
+            reader.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                while reader.recv(65536):
+                    pass
+            reader.settimeout(5)
+            assert reader.recv(1)
+            robot_on_standard_ports.call(lambda c: setattr(c, 'remote_control', True))
+    assert robot_on_standard_ports.state().safety_mode is SafetyMode.NORMAL
 
 
 @pytest.mark.slow

@@ -28,8 +28,12 @@ from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
 from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardSession
 from ur_cartesian_driver.sim.interfaces.interpreter_session import InterpreterSession
-from ur_cartesian_driver.sim.interfaces.primary_session import PrimarySession, ScriptSession
-from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
+from ur_cartesian_driver.sim.interfaces.primary_session import (
+    PrimarySession,
+    ReadOnlySession,
+    ScriptSession,
+)
+from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream, version_frame
 from ur_cartesian_driver.sim.interfaces.realtime_stream import RealtimeStream
 from ur_cartesian_driver.sim.interfaces.robot_api_session import FIRST_VERSION, RobotApiSession
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
@@ -44,6 +48,8 @@ T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
+#: From the port of a script interface to that of its read-only twin: 30001 and 30011.
+READ_ONLY_DISTANCE = 10
 #: The first version without a dashboard.
 POLYSCOPE_X = 10
 
@@ -123,6 +129,12 @@ class SimulatedRobot:
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
         self._interpreter = TcpServer('interpreter', lambda: InterpreterSession(self.controller))
         self._robot_api = TcpServer('robot-api', lambda: RobotApiSession(self.controller))
+        #: The script interfaces and their read-only twins, which send the same.
+        self._read_only: dict[TcpServer[Any], TcpServer[Any]] = {
+            self._primary: self._read_only_twin('primary', version_frame),
+            self._secondary: self._read_only_twin('secondary', version_frame),
+            self._realtime: self._read_only_twin('real-time', lambda _: b''),
+        }
         self._servers: tuple[TcpServer[Any], ...] = (
             self._rtde,
             self._primary,
@@ -145,6 +157,11 @@ class SimulatedRobot:
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None
         self._compiler: CompileThread | None = None
+
+    def _read_only_twin(
+        self, name: str, greet: Callable[[Controller], bytes]
+    ) -> TcpServer[ReadOnlySession]:
+        return TcpServer(f'read-only {name}', lambda: ReadOnlySession(greet(self.controller)))
 
     # Life
 
@@ -220,7 +237,7 @@ class SimulatedRobot:
             if self._compiler is not None:
                 self._compiler.close()
             self.controller.sockets.close_all()
-            for server in self._servers:
+            for server in (*self._servers, *self._read_only.values()):
                 await server.close()
             # Clients that connected at the last moment are accepted and disconnected.
             await asyncio.sleep(0.01)
@@ -240,6 +257,9 @@ class SimulatedRobot:
         await self._secondary.listen(host, config.listening_secondary_port)
         await self._realtime.listen(host, config.listening_realtime_port)
         await self._interpreter.listen(host, config.listening_interpreter_port)
+        if config.has_standard_ports:
+            for server, twin in self._read_only.items():
+                await twin.listen(host, server.port + READ_ONLY_DISTANCE)
         self._ports = Ports(
             rtde=self._rtde.port,
             primary=self._primary.port,
@@ -253,6 +273,8 @@ class SimulatedRobot:
     async def _cycles(self) -> None:
         stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
         took_scripts = self.controller.takes_scripts
+        primary, secondary, packets = self._read_only.items()
+        states = (*primary, *secondary)
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
@@ -261,7 +283,7 @@ class SimulatedRobot:
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
             if took_scripts and not self.controller.takes_scripts:
-                for server in (self._primary, self._secondary, self._realtime):
+                for server in self._read_only:
                     server.drop()
             took_scripts = self.controller.takes_scripts
             for session, connection in self._rtde.session_connections:
@@ -272,13 +294,16 @@ class SimulatedRobot:
             for _, api_client in self._robot_api.session_connections:
                 api_client.poll()
             for message in stream.messages():
-                self._primary.broadcast(message)
-            if stream.is_due() and (self._primary.connections or self._secondary.connections):
+                for server in primary:
+                    server.broadcast(message)
+            if stream.is_due() and any(server.connections for server in states):
                 state = stream.state()
-                self._primary.broadcast_state(state)
-                self._secondary.broadcast_state(state)
-            if self._realtime.connections:
-                self._realtime.broadcast_state(realtime.packet())
+                for server in states:
+                    server.broadcast_state(state)
+            if any(server.connections for server in packets):
+                packet = realtime.packet()
+                for server in packets:
+                    server.broadcast_state(packet)
 
     def _on_socket_data(self, port: int, data: bytes) -> None:
         if self.on_socket_data is not None:

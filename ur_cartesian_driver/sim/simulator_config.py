@@ -54,7 +54,8 @@ class SimulatorConfig:
     primary_port: int = _PRIMARY_PORT
     dashboard_port: int = 29999
     #: None = 30002 and 30003 if the primary interface is on 30001, otherwise any free ones: a
-    #: robot on other ports is probably not the only one on this computer.
+    #: robot on other ports is probably not the only one on this computer. Their read-only twins
+    #: (30011 to 30013) listen beside the standard ports only.
     secondary_port: int | None = None
     realtime_port: int | None = None
     #: Port of interpreter mode; None = 30020 or any free one, as above.
@@ -203,6 +204,12 @@ class SimulatorConfig:
         if self.robot_api_port is not None:
             return self.robot_api_port
         return _ROBOT_API_PORT if self.primary_port == _PRIMARY_PORT else 0
+
+    @property
+    def has_standard_ports(self) -> bool:
+        """Tell whether the script interfaces are on 30001 to 30003, as on a real robot."""
+        ports = (self.primary_port, self.listening_secondary_port, self.listening_realtime_port)
+        return ports == (_PRIMARY_PORT, _PRIMARY_PORT + 1, _PRIMARY_PORT + 2)
 
     def _port_beside_primary(self, chosen: int | None, distance: int) -> int:
         if chosen is not None:

@@ -4,7 +4,8 @@
 One client of an interface that takes scripts: primary, secondary, real-time.
 
 All three take programs and commands. What they send differs; apart from the greeting, it goes to
-all clients. Whether a client may send is decided when it connects, and not again.
+all clients. Whether a client may send is decided when it connects, and not again. Each has a
+read-only twin, which sends the same and ignores what it is sent.
 """
 
 from __future__ import annotations
@@ -39,3 +40,23 @@ class PrimarySession(ScriptSession):
     def open(self) -> bytes:
         """Introduce the controller: clients wait for this before anything else."""
         return version_frame(self._controller)
+
+
+class ReadOnlySession(ClientSession):
+    """A client of a read-only twin."""
+
+    def __init__(self, greeting: bytes) -> None:
+        """
+        Ignore what the client sends.
+
+        :param greeting: what the interface begins with.
+        """
+        self._greeting = greeting
+
+    def open(self) -> bytes:
+        """Begin as the interface does."""
+        return self._greeting
+
+    def feed(self, data: bytes) -> bytes:
+        """Ignore it."""
+        return b''
