@@ -74,7 +74,7 @@ def test_a_digital_output_is_set_and_no_other(driver, ur_sim):
 
 def test_an_analog_output_is_set_in_its_domain(driver, ur_sim):
     assert driver.set_analog_output(1, 0.25, AnalogDomain.VOLTAGE).ok
-    assert ur_sim.call(lambda c: list(c.io.analog_out)) == [0.0, 2.5]
+    assert ur_sim.call(lambda c: list(c.io.analog_out)) == [0.004, 2.5]
     assert driver.set_analog_output(0, 0.5, AnalogDomain.CURRENT).ok
     assert ur_sim.call(lambda c: c.io.analog_out[0]) == pytest.approx(0.012)
     wait_for(lambda: driver.signals.analog_outputs[0].domain is AnalogDomain.CURRENT)

@@ -132,6 +132,7 @@ def test_the_table_is_complete():
         ('load b.urp', 'File not found: b.urp'),
         ('load installation other.installation', 'File not found: other.installation'),
         ('pause', 'Failed to execute: pause'),
+        ('addToLog', 'No log message to add'),
         ('set operational mode dancing', 'could not understand: "set operational mode dancing"'),
         ('Play', 'could not understand: "Play"'),
         ('play now', 'could not understand: "play now"'),

@@ -34,6 +34,7 @@ def test_each_primary_client_gets_the_version_first_then_states(robot):
             version = wire.next()
             assert isinstance(version, VersionMessage)
             assert (version.major, version.minor) == (5, 21)
+            assert version.timestamp == 2**64 - 1  # as robots send it
             packages = {type(p): p for p in wire.await_(RobotStateFrame).packages}
     assert packages[RobotModeData].robot_mode == 7
     assert packages[ConfigurationData].robot_type == 1

@@ -127,6 +127,12 @@ def test_modes_and_voltages_follow_the_power(make_bench, command, joints, tool, 
     assert read(bench, 'actual_robot_voltage') == volts
 
 
+def test_a_new_robot_has_inputs_in_volts_and_outputs_at_4_milliamperes(bench):
+    # As in the state of a UR5e of URSim 5.8 that the manufacturer's library has recorded.
+    assert read(bench, 'analog_io_types') == read(bench, 'tool_analog_input_types') == 0b11
+    assert read(bench, 'standard_analog_output1') == 0.004
+
+
 def test_what_programs_and_people_set_is_reported(bench):
     bench.run("""set_payload(1.5, [0.1, 0.2, 0.3])
 set_tcp(p[0, 0, 0.2, 0, 0, 0])
@@ -134,6 +140,8 @@ set_gravity([0, 9.82, 0])
 set_standard_digital_out(3, True)
 set_configurable_digital_out(1, True)
 set_tool_digital_out(1, True)
+set_standard_analog_out(0, 0.25)
+set_analog_outputdomain(1, 1)
 set_standard_analog_out(1, 0.25)
 set_tool_voltage(24)
 write_output_float_register(7, 0.5)
@@ -147,7 +155,9 @@ write_output_boolean_register(33, True)""")
         'target_gravity': [0, 9.82, 0],
         'actual_digital_output_bits': 1 << 3 | 1 << 9 | 1 << 17,
         'actual_configurable_digital_output_bits': 0b10,
+        'standard_analog_output0': 0.008,
         'standard_analog_output1': 2.5,
+        'analog_io_types': 0b1011,
         'tool_output_voltage': 24,
         'output_double_register_7': 0.5,
         'output_bit_registers32_to_63': 0b10,

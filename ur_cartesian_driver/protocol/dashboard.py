@@ -76,7 +76,12 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
         'popup': CommandSpec(reply='showing popup', takes_argument=True, cb3=(1, 6)),
         'close popup': CommandSpec(reply='closing popup', cb3=(1, 6)),
         'close safety popup': CommandSpec(reply='closing safety popup', cb3=(3, 1)),
-        'addToLog': CommandSpec(reply='Added log message', takes_argument=True, cb3=(1, 8)),
+        'addToLog': CommandSpec(
+            reply='Added log message',
+            takes_argument=True,
+            argument_is_optional=True,
+            cb3=(1, 8),
+        ),
         'isProgramSaved': CommandSpec(reply='{}', cb3=(1, 8)),
         'programState': CommandSpec(reply='{}', cb3=(1, 8)),
         'PolyscopeVersion': CommandSpec(reply='URSoftware {}', cb3=(1, 8)),

@@ -110,9 +110,12 @@ class DashboardHandlers:
         """Show a window."""
         self.controller.show_popup(Popup(text=text))
 
-    def add_to_log(self, text: str) -> None:
+    def add_to_log(self, text: str) -> str | None:
         """Write to the log."""
+        if not text:
+            return 'No log message to add'
         self.controller.messages.note(text)
+        return None
 
     def set_role(self, role: str) -> str | None:
         """Change the user role."""

@@ -30,6 +30,8 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
 )
 from ur_cartesian_driver.sim.controller import Controller
 
+#: Of the version message, as recorded on four robots (3.5 to 5.1).
+NO_TIMESTAMP = 2**64 - 1
 #: States per second.
 STATE_RATE = 10.0
 #: Joint acceleration limit that is reported [rad/s^2], as by a recorded UR5e.
@@ -49,7 +51,7 @@ def version_frame(controller: Controller) -> bytes:
             bugfix=bugfix,
             build=build,
             date='2026-01-01, 00:00:00',
-            timestamp=round(controller.timestamp * 1e6),
+            timestamp=NO_TIMESTAMP,
         )
     )
 

@@ -184,6 +184,8 @@ FIXED: Mapping[str, Any] = MappingProxyType(
         'joint_temperatures': (25.0,) * 6,
         'actual_main_voltage': _VOLTAGE,
         'tool_temperature': 25.0,
+        # Both in volts, as on the primary interface.
+        'tool_analog_input_types': 3,
     }
 )
 

@@ -87,8 +87,9 @@ class ControllerIo:
     #: [V] or [A] by the domain; True = voltage.
     analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     analog_in_voltage: list[bool] = field(default_factory=lambda: [True, True])
-    analog_out: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    analog_out_voltage: list[bool] = field(default_factory=lambda: [True, True])
+    #: Outputs are 4 mA at first, as recorded in URSim and set by the programs of a pendant.
+    analog_out: list[float] = field(default_factory=lambda: [0.004, 0.004])
+    analog_out_voltage: list[bool] = field(default_factory=lambda: [False, False])
     tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     tool_voltage: int = 0
     #: Force [N] and torque [Nm] that an RTDE client has measured.
