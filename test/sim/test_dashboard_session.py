@@ -143,6 +143,11 @@ def test_what_cannot_be_done_is_said(command, answer):
     assert DashboardUser(5, 21).ask(command) == answer
 
 
+def test_the_name_of_a_program_may_stand_in_quotation_marks():
+    assert 'a.urp' in DashboardUser(5, 21).ask('load "a.urp"')
+    assert DashboardUser(5, 21).ask('load "b c.urp"') == 'File not found: b c.urp'
+
+
 @pytest.mark.parametrize('command', ['power on', 'brake release', 'play'])
 def test_an_arm_in_emergency_stop_refuses(command):
     user = DashboardUser(5, 21)

@@ -38,6 +38,7 @@ def test_each_primary_client_gets_the_version_first_then_states(robot):
             packages = {type(p): p for p in wire.await_(RobotStateFrame).packages}
     assert packages[RobotModeData].robot_mode == 7
     assert packages[ConfigurationData].robot_type == 1
+    assert packages[ConfigurationData].robot_sub_type == 3  # an e-Series, as recorded
     assert packages[KinematicsInfo].a == pytest.approx((0, -0.425, -0.3922, 0, 0, 0))
 
 
@@ -120,8 +121,9 @@ def test_a_bare_line_is_a_program_of_its_own(robot):
 
 def test_the_speed_can_be_set_by_a_line(robot):
     with Primary(robot.ports.primary) as wire:
-        wire.send(b'set speed 0.5\n')
+        wire.send(b'set real\nset sim\nset real\nset speed 0.5\n')
         wait_for(lambda: robot.state().speed_slider == 0.5)
+    assert robot.state().messages == ()
 
 
 def test_in_local_control_the_script_port_is_read_only():

@@ -263,11 +263,13 @@ class ConfigurationData:
     alpha: Vector6
     theta: Vector6
     masterboard_version: int = 6
+    #: 4 = of a UR5, 5 = UR10, 6 = UR3, 10 = UR20, 11 = UR30, 16 = UR16.
     controller_box_type: int = 4
     #: 1 = UR5 (UR7e, too), 2 = UR10 (UR12e, too), 3 = UR3, 4 = UR16, 5 = UR18, 6 = UR8 Long,
     #: 7 = UR20, 8 = UR30, 9 = UR15.
     robot_type: int
-    robot_sub_type: int = 0
+    #: 2 = CB3, 3 = e-Series.
+    robot_sub_type: int = 3
     reserved: tuple[int, ...] = ()
 
     def encode(self) -> bytes:

@@ -80,7 +80,8 @@ class DashboardHandlers:
     # What commands do
 
     def load(self, name: str) -> str | None:
-        """Load a program."""
+        """Load a program; some clients write its name in quotation marks."""
+        name = name.strip('"')
         refusal = self.controller.load_program(name)
         if not refusal or refusal.startswith('File not found'):
             return refusal or None

@@ -31,6 +31,9 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'stop program': lambda controller: controller.programs.stop(),
         'pause program': lambda controller: controller.programs.pause(),
         'resume program': lambda controller: controller.programs.play(),
+        # Whether motions are for the arm or for the screen only; here they are the same.
+        'set real': lambda _: None,
+        'set sim': lambda _: None,
     }
 )
 

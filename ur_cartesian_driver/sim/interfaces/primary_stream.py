@@ -36,6 +36,8 @@ NO_TIMESTAMP = 2**64 - 1
 STATE_RATE = 10.0
 #: Joint acceleration limit that is reported [rad/s^2], as by a recorded UR5e.
 _JOINT_ACCELERATION = 40.0
+#: By the type of the robot; those of others are not known.
+_CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: Limit of an endless joint on the wire, which has no infinity [rad].
 _UNLIMITED = 1e6
@@ -181,5 +183,7 @@ def _configuration(controller: Controller) -> ConfigurationData:
         d=geometry.d,
         alpha=geometry.alpha,
         theta=geometry.theta,
+        controller_box_type=_CONTROLLER_BOXES.get(model.wire_type, 4),
         robot_type=model.wire_type,
+        robot_sub_type=2 if model.series == 'CB3' else 3,
     )
