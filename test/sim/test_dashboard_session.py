@@ -148,6 +148,23 @@ def test_the_name_of_a_program_may_stand_in_quotation_marks():
     assert DashboardUser(5, 21).ask('load "b c.urp"') == 'File not found: b c.urp'
 
 
+@pytest.mark.parametrize('command', ['load a.urp', 'play', 'stop', 'power off', 'brake release'])
+def test_in_local_control_commands_are_refused_until_the_client_reconnects(command):
+    # The words are those of robots in several issues of the drivers for ROS.
+    refusal = (
+        'Command is not allowed due to safety reasons, please switch robot to Remote Control '
+        'mode and reconnect to port 29999'
+    )
+    user = DashboardUser(5, 21, remote_control=False)
+    assert user.ask(command) == refusal
+    assert user.ask('robotmode') == 'Robotmode: RUNNING'
+    assert user.ask('is in remote control') == 'false'
+    user.controller.remote_control = True
+    assert user.ask(command) == refusal
+    user.session = DashboardSession(user.controller)
+    assert user.ask(command) != refusal
+
+
 @pytest.mark.parametrize('command', ['power on', 'brake release', 'play'])
 def test_an_arm_in_emergency_stop_refuses(command):
     user = DashboardUser(5, 21)

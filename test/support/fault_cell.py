@@ -16,7 +16,8 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.services.service_calls import HandBackCall, RunScriptCall
-from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent
 
 #: Time for which the arm is watched after an unlock or a play, and while a goal waits [s].
 WATCH_TIME = 0.2
@@ -99,13 +100,36 @@ async def end_faults(cell: RobotCell):
     await cell.sleep(2.0 * CYCLE)
 
 
+def _restart_safety(controller: Controller):
+    controller.safety_event(SafetyEvent.RESTART)
+    controller.power_off()
+
+
+#: What the pendant has instead of the commands of the dashboard, which local control refuses.
+PENDANT = {
+    'unlock protective stop': lambda controller: controller.safety_event(SafetyEvent.UNLOCK),
+    'restart safety': _restart_safety,
+    'power on': Controller.power_on,
+    'brake release': Controller.release_brakes,
+    'play': lambda controller: controller.programs.play(),
+}
+
+
+async def command(cell: RobotCell, name: str):
+    """Give a command by the dashboard, or in local control at the pendant."""
+    if cell.robot.controller.takes_scripts:
+        await cell.dashboard(name)
+    else:
+        cell.robot.call(PENDANT[name])
+
+
 async def perform(cell: RobotCell, step: str):
     """Do one recovery step, as another client or at the pendant, and wait for its effect."""
     controller = cell.robot.controller
     match step:
         case 'unlock':
             await cell.sleep(cell.robot.config.unlock_delay + CYCLE)
-            await cell.dashboard('unlock protective stop')
+            await command(cell, 'unlock protective stop')
             await cell.until(lambda: controller.safety.mode in OPERATIONAL)
         case 'reset the safeguard':
             cell.robot.inject('reset_safeguard')
@@ -113,16 +137,16 @@ async def perform(cell: RobotCell, step: str):
         case 'release the button':
             cell.robot.release_emergency_stop()
         case 'restart safety':
-            await cell.dashboard('restart safety')
+            await command(cell, 'restart safety')
         case 'power on':
-            await cell.dashboard('power on')
+            await command(cell, 'power on')
             await cell.until(lambda: controller.power.mode.name == 'IDLE')
         case 'release the brakes':
-            await cell.dashboard('brake release')
+            await command(cell, 'brake release')
             await cell.until(lambda: controller.power.mode.name == 'RUNNING')
         case 'play':
             await cell.until(lambda: controller.programs.state in PLAYABLE_STATES)
-            await cell.dashboard('play')
+            await command(cell, 'play')
         case 'resend':
             # What runs on the robot is known from the newest packet.
             await cell.sleep(cell.max_packet_gap)

@@ -34,6 +34,28 @@ _RUNTIME_WORDS = {
     RuntimeState.PAUSING: 'PAUSED',
     RuntimeState.PAUSED: 'PAUSED',
 }
+#: What moves the arm, its power or its programs: refused in local control, and ever after to a
+#: client that connected in it.
+_REMOTE_ONLY = frozenset(
+    {
+        'load',
+        'load installation',
+        'play',
+        'pause',
+        'stop',
+        'shutdown',
+        'power on',
+        'power off',
+        'brake release',
+        'unlock protective stop',
+        'restart safety',
+    }
+)
+#: The words of real robots.
+_LOCAL_CONTROL = (
+    'Command is not allowed due to safety reasons, please switch robot to Remote Control mode and '
+    'reconnect to port 29999'
+)
 _QUIT = DashboardRequest(name='quit')
 _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
@@ -198,6 +220,8 @@ class DashboardSession(ClientSession):
 
     def __init__(self, controller: Controller) -> None:
         """Wait for commands."""
+        self._controller = controller
+        self._may_control = controller.takes_scripts
         self._handlers = DashboardHandlers(controller)
         self._server = DashboardServerCodec(controller.config.version[:2])
 
@@ -218,6 +242,9 @@ class DashboardSession(ClientSession):
         if isinstance(request, str):
             return not_understood(request)
         name, argument = request.name, request.argument
+        may_control = self._may_control and self._controller.takes_scripts
+        if name in _REMOTE_ONLY and not may_control:
+            return encode_line(_LOCAL_CONTROL)
         if (control := _CONTROL.get(name)) and control(self._handlers.controller):
             return encode_line(f'Failed to execute: {name}')
         if (handler := _HANDLERS.get(name)) and (refusal := handler(self._handlers, argument)):
