@@ -61,6 +61,34 @@ def test_a_new_program_replaces_the_running_one_once_the_arm_stands(bench):
     assert keys(bench)[1:] == [('PROGRAM_XXX_STOPPED', 'first'), ('PROGRAM_XXX_STARTED', 'second')]
 
 
+@pytest.mark.parametrize(
+    ('line', 'speed'),
+    [
+        ('speedj([0.2, 0, 0, 0, 0, 0], 1, 0.1)', 0.2),
+        ('speedl([0.05, 0, 0, 0, 0, 0], 0.25, 0.1)', 0.05),
+    ],
+)
+def test_set_points_may_be_streamed_a_program_each(bench, line, speed):
+    # As clients do it, such as ur_modern_driver 125 times a second.
+    motion, speeds = bench.controller.motion, []
+    for _ in range(30):
+        bench.start(line)
+        bench.step(10)
+        speeds.append(motion.tcp_twist[0] if 'speedl' in line else motion.qd[0])
+    reached = [min(speed, 0.1 * speed * n) for n in range(1, 31)]
+    assert speeds == pytest.approx(reached, abs=0.06 * speed)
+
+
+def test_a_move_that_replaces_a_stream_begins_once_the_arm_stands(bench):
+    motion, goal = bench.controller.motion, (0.5, -1.57, 1.57, -1.57, -1.57, 0)
+    bench.start('speedj([0.5, 0, 0, 0, 0, 0], 2, 10)')
+    bench.wait(0.5)
+    bench.start(f'movej({list(goal)})')
+    bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
+    assert motion.q == pytest.approx(goal)
+    assert bench.log == []
+
+
 def test_a_program_that_ends_while_the_arm_moves_makes_it_brake(bench):
     q = bench.controller.config.q
     bench.start('movej([1.5, -1.57, 1.57, -1.57, -1.57, 0], a=2, v=1, r=0.05)\nhalt')

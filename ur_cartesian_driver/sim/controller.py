@@ -176,6 +176,11 @@ class Controller:
         return self.scale == 0.0 or not self.motion.moving
 
     @property
+    def on_path(self) -> bool:
+        """Whether a move is running or slows down, and not a stream of set-points."""
+        return self.motion.on_path
+
+    @property
     def speed_scaling(self) -> float:
         """What slows the motion beside the speed slider, 0..1; 0 at rest and in pauses."""
         if self.at_rest or not self.speed_slider:

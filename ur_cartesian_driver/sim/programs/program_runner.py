@@ -72,6 +72,10 @@ class ProgramArm(Protocol):
     def at_rest(self) -> bool:
         """Whether the arm stands, at the end of a motion or paused on its path."""
 
+    @property
+    def on_path(self) -> bool:
+        """Whether a move is running or slows down, and not a stream of set-points."""
+
     def brake(self) -> None:
         """Stop as hard as the controller does on its own."""
 
@@ -221,8 +225,14 @@ class ProgramRunner:
         self._start_waiting()
 
     def _start_waiting(self) -> None:
-        """Start the program that waits, once the arm stands."""
-        if self._queued is None or self.state is not RuntimeState.STOPPED:
+        """
+        Start the program that waits, once the arm stands.
+
+        One that comes during or after a stream of set-points starts at once and may go on with
+        it: clients stream `speedj` and `speedl`, each a program of its own.
+        """
+        taken_over = self.state is RuntimeState.STOPPING and not self._arm.on_path
+        if self._queued is None or not (taken_over or self.state is RuntimeState.STOPPED):
             return
         self.name, self._interpreter = self._queued
         self._queued = None
