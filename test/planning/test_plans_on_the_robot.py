@@ -9,7 +9,7 @@ micrometres.
 
 from dataclasses import replace
 from itertools import pairwise
-from math import cos, sin
+from math import cos, radians, sin
 import re
 
 import numpy as np
@@ -88,6 +88,39 @@ def test_no_point_is_skipped_where_blends_take_a_whole_segment(robot, kind, leng
         assert ran.failure == ''
         radius = made.segments[0].primitive.blend_radius
         assert radii[0] - 10e-6 < radius <= radii[0]
+
+
+def turning(robot, degrees, radius, velocity):
+    """Return a goal of two lines at an angle, by PROCESS with a blend between them."""
+    home = robot.place(HOME, TOOL).actual_tcp_pose
+    x, y, z = home.position
+    side, on = 0.05 * sin(radians(degrees)), 0.05 * cos(radians(degrees))
+    places = ((x, y + 0.05, z), (x + side, y + 0.05 + on, z))
+    segment = Segment(type=TYPE.PROCESS, velocity=velocity)
+    return Goal(
+        waypoints=tuple(Waypoint(pose=replace(home, position=place)) for place in places),
+        segments=(replace(segment, blend_radius=radius), segment),
+    )
+
+
+@pytest.mark.parametrize(('degrees', 'radius'), [(90, 0.003), (150, 0.01), (10, 0.003)])
+def test_process_keeps_the_acceleration_of_the_tool_in_its_arcs(robot, degrees, radius):
+    made, ran = run(robot, turning(robot, degrees, radius, 0.25))
+    assert ran.failure == ''
+    speeds = np.diff([pose.position for pose in ran.poses], axis=0) / robot.controller.cycle
+    accelerations = np.linalg.norm(np.diff(speeds, axis=0), axis=1) / robot.controller.cycle
+    assert accelerations.max() < 10.0 * 1.05
+    is_slowed = any(
+        'slowed from 0.25' in line and 'an arc with a radius of' in line for line in made.report
+    )
+    assert is_slowed == (degrees > 10)
+    assert is_slowed == (accelerations.max() > 6.0)
+
+
+@pytest.mark.parametrize('degrees', [179.9, 180.0])
+def test_process_does_not_turn_back_in_a_blend(robot, degrees):
+    with pytest.raises(InvalidGoal, match=r'^segments\[0\]\.blend_radius is 8 mm, but the path'):
+        run(robot, turning(robot, degrees, 0.008, 0.05))
 
 
 @pytest.mark.parametrize('radius', [1e-4, 5e-4, 7.9e-4, 8.1e-4, 2e-3])

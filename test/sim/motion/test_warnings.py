@@ -13,6 +13,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ErrorCodeMessage,
     ReportLevel,
 )
+from ur_cartesian_driver.sim.motion.motion_values import MotionError
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 CYCLE = 0.002
@@ -41,6 +42,14 @@ def test_movep_that_is_too_fast_for_its_blend_is_said_to_be_and_keeps_its_fillet
     r.run(r.generator.movep(shifted(waypoint, x=0.15), a=5.0, v=0.8))
     assert codes(r) == [(196, 0)]
     assert 'blend' in r.generator.warnings[0].text
+
+
+def test_movep_does_not_turn_back_in_a_blend(recorder, shifted):
+    r = recorder()
+    waypoint = shifted(r.generator.T_base_tcp, y=0.15)
+    r.run(r.generator.movep(waypoint, v=0.1, r=0.01))
+    with pytest.raises(MotionError, match='cannot maintain speed when reversing direction'):
+        r.generator.movep(shifted(waypoint, y=-0.1), v=0.1)
 
 
 @pytest.mark.parametrize('slider', [1.0, 0.3])

@@ -30,6 +30,8 @@ from ur_cartesian_driver.planning.geometry.curves import (
 
 # Segments that continue straight on, or straight back, have no circle between them [rad].
 _STRAIGHT = 1e-6
+# Where they go straight back it is no smaller than this [m].
+_LEAST_RADIUS = 1e-9
 
 
 def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
@@ -75,17 +77,24 @@ class BlendShapes:
 
     def lengths(self) -> Floats:
         """Return the lengths [m], of parabolas and circles between straight lines."""
-        arc = fillet_radius(self.radius, self.opening) * (np.pi - self.opening)
+        arc = self._circle_radii() * (np.pi - self.opening)
         there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
             self.end - self.middle, axis=1
         )
-        has_circle = (self.opening > _STRAIGHT) & (self.opening < np.pi - _STRAIGHT)
         lengths: Floats = np.where(
             self.fillet,
-            np.where(has_circle, arc, there_and_back),
+            np.where(self.opening < np.pi - _STRAIGHT, arc, there_and_back),
             _parabola_lengths(self.start, self.middle, self.end),
         )
         return lengths
+
+    def arc_radii(self) -> Floats:
+        """Return the radii of the circles [m], inf of other blends."""
+        radii: Floats = np.where(self.fillet, self._circle_radii(), np.inf)
+        return radii
+
+    def _circle_radii(self) -> Floats:
+        return np.maximum(fillet_radius(self.radius, self.opening), _LEAST_RADIUS)
 
     def samples(self) -> NDArray[np.intp]:
         """Return the numbers of chords that follow them closely enough."""

@@ -167,6 +167,8 @@ class BlendedPath:
         #: Of the blend after each curve: distance from the waypoint at which both curves are left
         #: [m], 0 = none; whether it is a circular arc (``movep``), between lines.
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        #: Radius of that arc [m], inf = it is none.
+        self.arc_radius = np.full(n, np.inf)
         #: Its length [m] and turn of the tool [rad], and the number of chords that follow it.
         self.blend_length, self.blend_angle = np.zeros((2, n))
         self.blend_samples = np.zeros(n, dtype=np.intp)
@@ -211,6 +213,7 @@ class BlendedPath:
         )
         self.blend_length[row], self.blend_angle[row] = shapes.lengths(), shapes.turns
         self.blend_samples[row] = shapes.samples()
+        self.arc_radius[row] = shapes.arc_radii()
         self.blend_tolerance[row] = shapes.tolerances()
         for k in row[~(curves.is_line[row] & curves.is_line[after])].tolist():
             s = np.linspace(0.0, 1.0, _CHORDS + 1)

@@ -10,7 +10,7 @@ derived so that the time is met. How moves and blends follow each other is that 
 
 from __future__ import annotations
 
-from math import ceil, inf
+from math import ceil, inf, pi
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.goal_table import rows_where
 from ur_cartesian_driver.motion.plan import PlannedSegment
 from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.planning.geometry.blended_path import Integers
+from ur_cartesian_driver.planning.geometry.blended_path import Flags, Integers
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
@@ -235,14 +235,40 @@ class SegmentTimings:
         self._slowed_at[row] = worst
 
     def _tool_times(self) -> Floats:
-        """Return the times of the samples in blends at the speed limit of the tool."""
-        return self._samples.tool_distance / (self._options.max_tool_speed or inf)
+        """Return the times of the samples in blends at the speed limits of the tool."""
+        times: Floats = self._samples.tool_distance / np.minimum(
+            self._options.max_tool_speed or inf, self._arc_speeds()
+        )
+        return times
+
+    def _arc_speeds(self) -> Floats:
+        """Return how fast the tool may pass the samples, where its blend is an arc [m/s]."""
+        radius = self._geometries.path.arc_radius[self._samples.index - self._geometries.begin]
+        speeds: Floats = np.sqrt(self._options.max_linear_acceleration * radius)
+        return speeds
+
+    def _is_slowed_in_arc(self) -> Flags:
+        """Tell which segments are slowed because of the arc of a blend (n,)."""
+        samples, arc_speeds = self._samples, self._arc_speeds()
+        times = np.maximum(
+            samples.joint_time, samples.tool_distance / (self._options.max_tool_speed or inf)
+        )
+        in_arc = np.append(samples.tool_distance > times * arc_speeds, False)  # -1 = none
+        slowed: Flags = in_arc[self._slowed_at]
+        return slowed
 
     def _limit_name(self, row: int) -> str:
         """Return what slows a segment."""
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
             return self.requests.limits.name(row)
+        if self._is_slowed_in_arc()[row]:
+            point = samples.index[sample]
+            radius = self._geometries.path.arc_radius[point - self._geometries.begin]
+            return (
+                f'max_linear_acceleration = {self._options.max_linear_acceleration:g} m/s^2 (in '
+                f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)'
+            )
         if samples.joint_time[sample] < self._tool_times()[sample]:
             return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
         joint = int(samples.joint[sample])
@@ -295,9 +321,16 @@ class SegmentTimings:
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
         needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
-        travel = self.velocities * self._model.control_cycle
+        # A blend that is too small for the speed asked for is refused, not passed slowly.
+        asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
+        travel = asked * self._model.control_cycle
         too_small = needs_a_cycle & (path.radius < travel)
-        refused = takes_too_long | too_slow | too_small
+        # Half a turn takes less than a control cycle, even as slow as its acceleration may be.
+        turns_back = path.has_blend_after & (
+            path.arc_radius
+            < self._options.max_linear_acceleration * (self._model.control_cycle / pi) ** 2
+        )
+        refused = takes_too_long | too_slow | too_small | turns_back
         remarks = requests.remarks
         for row in rows_where(is_late | takes_longer | is_slower | is_ahead | refused):
             point = self._geometries.begin + row
@@ -328,13 +361,21 @@ class SegmentTimings:
                     f'max_segment_time = {self._options.max_segment_time:.0f} s',
                     'raise velocity or acceleration',
                 )
+            if turns_back[row]:
+                raise InvalidGoal(
+                    segment_field(point, 'blend_radius'),
+                    f'is {1e3 * path.radius[row]:g} mm, but the path turns back there: PROCESS '
+                    'would keep its speed around an arc with a radius of '
+                    f'{1e3 * path.arc_radius[row]:.2g} mm, and no robot reverses in motion',
+                    'set it to 0 to stop there, or add a point beside it',
+                )
             if too_slow[row]:
                 raise self._too_slow(row)
             if too_small[row]:
                 raise InvalidGoal(  # the robot would stop at the point (C171)
                     segment_field(point, 'blend_radius'),
                     f'is {1e3 * path.radius[row]:g} mm, less than the {1e3 * travel[row]:.3g} mm '
-                    f'that the robot moves in one control cycle at {self.velocities[row]:.3g} '
+                    f'that the robot moves in one control cycle at {asked[row]:.3g} '
                     f'{requests.limits.unit(row)}: it would stop at the point',
                     'enlarge it, move slower, or set it to 0 to stop there',
                 )

@@ -345,16 +345,19 @@ def make_blend(
     Blend two paths: joint lines in joint space, all others in the tool's space.
 
     :param circular: by an arc, where both are lines that meet at an angle.
+    :raises MotionError: it is to be an arc, and the second line leads straight back.
     """
     if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
         return JointBlendPath(before, tail, after, head)
-    if (
-        circular
-        and isinstance(before, LinearMovePath)
-        and isinstance(after, LinearMovePath)
-        and _STRAIGHT < fillet_angle(before, after) < pi - _STRAIGHT
-    ):
-        return FilletBlendPath(before, tail, after, head)
+    if circular and isinstance(before, LinearMovePath) and isinstance(after, LinearMovePath):
+        angle = fillet_angle(before, after)
+        if angle > pi - _STRAIGHT:
+            raise MotionError(
+                'MoveP cannot maintain speed when reversing direction. Adjust waypoint to make '
+                'robot able to blend.'
+            )
+        if angle > _STRAIGHT:
+            return FilletBlendPath(before, tail, after, head)
     return ToolBlendPath(before, tail, after, head)
 
 
