@@ -82,6 +82,14 @@ def test_a_way_back_over_the_same_line_is_followed_in_order():
     assert times[-1] == pytest.approx(2.0)
 
 
+def test_a_target_that_comes_to_a_turn_slowly_is_followed_into_it_though_the_way_back_is_nearer():
+    there, end, back = (0.4, 0.0, 0.2), (0.42, 0.0, 0.2), (0.4, 0.0, 0.200002)
+    tracker = PathTracker(path(there, end, back))
+    target = [(x, y, z + 1e-6) for x, y, z in along([there, end, there])]
+    for actual, found in zip(target, walk(tracker, target, step=4e-4), strict=True):
+        assert found == pytest.approx(actual, abs=1e-5)
+
+
 def test_the_program_s_own_count_keeps_the_tracker_from_running_ahead():
     there_and_back = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.4, 0.0, 0.2)]
     tracker = PathTracker(path(*there_and_back))

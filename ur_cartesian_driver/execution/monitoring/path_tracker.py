@@ -37,6 +37,11 @@ from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
 METRES_PER_RADIAN = 0.1
 #: How much farther the target may have come than its speed explains [m].
 SEARCH_MARGIN = 0.005
+#: The same in planned time [s]: where set-points turn back, a servo that lags turns before them.
+SEARCH_TIME = 0.1
+#: The target is no farther than its speed explains unless the path is nearer there by this [m]:
+#: where a path turns back, both ways are as near.
+CLEARLY_NEARER = 0.0005
 #: How far the tool may be ahead of or behind its target: this long at the speed of the target
 #: [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
@@ -107,9 +112,9 @@ class PathTracker:
     Poses are compared as points of seven dimensions, position and twice the quaternion times
     :data:`METRES_PER_RADIAN`: for small angles the distance of two quaternions is half the angle,
     so a straight line in these coordinates is a straight line of the tool with a steady turn. The
-    search reaches as far as the target can have come since the last packet, and, where the robot
-    program reports it, not beyond the point that it is running; so a path that crosses itself or
-    turns back is followed in the right order.
+    search reaches as far as the target can have come since the last packet, farther only where the
+    path is clearly nearer, and, where the robot program reports it, not beyond the point that it
+    is running; so a path that crosses itself or turns back is followed in the right order.
     """
 
     def __init__(self, path: ReferencePath) -> None:
@@ -158,31 +163,52 @@ class PathTracker:
         :returns: the new position, never behind the one before.
         """
         first, end = self._window(max_advance, running)
-        self.residual = inf
+        explained = self._arc_length() + max_advance
+        near = min(max(bisect_right(self._arc, explained + SAME_PLACE), first + 1), end)
+        found = self._search(target, first, near, explained)
+        if found[1] > CLEARLY_NEARER:
+            farther = self._search(target, first, end)
+            if farther[1] < found[1] - CLEARLY_NEARER:
+                found = farther
+        self.path_position, self.residual = found
+        return self.path_position
+
+    def _search(
+        self, target: Pose, first: int, end: int, limit: float = inf
+    ) -> tuple[PathPosition, float]:
+        """
+        Return the nearest position on some edges, and its distance.
+
+        :param limit: the length of the path at which the search ends [m].
+        """
+        nearest = self.path_position, inf
         while end > first:
             # The target does not pass a place where the plan waits before it has been there.
             wait = self._next_wait(first, end)
-            found = self._nearest_in(target, first, wait)
-            if found is not None and found[1] <= self.residual:
-                self.path_position, self.residual = found
-            if wait >= end or self._arc[wait] - self._arc_length() > SAME_PLACE:
+            found = self._nearest_in(target, first, wait, limit)
+            if found is not None and found[1] <= nearest[1]:
+                nearest = found
+            if wait >= end or self._arc[wait] - self._arc_length(nearest[0]) > SAME_PLACE:
                 break
             here = self._edge(wait).start
             distance = here.distance_to(target) + METRES_PER_RADIAN * here.angle_to(target)
             if distance <= SAME_PLACE:
-                if self.path_position.row < wait:
-                    self.path_position = PathPosition(wait, 0.0)
-                self.residual = distance
-                break
+                is_there = nearest[0].row >= wait
+                return nearest[0] if is_there else PathPosition(wait, 0.0), distance
             first = wait + 1
-        return self.path_position
+        return nearest
 
-    def _nearest_in(self, target: Pose, first: int, end: int) -> tuple[PathPosition, float] | None:
+    def _nearest_in(
+        self, target: Pose, first: int, end: int, limit: float
+    ) -> tuple[PathPosition, float] | None:
         """Return the position on some edges, and its distance; None where there are none."""
         if end <= first:
             return None
         lowest = self.path_position.fraction if first == self.path_position.row else 0.0
-        return self._nearest(self._coordinates(target, first), first, end, lowest)
+        highest = self._fraction(end - 1, limit)
+        if first == end - 1:
+            highest = max(highest, lowest)
+        return self._nearest(self._coordinates(target, first), first, end, lowest, highest)
 
     def _next_wait(self, first: int, end: int) -> int:
         """Return the first row from which on the plan waits, or the end of the rows."""
@@ -343,15 +369,19 @@ class PathTracker:
             if passed > self.path_position.row:
                 self.path_position = PathPosition(passed, 0.0)
         first = self.path_position.row
-        end = bisect_left(self._arc, self._arc_length() + max_advance + SEARCH_MARGIN)
+        end = max(
+            bisect_left(self._arc, self._arc_length() + max_advance + SEARCH_MARGIN),
+            bisect_left(self._time, self.time() + SEARCH_TIME),
+        )
         end = min(max(end, first + 1), self.last_row)
         if running is not None:
             end = min(end, bisect_right(points, running[0]) - 1)
         return first, max(end, first)
 
-    def _arc_length(self) -> float:
-        """Return the length of the path up to the present position [m]."""
-        row, fraction = self.path_position.row, self.path_position.fraction
+    def _arc_length(self, path_position: PathPosition | None = None) -> float:
+        """Return the length of the path up to a position, by default the present one [m]."""
+        at = self.path_position if path_position is None else path_position
+        row, fraction = at.row, at.fraction
         here = self._arc[row]
         return here + fraction * (self._arc[row + 1] - here) if fraction else here
 

@@ -31,7 +31,7 @@ from ur_cartesian_driver.planning.geometry.curves import (
 # Segments that continue straight on, or straight back, have no circle between them [rad].
 _STRAIGHT = 1e-6
 # Where they go straight back it is no smaller than this [m].
-_LEAST_RADIUS = 1e-9
+_MIN_RADIUS = 1e-9
 
 
 def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
@@ -94,7 +94,7 @@ class BlendShapes:
         return radii
 
     def _circle_radii(self) -> Floats:
-        return np.maximum(fillet_radius(self.radius, self.opening), _LEAST_RADIUS)
+        return np.maximum(fillet_radius(self.radius, self.opening), _MIN_RADIUS)
 
     def samples(self) -> NDArray[np.intp]:
         """Return the numbers of chords that follow them closely enough."""
