@@ -166,6 +166,25 @@ def test_what_happens_at_points_happens_there_and_the_last_of_before_again():
     assert [(each.waypoint, each.function) for each in left.script_calls] == [(3, 'f3')]
 
 
+@pytest.mark.parametrize('overlap', [0.0, 0.005])
+@pytest.mark.parametrize(
+    ('place', 'called_again'),
+    [((0, 1.0), [0, 2]), ((1, 0.01), [2]), ((2, 0.999), [2]), ((2, 1.0), [2]), ((3, 0.01), [])],
+)
+@pytest.mark.parametrize('following', [LINEAR, JOINT])
+def test_a_function_is_called_again_where_the_goal_was_stopped_at_its_point_and_nowhere_else(
+    overlap, place, called_again, following
+):
+    calls = tuple(ScriptCall(waypoint=k, function=f'f{k}') for k in (0, 2))
+    line = Segment(velocity=0.1)
+    of = goal(line, line, line, Segment(type=following), script_calls=calls)
+    left = resume(of, at(*place), overlap=overlap).goal
+    assert [call.function for call in left.script_calls] == [f'f{k}' for k in called_again]
+    for call in left.script_calls:
+        point = int(call.function[1:])
+        assert left.waypoints[call.waypoint].pose == of.waypoints[point].pose
+
+
 def test_an_amount_follows_the_speed_from_the_place_on():
     stretches = ((0, 1), (1, 3), (2, 3))
     amounts = tuple(

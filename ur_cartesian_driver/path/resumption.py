@@ -120,11 +120,13 @@ class _Resumption:
         self.timed, self.mode = is_timed(table), resolve_execution_mode(table)
         self.spline = _Spline(table, start) if self.mode.traits.is_spline else None
         self.stopped = place.point + place.fraction
-        self.begin = self._begin(self.stopped, overlap)
+        self.begin = self._begin(place, overlap)
 
     def resumed(self) -> ResumedGoal:
         """Return what is left."""
         n, k = len(self.points), min(floor(self.begin), len(self.points) - 1)
+        if k == self.begin == self.stopped > 0.0:
+            k -= 1  # it rests at a point, and not on its way to the next one
         u = self.begin - k
         if self._is_new_start(k):
             points, segments = list(self.points[k:]), list(self.segments[k:])
@@ -135,7 +137,8 @@ class _Resumption:
             if self.spline is not None:
                 return self._resumed_spline(points)
             times = self._times(k, u, approach=len(points))
-            if self._length(k) * (1.0 - u) > _NOTHING or self._length(k) <= _NOTHING:
+            is_turn = self._length(k) <= _NOTHING and u < 1.0
+            if self._length(k) * (1.0 - u) > _NOTHING or is_turn:
                 points.append(self.points[k])
                 segments.append(self._cut(k, u))
             else:  # it is there: the next segment follows
@@ -157,7 +160,7 @@ class _Resumption:
             waypoints=tuple(points),
             segments=tuple(segments) if self.goal.segments or self.spline is None else (),
             io_commands=self._outputs(places),
-            script_calls=tuple(self._ahead(self.goal.script_calls, places)),
+            script_calls=self._calls(places),
             input_waits=self._events(self.goal.input_waits, places),
             payload_changes=self._events(self.goal.payload_changes, places),
             proportional_outputs=self._stretches(self.goal.proportional_outputs, places),
@@ -177,12 +180,11 @@ class _Resumption:
         """Tell whether a segment is done from wherever the arm is."""
         return k == 0 or self.segments[k].type in _JOINT_MOTIONS
 
-    def _begin(self, stopped: float, overlap: float) -> float:
+    def _begin(self, place: PathPlace, overlap: float) -> float:
         """Return the place at which the path is taken up again."""
-        k = min(floor(stopped), len(self.points) - 1)
+        k, u, left = place.point, place.fraction, overlap
         if self._is_new_start(k):
             return float(k)
-        left, u = overlap, stopped - k
         while (length := self._length(k)) * u < left:
             left -= length * u
             if self._is_new_start(k - 1):
@@ -361,6 +363,20 @@ class _Resumption:
             replace(each, waypoint=first) for each in passed if each.waypoint == last
         ]
         return tuple(again + left)
+
+    def _calls(self, places: Sequence[float]) -> tuple[ScriptCall, ...]:
+        """Return the calls of the points that the arm had not left when the goal was stopped."""
+        first = self._start_index(places)
+        return tuple(
+            replace(
+                call,
+                waypoint=first
+                if self._is_passed(call.waypoint)
+                else _index(places, call.waypoint),
+            )
+            for call in self.goal.script_calls
+            if call.waypoint + 1.0 >= self.stopped - _NO_FRACTION
+        )
 
     def _ahead(self, events: Sequence[_Event], places: Sequence[float]) -> list[_Event]:
         """Return what happens at the points that are left."""
