@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.goal_table import goal_table
 from ur_cartesian_driver.motion.pose import Pose
 
@@ -45,6 +45,12 @@ def test_a_goal_of_numpy_numbers_and_arrays_equals_one_of_floats():
     assert {type(value) for value in plain.waypoints[0].pose.row()} == {float}
     assert type(plain.waypoints[0].time) is float
     assert type(plain.segments[0].type) is SegmentType
+
+
+def test_the_arrays_of_a_posture_are_its_tuples():
+    posture = Posture(names=of_user(np.array(['elbow_joint'])), values=of_user(np.array([1.5])))
+    table = goal_table(replace(GOAL, waypoints=(replace(GOAL.waypoints[0], posture=posture),)))
+    assert table.waypoints.postures[0] == Posture(names=('elbow_joint',), values=(1.5,))
 
 
 def test_plain_values_are_not_copied():

@@ -63,6 +63,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
 
 
 GLUE = SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=3, value=0.0)
+VALVE = IOCommand(waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=3, value=1.0)
 BEAD = ProportionalOutput(first_waypoint=0, last_waypoint=2, pin=1, gain=2.0)
 BURNING = InputWait(waypoint=1, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=2.0)
 GRIND = Press(first_waypoint=0, last_waypoint=1, axes=('z',), forces=(20.0,))
@@ -144,6 +145,21 @@ REFUSALS = [
     ),
     (pressing(frame=7), InvalidGoal, 'presses[0].frame is 7; allowed are'),
     (pressing(contact=7), InvalidGoal, 'presses[0].contact is 7; allowed are'),
+    *(
+        (
+            with_fields(PLAIN, **{name: (with_fields(entry, **{field: 7}),)}),
+            InvalidGoal,
+            f'{name}[0].{field.replace("domain", "analog_domain")} is 7; allowed are',
+        )
+        for name, entry, field in (
+            ('input_waits', BURNING, 'input'),
+            ('io_commands', VALVE, 'output'),
+            ('io_commands', VALVE, 'domain'),
+            ('safe_outputs', GLUE, 'output'),
+            ('safe_outputs', GLUE, 'domain'),
+            ('proportional_outputs', BEAD, 'domain'),
+        )
+    ),
     # free axes
     (
         with_segment(PLAIN, 1, free_max=1.0),

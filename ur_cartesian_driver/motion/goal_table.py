@@ -376,10 +376,16 @@ def _are_plain_segments(segments: Sequence[Segment]) -> bool:
 def _are_plain_postures(postures: Iterable[Posture]) -> bool:
     """Tell whether postures need no conversion, as the empty ones that most are."""
     return all(
-        type(posture) is Posture and not posture.names and not posture.values
+        type(posture) is Posture
+        and _is_empty_tuple(posture.names)
+        and _is_empty_tuple(posture.values)
         for posture in postures
         if posture is not _DEFAULT_POSTURE
     )
+
+
+def _is_empty_tuple(values: object) -> bool:
+    return type(values) is tuple and not values  # an array may be neither true nor false
 
 
 _DEFAULT_POSTURE = Waypoint(pose=IDENTITY).posture

@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.output_names import (
 from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
+from ur_cartesian_driver.planning.request.number_rules import check_output_enums
 
 #: Maximum time after a point [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -53,6 +54,7 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
             f'{options.dialect.name} cannot switch outputs during a motion',
             'leave it empty, or let the driver send its own robot program',
         )
+    check_output_enums(goal)
     _check_safe_outputs(goal, options)
     check_proportional_outputs(goal, options)
     for i, command in enumerate(goal.io_commands):

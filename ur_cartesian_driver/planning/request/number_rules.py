@@ -19,13 +19,16 @@ from ur_cartesian_driver.motion.goal import (
     ContactEnd,
     DEFAULT_STALL_TIMEOUT,
     FreeAxis,
+    InputKind,
     OnPathTolerance,
+    OutputKind,
     PressFrame,
     SegmentType,
     StaleOffset,
     Waypoint,
 )
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.io_signals import AnalogDomain
 from ur_cartesian_driver.motion.pose import Quaternion
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -46,13 +49,15 @@ _Enum = TypeVar('_Enum', bound=IntEnum)
 
 
 def check_enums(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse a mode or a type that does not exist."""
+    """Refuse a mode, a type or an input that does not exist."""
     _check_enum('execution', goal.execution, ExecutionMode)
     _check_enum('on_path_tolerance', goal.on_path_tolerance, OnPathTolerance)
     _check_enum('path_offset.on_stale', goal.path_offset.on_stale, StaleOffset)
     for i, press in enumerate(goal.presses):
         _check_enum(f'presses[{i}].frame', press.frame, PressFrame)
         _check_enum(f'presses[{i}].contact', press.contact, ContactEnd)
+    for i, wait in enumerate(goal.input_waits):
+        _check_enum(f'input_waits[{i}].input', wait.input, InputKind)
     segments = goal.segments
     known = np.isin(segments.types, list(SegmentType)) & np.isin(segments.arc_modes, list(ArcMode))
     known &= np.isin(segments.free_axes, list(FreeAxis))
@@ -61,6 +66,16 @@ def check_enums(goal: GoalTable, options: PlanningOptions) -> None:
         _check_enum(segment_field(i, 'type'), segment.type, SegmentType)
         _check_enum(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
         _check_enum(segment_field(i, 'free_axis'), segment.free_axis, FreeAxis)
+
+
+def check_output_enums(goal: GoalTable) -> None:
+    """Refuse outputs, and what they carry, that do not exist."""
+    for name in ('io_commands', 'safe_outputs'):
+        for i, output in enumerate(getattr(goal, name)):
+            _check_enum(f'{name}[{i}].output', output.output, OutputKind)
+            _check_enum(f'{name}[{i}].analog_domain', output.domain, AnalogDomain)
+    for i, amount in enumerate(goal.proportional_outputs):
+        _check_enum(f'proportional_outputs[{i}].analog_domain', amount.domain, AnalogDomain)
 
 
 def check_frame_numbers(goal: GoalTable, options: PlanningOptions) -> None:
