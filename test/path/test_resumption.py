@@ -97,6 +97,15 @@ def test_nothing_is_taken_up_within_a_blend(stopped):
     assert begin.fraction <= 0.8
 
 
+def test_on_the_way_to_a_point_from_anywhere_it_is_reached_without_a_blend():
+    corner, turn = Segment(velocity=0.1, blend_radius=0.02), Segment(type=JOINT, blend_radius=0.02)
+    of = goal(corner, turn, corner, Segment())
+    for place, radii in ((at(0, 0.9), [0.0, 0.02]), (at(1, 0.9), [0.0, 0.02])):
+        assert [each.blend_radius for each in resume(of, place).goal.segments[:2]] == radii
+    steady = replace(of, min_speed_fraction=0.5)
+    assert resume(steady, at(0, 0.9)).goal.segments[0].blend_radius == 0.02
+
+
 @pytest.mark.parametrize('mode', ArcMode)
 def test_what_is_left_of_an_arc_is_of_the_same_circle(mode):
     via = Pose((0.1 - 0.1 * np.sqrt(0.5), 0.1 - 0.1 * np.sqrt(0.5), 0.0), FLAT)

@@ -473,7 +473,8 @@ def test_the_first_blend_must_fit_into_the_way_from_where_the_robot_stands(cell)
         waypoints=(cell.point(0.02), cell.point(0.02, 0.1)),
         segments=(Segment(blend_radius=0.03), Segment()),
     )
-    assert 'segment of 20.000 mm' in refusal(InvalidGoal, cell, goal)
+    text = refusal(InvalidGoal, cell, goal)
+    assert 'the blend takes 30 mm, but the arm is 20.000 mm from points[0]' in text
 
 
 # -- what is said ---------------------------------------------------------------------------------

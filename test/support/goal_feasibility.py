@@ -504,7 +504,7 @@ def _time(refused: Refused) -> str:
 
 RULES: tuple[tuple[str, str, Callable[[Refused], str]], ...] = (
     ('approach', 'max_approach_distance', _distance),
-    ('blends overlap', 'is too large: the blends', _blends_overlap),
+    ('blends overlap', 'is too large: the blend', _blends_overlap),
     ('blend within a cycle', 'in one control cycle', _blend_in_a_cycle),
     ('arc', 'defines no arc', _arc),
     ('turn of unknown speed', 'has not been measured', _turn_leads),

@@ -129,7 +129,7 @@ class _Resumption:
             k -= 1  # it rests at a point, and not on its way to the next one
         u = self.begin - k
         if self._is_new_start(k):
-            points, segments = list(self.points[k:]), list(self.segments[k:])
+            points, segments = list(self.points[k:]), self._from_anywhere(k)
             places: list[float] = []
             times = self._times(k, 0.0)
         else:
@@ -179,6 +179,14 @@ class _Resumption:
     def _is_new_start(self, k: int) -> bool:
         """Tell whether a segment is done from wherever the arm is."""
         return k == 0 or self.segments[k].type in _JOINT_MOTIONS
+
+    def _from_anywhere(self, k: int) -> list[Segment]:
+        """Return the segments from one on that begins where the arm is."""
+        first, *rest = self.segments[k:]
+        # The arm may be in the blend already. Without one the tool would not keep its speed.
+        if self.stopped > k and not self.goal.min_speed_fraction:
+            first = replace(first, blend_radius=0.0)
+        return [first, *rest]
 
     def _begin(self, place: PathPlace, overlap: float) -> float:
         """Return the place at which the path is taken up again."""

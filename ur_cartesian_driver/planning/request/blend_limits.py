@@ -39,6 +39,13 @@ def check_blends_fit(index: int, length: float, before: float, after: float) -> 
     """
     # Rounding must not refuse blends that touch.
     if before + after > length * (1.0 + 1e-9) + 1e-9:
+        if index == 0:
+            raise InvalidGoal(
+                segment_field(0, 'blend_radius'),
+                f'is too large: the blend takes {1e3 * after:g} mm, but the arm is '
+                f'{1e3 * length:.3f} mm from points[0]',
+                'reduce it, or begin farther away',
+            )
         raise InvalidGoal(
             segment_field(index if after > 0.0 else index - 1, 'blend_radius'),
             f'is too large: the blends at points[{index - 1}] and points[{index}] take '
