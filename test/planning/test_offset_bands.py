@@ -72,6 +72,13 @@ def test_the_offset_fades_out_before_the_end_and_before_a_corner(cell, mode):
     assert (np.diff(np.flatnonzero(band.is_open)) == 1).all()
 
 
+@pytest.mark.parametrize('velocity', [0.0325, 0.0451])
+def test_samples_close_together_near_a_corner_need_no_faster_joints(cell, velocity):
+    there = cell.point(x=0.019, y=0.022, z=-0.026), cell.point(x=-0.013, y=-0.012, z=-0.029)
+    segments = (Segment(velocity=velocity), Segment(velocity=2.0 * velocity))
+    assert band_of(cell, *there, segments=segments, mode=ExecutionMode.PRIMITIVES)
+
+
 def test_the_report_names_bounds_and_gaps(cell):
     made = plan(goal(cell.point(y=0.1, time=2.0)), cell.state, cell.arm, OPTIONS)
     (line,) = [line for line in made.report if line.startswith('path_offset')]

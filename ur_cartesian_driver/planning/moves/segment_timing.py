@@ -253,7 +253,7 @@ class SegmentTimings:
         times = np.maximum(
             samples.joint_time, samples.tool_distance / (self._options.max_tool_speed or inf)
         )
-        in_arc = np.append(samples.tool_distance > times * arc_speeds, False)  # -1 = none
+        in_arc = np.append(samples.tool_distance / arc_speeds > times, False)  # -1 = none
         slowed: Flags = in_arc[self._slowed_at]
         return slowed
 

@@ -247,8 +247,7 @@ class OffsetBandCheck:
         path, band = self.reference, self.band
         self._check_tool_speeds()
         q, qd = self.q, self.qd
-        rows = np.clip(np.rint(path.time / band.step).astype(np.intp), 0, len(band.axes) - 1)
-        axes = band.axes[rows]
+        axes = np.array([band.axes_at(time) for time in path.time.tolist()])
         joint_speeds = np.abs(qd) + self._joint_speeds_of_offsets(q, axes)
         sides = ((-limit, limit) if limit else (0.0,) for limit in band.limits)
         warnings: list[str] = []
@@ -352,8 +351,9 @@ class OffsetBandCheck:
     def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
         times = self.reference.time
         steps = np.maximum(np.diff(times), 1e-6)[:, None]
-        # Beside its path the arm may have to turn faster.
-        extra = np.abs(np.diff(there - q, axis=0) / steps)
+        # Beside its path the arm may have to turn faster; where that turns too fast it is on it.
+        is_open = np.array([self.band.opens(time) for time in times[1:].tolist()])
+        extra = np.abs(np.diff(there - q, axis=0) / steps) * is_open[:, None]
         speeds = joint_speeds.copy()
         speeds[1:] += extra
         limits = np.array(self.kinematics.arm.model.max_joint_speed)
