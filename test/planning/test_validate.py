@@ -943,7 +943,7 @@ def test_optimized_moves_need_a_software_that_knows_them(kind):
     ('options', 'text'),
     [
         ({'path_offset_known': False}, r"the robot's software is not known to have .* 5\.6"),
-        ({'dialect': DIALECTS['2.12']}, r'robot programs of wire dialect 2\.12 add no offsets'),
+        ({'dialect': DIALECTS['2.12']}, r'2\.12 add no offsets .*; let the driver send its own'),
     ],
 )
 def test_path_offsets_of_the_controller_need_a_software_and_a_program_that_have_them(

@@ -79,18 +79,18 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
 
     :raises NotAvailable: names the reason.
     """
-    if not options.path_offset_known:
-        raise NotAvailable(
-            'path_offset',
-            "is set, but the robot's software is not known to have path offsets of its own "
-            '(PolyScope 5 has them from 5.6 on)',
-            'set execution to SERVO',
-        )
     if not options.dialect.supports_stops:
         raise NotAvailable(
             'path_offset',
             f'is set, but robot programs of wire dialect {options.dialect.name} add no offsets '
             'to their motions',
+            'let the driver send its own robot program',
+        )
+    if not options.path_offset_known:
+        raise NotAvailable(
+            'path_offset',
+            "is set, but the robot's software is not known to have path offsets of its own "
+            '(PolyScope 5 has them from 5.6 on)',
             'set execution to SERVO',
         )
     if goal.presses:
