@@ -55,13 +55,15 @@ def put(cell, shape, offset, extent, **properties):
     contact.bodies = (*contact.bodies, body)
 
 
-def start(cell, press=DOWN, ways=((0.0, 0.02), (0.0, 0.08), (0.0, 0.1)), **fields):
+def start(
+    cell, press=DOWN, ways=((0.0, 0.02), (0.0, 0.08), (0.0, 0.1)), *, velocity=0.05, **fields
+):
     """Start a goal along y that presses from its first point to its second one."""
     state = cell.memory.read()
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     goal = Goal(
         waypoints=tuple(Waypoint(pose=Pose((x + dx, y + dy, z), turned)) for dx, dy in ways),
-        segments=(Segment(velocity=0.05, acceleration=0.5),) * len(ways),
+        segments=(Segment(velocity=velocity, acceleration=0.5),) * len(ways),
         presses=(press,),
         **{'path_tolerance': TIGHT, 'goal_tolerance': TIGHT} | fields,
     )
@@ -175,6 +177,20 @@ def test_the_goal_ends_where_the_tool_touches(axes):
         assert places[-1] == pytest.approx((0.0, 0.05, 0.0), abs=1e-3)
         assert np.abs(forces[-1]).max() < 3.0
         assert cell.robot.controller.contact.force_mode is None
+
+    run_cell(scenario)
+
+
+def test_a_tool_that_touches_fast_may_go_back_farther_than_max_plan_deviation():
+    async def scenario(cell):
+        put(cell, 'box', (0.0, 0.085, 0.0), (0.1, 0.05, 0.1))  # its face is at 60 mm
+        press = replace(DOWN, contact=ContactEnd.REQUIRED, axes=(), forces=())
+        tolerance = Tolerance(position=(0.001, 0.004, 0.001))
+        motion, _ = start(cell, press, velocity=0.12, path_tolerance=tolerance)
+        places, _ = await recorded(cell, motion)
+        assert motion.outcome.succeeded, motion.outcome.text
+        assert places[:, 1].max() - places[-1, 1] > 0.002
+        assert places[-1] == pytest.approx((0.0, 0.06, 0.0), abs=2e-3)
 
     run_cell(scenario)
 

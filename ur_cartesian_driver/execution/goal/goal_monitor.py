@@ -369,14 +369,26 @@ class GoalMonitor:
         press = self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 
+    def _gone_back(self, pose: Pose, planned: Pose) -> Pose:
+        """Return the planned pose of a tool that may have gone back to where it touched."""
+        press = self._press()
+        if press is None or not press.ends_at_contact:
+            return planned
+        behind = self._tracker.behind(pose)
+        return behind if behind.distance_to(pose) < planned.distance_to(pose) else planned
+
     def _plan_deviation(self, state: RobotState) -> Fault | None:
         """Return that the controller's target left the plan, or None."""
         if not self._has_begun or self._tracker.is_within(*self._clearly_allowed):
             return None
+        target, here = self._stiff(state.target_tcp_pose), self._tracker.pose()
+        planned = self._gone_back(target, here)
         for name, unit, value, limit in zip(
             ('max_plan_deviation', 'max_plan_deviation_angle'),
             ('m', 'rad'),
-            self._tracker.deviation(self._stiff(state.target_tcp_pose)),
+            self._tracker.deviation(target)
+            if planned is here
+            else (planned.distance_to(target), planned.angle_to(target)),
             self._max_plan_deviation,
             strict=True,
         ):
@@ -438,6 +450,7 @@ class GoalMonitor:
         if clause is None and (self._path_check or press):
             desired = self._desired(state)
             if press is not None:
+                desired = self._gone_back(self._tracked(state.actual_tcp_pose), desired)
                 clause = press.excess(desired, state, self._tracker.time())
                 state = press.stiff_state(desired, state)
             clause = clause or self._violation(self._path_check, desired, state)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
+    ContactEnd,
     DEFAULT_STALL_TIMEOUT,
     DEFAULT_YIELDS,
     OnPathTolerance,
@@ -260,6 +261,7 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
                 press.max_yield or DEFAULT_YIELDS[0],
                 press.max_yield_angle or DEFAULT_YIELDS[1],
             ),
+            ends_at_contact=press.contact != ContactEnd.NONE,
         )
 
 

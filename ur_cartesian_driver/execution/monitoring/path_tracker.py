@@ -252,6 +252,15 @@ class PathTracker:
         )
         return self.pose(path_position)
 
+    def behind(self, pose: Pose) -> Pose:
+        """Return the planned pose nearest to a pose, up to the target's position."""
+        row, fraction = self.path_position.row, self.path_position.fraction
+        if row == 0 and not fraction:
+            return self.pose()
+        end = row + 1 if fraction else row
+        found, _ = self._nearest(self._coordinates(pose, 0), 0, end, 0.0, fraction or 1.0)
+        return self.pose(found)
+
     def deviation(self, target: Pose) -> tuple[float, float]:
         """
         Return how far the controller's target is from the plan, [m] and [rad].

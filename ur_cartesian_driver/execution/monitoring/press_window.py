@@ -44,6 +44,8 @@ class PressWindow:
     q_base_task: Quaternion | None
     #: How far it may give way [m], [rad].
     max_yields: tuple[float, float]
+    #: Whether the tool goes back on its path, to where it touched, and the goal ends there.
+    ends_at_contact: bool = False
 
     def contains(self, time: float) -> bool:
         """Tell whether the tool may be off its path at a planned time [s]."""
