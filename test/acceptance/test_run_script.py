@@ -92,6 +92,18 @@ def test_a_primary_program_that_does_not_end_is_stopped():
     run_cell(scenario, allow_scripts=True)
 
 
+def test_a_primary_program_that_ours_replaces_has_not_been_run():
+    async def scenario(cell):
+        cell.loop.call_later(0.5, cell.resend)
+        answer = await run(cell, ENDLESS, timeout=60.0)
+        assert not answer.ok
+        assert answer.text.endswith('the robot program was sent again before it had ended.')
+        assert cell.is_ready()
+        assert (await run(cell, OUTPUT)).ok
+
+    run_cell(scenario, allow_scripts=True)
+
+
 @pytest.mark.parametrize(
     ('script', 'reason'),
     [

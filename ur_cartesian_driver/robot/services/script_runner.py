@@ -102,6 +102,8 @@ class ScriptRunner:
             link.send_primary(PrimaryCommand.STOP_PROGRAM, lambda: self._runs_script(link.robot))
             await wait_for_state(link, has_ended, STOP_TIMEOUT)
         error = link.event_log.robot_error(since=begin)
+        if has_begun and link.program.connected:
+            error = error or 'the robot program was sent again before it had ended'
         again = await self._send_program() if not link.program.connected else succeeded('')
         if not in_time:
             error = f'it took longer than {call.timeout:g} s and was stopped'
@@ -118,10 +120,14 @@ class ScriptRunner:
         return robot is not None and not (has_ended(robot) or self._link.program.connected)
 
     async def _ends_within(self, longest: float) -> bool:
-        """Return whether the program ends; none runs for a moment between ours and this one."""
+        """
+        Return whether the program ends, or ours takes its place.
+
+        None runs for a moment between ours and this one.
+        """
         end = asyncio.get_running_loop().time() + longest
         while (left := end - asyncio.get_running_loop().time()) > 0.0:
-            if await wait_for_state(self._link, has_ended, left):
+            if await wait_for_state(self._link, lambda robot: not self._runs_script(robot), left):
                 await asyncio.sleep(CHANGE_TIME)
                 if not self._runs_script(self._link.robot):
                     return True
