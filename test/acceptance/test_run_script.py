@@ -108,6 +108,8 @@ def test_a_primary_program_that_ours_replaces_has_not_been_run():
     ('script', 'reason'),
     [
         ('sec a():\n  fly()\nend\n', 'fly'),
+        ('sec a():\n  x = [1, 2][3]\nend\n', 'a secondary program failed: Runtime error (2:'),
+        ('sec a():\n  sleep(1)\nend\n', 'sleep takes time'),
         ('def a():\n  x = [1, 2][3]\nend\n', 'the robot program failed in line 2'),
         ('def a():\n  x = = 1\nend\n', 'The script was not sent: line 2: a value is missing'),
         ('set_tcp(p[0,0,0,0,0,0])\n', "line 1: a program begins with 'def' or 'sec'"),
@@ -118,6 +120,7 @@ def test_what_is_wrong_with_a_script_is_the_answer(script, reason):
         answer = await run(cell, script, within=5.0)
         assert not answer.ok
         assert reason in answer.text
+        assert not answer.text.endswith('..')
         assert cell.owner.status.state is ConnectionState.READY
 
     run_cell(scenario, allow_scripts=True)

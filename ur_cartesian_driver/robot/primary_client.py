@@ -36,6 +36,8 @@ REPORT_TIMEOUT = 5.0
 SILENCE_TIMEOUT = 1.5
 #: Error code of a request on a connection that is read-only.
 READ_ONLY_CODE = 210
+#: How the title of the message begins that a secondary program failed, which stops no other.
+SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
 #: A request that is older is not repeated [s]: whoever turns the key meanwhile starts nothing.
 REPEAT_TIMEOUT = 1.0
 
@@ -219,6 +221,8 @@ class PrimaryClient:
                     f'the robot program failed in line {message.line}, column '
                     f'{message.column}: {to_single_line(message.text)}'
                 )
+            case primary.KeyMessage(title=title) if title.startswith(SECONDARY_EXCEPTION):
+                self._listener.error(f'a secondary program failed: {to_single_line(message.text)}')
             case primary.TextMessage():
                 self._listener.text(to_single_line(message.text))
 

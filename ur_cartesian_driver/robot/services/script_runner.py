@@ -79,7 +79,7 @@ class ScriptRunner:
             return failed('The script was not sent: the primary interface is not connected.')
         await asyncio.sleep(REPORT_TIME)
         if error := self._link.event_log.robot_error(since=begin):
-            return failed(f'The script was sent, and {error}.')
+            return failed(f'The script was sent, and {error.rstrip(".")}.')
         return succeeded('The script was sent, and the robot reports no error.')
 
     async def _primary(self, call: RunScriptCall) -> ServiceAnswer:
@@ -109,7 +109,7 @@ class ScriptRunner:
             error = f'it took longer than {call.timeout:g} s and was stopped'
         after = '' if again.ok else f' The robot program does not run again: {again.text}'
         if error:
-            return failed(f'The script was sent, and {error}.{after}')
+            return failed(f'The script was sent, and {error.rstrip(".")}.{after}')
         if not has_run:
             return failed(f'The script was sent, but the robot did not begin it.{after}')
         if after:
