@@ -3,7 +3,7 @@
 """Result and status name the events that led to the end of a goal."""
 
 import pytest
-from robot_cell import REVERSE, run_cell, TRAJECTORY
+from robot_cell import PRIMARY, REVERSE, RobotCell, run_cell, TRAJECTORY
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -16,10 +16,18 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 
-def ended_by(fault, execution=ExecutionMode.PRIMITIVES, time=2.0, **settings):
-    """Run a goal that something ends halfway; return outcome and the last status."""
+def ended_by(
+    fault, execution=ExecutionMode.PRIMITIVES, time=2.0, before=RobotCell.is_ready, **settings
+):
+    """
+    Run a goal that something ends halfway; return outcome and the last status.
+
+    :param before: what happens half a second before the goal.
+    """
 
     async def scene(cell):
+        before(cell)
+        await cell.sleep(0.5)
         state = cell.memory.read()
         (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
         made = plan(
@@ -134,3 +142,13 @@ def test_an_arm_that_cannot_follow_its_set_points_is_named_as_the_cause():
         'the divergence thresholds allow' in line
         for line in whys(outcome)
     ), outcome
+
+
+def test_what_the_robot_reported_before_the_goal_is_no_cause_of_its_end():
+    def fail_beside(cell):
+        cell.loop.inject_data(PRIMARY, b'sec other():\n  x = [1][3]\nend\n')
+
+    outcome, _ = ended_by(cut_trajectory, before=fail_beside)
+    assert outcome.code is ErrorCode.PROGRAM_STOPPED
+    assert 'secondary program' not in outcome.text
+    assert any('secondary program failed' in line for line in whys(outcome))

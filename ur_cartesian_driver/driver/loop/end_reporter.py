@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from math import inf
 
 from ur_cartesian_driver.driver.ipc.channel import MotionEnded
 from ur_cartesian_driver.driver.loop.output_securer import OutputSecurer
@@ -28,6 +29,9 @@ CODES_WITH_CAUSE = frozenset(
 #: The end waits that long for it [s].
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 CAUSE_TIMEOUT = 0.05
+#: What the robot reported so long before a motion began may have led to its end [s]: a program
+#: fails some cycles before its sockets close.
+CAUSE_LEAD = 0.1
 
 
 class EndReporter:
@@ -41,6 +45,12 @@ class EndReporter:
         self._outputs = outputs
         #: An end that waits for its cause, or for its outputs.
         self._pending: MotionEnded | None = None
+        #: What the robot reported before is no cause of the end [s].
+        self._since = -inf
+
+    def begin(self) -> None:
+        """Take note that a motion begins."""
+        self._since = self._link.event_log.now - CAUSE_LEAD
 
     @property
     def is_pending(self) -> bool:
@@ -56,7 +66,9 @@ class EndReporter:
         ended = self._pending
         if ended is None:
             return
-        if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.event_log.robot_error():
+        if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.event_log.robot_error(
+            self._since
+        ):
             asyncio.get_running_loop().call_later(CAUSE_TIMEOUT, self.report_pending)
         else:
             self.report_pending()
@@ -73,7 +85,7 @@ class EndReporter:
             outcome = replace(outcome, text=f'{outcome.text} {failure}')
         if outcome.code in CODES_WITH_CAUSE:
             text = outcome.text
-            if error := self._link.event_log.robot_error():
+            if error := self._link.event_log.robot_error(self._since):
                 text = f'{text} {error[:1].upper()}{error[1:].rstrip(".")}.'
             causes = tuple(f'why: {line}' for line in self._link.event_log.event_chain())
             outcome = replace(outcome, text=text, report=(*outcome.report, *causes))

@@ -157,6 +157,7 @@ class MotionRunner:
         self._record(request, state)
         self._number, self._points, self._machine = request.motion, points, machine
         self._outputs.forget()
+        self._ends.begin()
         self._link.set_executing(True)
         self._execute(commands)
 
