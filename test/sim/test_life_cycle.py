@@ -135,6 +135,21 @@ def test_pause_brakes_on_the_path_and_play_goes_on(bench):
     assert start.inverse().apply(line.position)[:2] == pytest.approx((0, 0), abs=1e-9)
 
 
+def test_clients_see_a_program_resuming_before_its_speed_rises_from_zero(bench):
+    bench.start(LONG_LINE)
+    bench.wait(0.5)
+    bench.programs.pause()
+    bench.until(lambda: bench.programs.state is RuntimeState.PAUSED)
+    bench.programs.play()
+    seen = []
+    for _ in range(3):
+        bench.step()
+        seen.append((bench.programs.state, bench.controller.speed_scaling))
+    assert seen[0] == (RuntimeState.RESUMING, 0.0)
+    assert [state for state, _ in seen[1:]] == [RuntimeState.PLAYING] * 2
+    assert 0.0 < seen[1][1] < seen[2][1] < 0.1
+
+
 def test_the_statement_pause_pauses(bench):
     bench.start('textmsg("a")\npause\ntextmsg("b")')
     bench.until(lambda: bench.programs.state is RuntimeState.PAUSED)

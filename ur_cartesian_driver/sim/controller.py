@@ -59,6 +59,8 @@ SLIDER_TIME = 0.25
 PROTECTIVE_STOP_TIME = 0.1
 #: The same for a program that ends on its path: a recorded UR5e of URSim loses 6.25 per second.
 PROGRAM_STOP_TIME = 0.16
+#: States of a program in which its motion slows down to zero, or stays there.
+_HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING)
 #: How many cycles back programs can ask for joint positions.
 MAX_HISTORY = 100
 _MAX_POPUPS = 100
@@ -281,8 +283,8 @@ class Controller:
 
         :param was_at_rest: the arm stood before this cycle, so it needs no ramp.
         """
-        paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
-        target = 0.0 if paused or self._stopping_on_path else self.speed_slider
+        held = self.programs.state in _HELD_STATES or self._stopping_on_path
+        target = 0.0 if held else self.speed_slider
         if was_at_rest or self.scale == target:
             self.scale = target
             return

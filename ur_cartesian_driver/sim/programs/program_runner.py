@@ -127,6 +127,8 @@ class ProgramRunner:
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
         self.state = RuntimeState.STOPPED
+        #: The state at the end of the cycle before, which clients have read.
+        self._reported_state = self.state
         #: Name of the running program, or of the last one.
         self.name = ''
         #: Called when a program has ended or before another starts: sockets are closed here.
@@ -303,6 +305,7 @@ class ProgramRunner:
         for interpreter in self._secondaries:
             self._run_secondary(interpreter)
         self._secondaries.clear()
+        self._reported_state = self.state
 
     def _change_state(self) -> None:
         if self.state is RuntimeState.STOPPING and self._arm.at_rest:
@@ -311,7 +314,7 @@ class ProgramRunner:
             self._start_waiting()
         elif self.state is RuntimeState.PAUSING and self._arm.at_rest:
             self.state = RuntimeState.PAUSED
-        elif self.state is RuntimeState.RESUMING:
+        elif self.state is self._reported_state is RuntimeState.RESUMING:
             self.state = RuntimeState.PLAYING
 
     def _run(self, interpreter: ScriptInterpreter) -> None:
