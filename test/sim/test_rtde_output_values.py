@@ -8,10 +8,13 @@ import json
 from pathlib import Path
 
 import numpy as np
+from plain_clients import state_fields
 import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
+from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
+from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: All names with their types, from the manufacturer's client library.
@@ -131,6 +134,24 @@ def test_a_new_robot_has_inputs_in_volts_and_outputs_at_4_milliamperes(bench):
     # As in the state of a UR5e of URSim 5.8 that the manufacturer's library has recorded.
     assert read(bench, 'analog_io_types') == read(bench, 'tool_analog_input_types') == 0b11
     assert read(bench, 'standard_analog_output1') == 0.004
+
+
+@pytest.mark.parametrize(
+    'command', [lambda c: None, lambda c: c.power_on(), lambda c: c.release_brakes()]
+)
+def test_the_primary_interface_reports_the_joints_as_rtde_does(make_bench, command):
+    bench = make_bench(power='off', imperfections=Imperfections())
+    command(bench.controller)
+    bench.wait(2.0)
+    primary = state_fields(PrimaryStream(bench.controller).state()[5:])
+    for field, output in {
+        'q': 'actual_q',
+        'amperes': 'actual_current',
+        'volts': 'actual_joint_voltage',
+        'celsius': 'joint_temperatures',
+        'joint_modes': 'joint_mode',
+    }.items():
+        assert primary[field] == pytest.approx(read(bench, output)), field
 
 
 def test_what_programs_and_people_set_is_reported(bench):

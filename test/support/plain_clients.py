@@ -23,6 +23,25 @@ STATE, MESSAGE = 16, 20
 TEXT, SAFETY_MODE, ERROR, KEY, EXCEPTION = 0, 5, 6, 7, 10
 
 
+def state_fields(body: bytes) -> dict[str, Any]:
+    """Return fields of a robot state: of its sub-packages for modes and joints."""
+    start, fields = 0, dict[str, Any]()
+    while start < len(body):
+        size, kind = struct.unpack_from('>IB', body, start)
+        if kind == 0:
+            names = 'stamp real enabled power emergency protective running paused mode'
+            values = struct.unpack_from('>Q7?B', body, start + 5)
+            fields |= dict(zip(names.split(), values, strict=True))
+            fraction, scaling = struct.unpack_from('>dd', body, start + 22)
+            fields |= {'fraction': fraction, 'scaling': scaling}
+        elif kind == 1:
+            joints = [struct.unpack_from('>3d4fB', body, start + 5 + 41 * i) for i in range(6)]
+            names = 'q target_q qd amperes volts celsius motor_celsius joint_modes'
+            fields |= dict(zip(names.split(), map(list, zip(*joints, strict=True)), strict=True))
+        start += size
+    return fields
+
+
 class PlainPrimary:
     """The primary interface (30001) as pairs of a name and its fields."""
 
@@ -51,7 +70,7 @@ class PlainPrimary:
         size, kind = struct.unpack('>iB', self._exactly(5))
         body = self._exactly(size - 5)
         if kind == STATE:
-            return 'state', self._state(body)
+            return 'state', state_fields(body)
         stamp, _, message = struct.unpack_from('>QbB', body)
         rest = body[10:]
         if kind != MESSAGE:
@@ -68,22 +87,6 @@ class PlainPrimary:
         if message == TEXT:
             return 'text', {'stamp': stamp, 'text': rest.decode()}
         return 'other', {}
-
-    def _state(self, body: bytes) -> dict[str, Any]:
-        start, fields = 0, dict[str, Any]()
-        while start < len(body):
-            size, kind = struct.unpack_from('>IB', body, start)
-            if kind == 0:
-                names = 'stamp real enabled power emergency protective running paused mode'
-                values = struct.unpack_from('>Q7?B', body, start + 5)
-                fields |= dict(zip(names.split(), values, strict=True))
-                fraction, scaling = struct.unpack_from('>dd', body, start + 22)
-                fields |= {'fraction': fraction, 'scaling': scaling}
-            elif kind == 1:
-                joints = [struct.unpack_from('>3d', body, start + 5 + 41 * i) for i in range(6)]
-                fields |= {'q': [joint[0] for joint in joints]}
-            start += size
-        return fields
 
     def await_(self, wanted: str, **fields: object) -> dict[str, Any]:
         """Return the fields of the next frame of this kind that has these values."""

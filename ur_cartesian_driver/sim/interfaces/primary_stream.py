@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.robot_state import RobotStatus, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_message,
     encode_state,
@@ -29,6 +31,26 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     ToolModeInfo,
 )
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED, FIXED
+
+#: Fields of a sub-package -> RTDE outputs with the same meaning.
+JOINT_OUTPUTS: Mapping[str, str] = MappingProxyType(
+    {
+        'q_actual': 'actual_q',
+        'q_target': 'target_q',
+        'qd_actual': 'actual_qd',
+        'current': 'actual_current',
+        'voltage': 'actual_joint_voltage',
+        'temperature': 'joint_temperatures',
+        'mode': 'joint_mode',
+    }
+)
+MASTERBOARD_OUTPUTS: Mapping[str, str] = MappingProxyType(
+    {'robot_voltage_48v': 'actual_robot_voltage', 'robot_current': 'actual_robot_current'}
+)
+TOOL_OUTPUTS: Mapping[str, str] = MappingProxyType(
+    {'voltage_48v': 'actual_robot_voltage', 'temperature': 'tool_temperature', 'mode': 'tool_mode'}
+)
 
 #: Of the version message, as recorded on four robots (3.5 to 5.1).
 NO_TIMESTAMP = 2**64 - 1
@@ -119,16 +141,16 @@ def _mode(controller: Controller) -> RobotModeData:
     )
 
 
+def _outputs(controller: Controller, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return fields whose values are those of RTDE outputs, so that the interfaces agree."""
+    return {
+        field: COMPUTED[name](controller) if name in COMPUTED else FIXED[name]
+        for field, name in names.items()
+    }
+
+
 def _joints(controller: Controller) -> JointData:
-    mode = 253 if controller.power.mode is RobotMode.RUNNING else 239
-    return JointData(
-        q_actual=controller.actual.q,
-        q_target=controller.target.q,
-        qd_actual=controller.actual.qd,
-        voltage=(48.0,) * 6,
-        temperature=(25.0,) * 6,
-        mode=(mode,) * 6,
-    )
+    return JointData(**_outputs(controller, JOINT_OUTPUTS))
 
 
 def _cartesian(controller: Controller) -> CartesianInfo:
@@ -151,6 +173,7 @@ def _masterboard(controller: Controller) -> MasterboardData:
         analog_output=(io.analog_out[0], io.analog_out[1]),
         temperature=25.0,
         safety_mode=controller.safety.mode,
+        **_outputs(controller, MASTERBOARD_OUTPUTS),
     )
 
 
@@ -158,9 +181,8 @@ def _tool(controller: Controller) -> ToolData:
     io = controller.io
     return ToolData(
         analog_input=(io.tool_analog_in[0], io.tool_analog_in[1]),
-        voltage_48v=48.0,
         output_voltage=io.tool_voltage,
-        temperature=25.0,
+        **_outputs(controller, TOOL_OUTPUTS),
     )
 
 
