@@ -64,7 +64,7 @@ def test_statements_without_a_function_around(tmp_path):
     q = f'[0, {-pi / 2}, {pi / 2}, {-pi / 2}, {-pi / 2}, 0]'
     found = imported(tmp_path, f'movej({q})\nmovej({q[:-2]}1], t=2)\n')
     assert found.lines.tolist() == [1, 2]
-    assert found.goal.segments.velocities.tolist() == pytest.approx([1.05, 0.5])
+    assert found.goal.segments.velocities.tolist() == pytest.approx([pi / 3, 0.5])
     assert any('t = 2 s is taken as the mean speed' in r.why for r in found.remarks)
 
 

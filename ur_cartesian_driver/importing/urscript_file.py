@@ -36,6 +36,10 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 )
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose_of
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.motion.motion_generator import (
+    DEFAULT_JOINT_ACCELERATION,
+    DEFAULT_JOINT_SPEED,
+)
 from ur_cartesian_driver.urscript import (
     Builtin,
     CompileError,
@@ -222,7 +226,14 @@ class _Moves:
 
     # ---- moves ---------------------------------------------------------------------------------
 
-    def movej(self, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0) -> Any:
+    def movej(
+        self,
+        q: Value,
+        a: Value = DEFAULT_JOINT_ACCELERATION,
+        v: Value = DEFAULT_JOINT_SPEED,
+        t: Value = 0,
+        r: Value = 0,
+    ) -> Any:
         """Collect a joint motion."""
         yield from self._joints('movej', SegmentType.JOINT, q, a, v, t, r)
 

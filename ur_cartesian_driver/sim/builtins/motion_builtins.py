@@ -22,6 +22,10 @@ from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose
 from ur_cartesian_driver.sim.controller import MAX_HISTORY
 from ur_cartesian_driver.sim.motion import MotionGenerator, Move
 from ur_cartesian_driver.sim.motion.contact_motion import ForceMode
+from ur_cartesian_driver.sim.motion.motion_generator import (
+    DEFAULT_JOINT_ACCELERATION,
+    DEFAULT_JOINT_SPEED,
+)
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
@@ -61,7 +65,12 @@ class MotionBuiltins(BuiltinGroup):
         return pose_of(self._controller, value, name)
 
     def movej(
-        self, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0
+        self,
+        q: Value,
+        a: Value = DEFAULT_JOINT_ACCELERATION,
+        v: Value = DEFAULT_JOINT_SPEED,
+        t: Value = 0,
+        r: Value = 0,
     ) -> Steps:
         """Move straight in joint space; for a pose, to the solution nearest to the present one."""
         limits = _limits(a, v, t)

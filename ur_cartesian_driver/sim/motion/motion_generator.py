@@ -15,7 +15,7 @@ creeps up to the last solution and stops there with a fault.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import inf, radians
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import Pose
@@ -66,6 +66,9 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
 #: The first path of a program sets out slowly: for so long [s] its time runs at a rate that grows
 #: evenly from 0 to 1, which costs half of that. Recorded on UR3, UR3e and UR10e.
 START_TIME = 0.16
+#: What movej does without `a` and `v` [rad/s^2, rad/s]. Recorded on a UR3; the manual rounds them
+#: to 1.4 and 1.05.
+DEFAULT_JOINT_ACCELERATION, DEFAULT_JOINT_SPEED = radians(80.0), radians(60.0)
 
 
 class MotionGenerator:
@@ -172,7 +175,12 @@ class MotionGenerator:
     # -- path moves --------------------------------------------------------------------------
 
     def movej(
-        self, q: Vector6, a: float = 1.4, v: float = 1.05, t: float = 0.0, r: float = 0.0
+        self,
+        q: Vector6,
+        a: float = DEFAULT_JOINT_ACCELERATION,
+        v: float = DEFAULT_JOINT_SPEED,
+        t: float = 0.0,
+        r: float = 0.0,
     ) -> Move:
         """Move straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
