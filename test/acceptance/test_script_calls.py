@@ -107,7 +107,9 @@ def test_the_arm_stands_until_the_function_returns(run, start, headless, executi
         assert is_at(0)
         cell.robot.controller.io.digital_in.standard[1] = True
         await cell.until(lambda: not is_at(0), 0.2)
-        assert cell.robot.controller.io.analog_out[0] == pytest.approx(2.0)  # [V]
+        assert cell.robot.controller.io.analog_out[0] == pytest.approx(
+            0.0072
+        )  # [A], of 4 to 20 mA
         await cell.until(lambda: motion.outcome, 3.0)
         # The call is no delay of the motion: the tolerance of its time is less.
         assert motion.outcome.succeeded, motion.outcome.text

@@ -155,6 +155,20 @@ def test_speedl_moves_the_tool_straight_and_turns_it(recorder):
     assert np.abs(r.positions[:, 1:] - np.array(start.position)[1:]).max() < 1e-9
 
 
+@pytest.mark.parametrize(('turn', 'a_rot', 'leads'), [(0.05, 0.2, 0.5), (0.2, 0.1, 2.0)])
+def test_speedl_and_stopl_change_speed_and_turn_together(recorder, turn, a_rot, leads):
+    r = recorder()
+    target = (0.1, 0.0, 0.0, 0.0, 0.0, turn)
+    assert r.run(r.generator.speedl(target, 0.2, a_rot=a_rot)) == pytest.approx(
+        leads / CYCLE, abs=1
+    )
+    twists = np.array(r.twists)
+    assert twists[:, 5] == pytest.approx(twists[:, 0] * turn / 0.1, abs=1e-9)
+    r.run(r.generator.stopl(1.0))
+    twists = np.array(r.twists)
+    assert twists[:, 5] == pytest.approx(twists[:, 0] * turn / 0.1, abs=1e-9)
+
+
 @pytest.mark.parametrize(('lookahead', 'gain'), [(0.03, 2000.0), (0.1, 300.0), (0.06, 1000.0)])
 def test_servoj_lags_behind_a_ramp_by_its_lookahead(recorder, lookahead, gain):
     r = recorder()

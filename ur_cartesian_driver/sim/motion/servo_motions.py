@@ -21,10 +21,7 @@ from ur_cartesian_driver.motion.vectors import (
     add,
     add_scaled6,
     norm,
-    scale,
-    subtract,
     subtract6,
-    Vector3,
     Vector6,
     vector6,
 )
@@ -164,8 +161,10 @@ class JointStopMotion(_JointMotion):
 @dataclass(slots=True)
 class ToolSpeedMotion(_ToolMotion):
     """
-    speedl: the tool's speed changes at ``acceleration``, its rotation at ``acceleration_rot``.
+    speedl: the twist changes along a straight line, as recorded on a UR5e of URSim.
 
+    :param acceleration: the most for the tool's speed [m/s^2].
+    :param acceleration_rot: the most for its rotation [rad/s^2].
     :param duration: [s] after which the call returns; None = when the speed is reached.
     """
 
@@ -177,7 +176,7 @@ class ToolSpeedMotion(_ToolMotion):
     def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
         """Return set-point and state after ``h`` seconds."""
         twist = _approach_twist(
-            self.twist, self.target, self.acceleration * h, self.acceleration_rot * h
+            self.twist, self.target, self.acceleration, self.acceleration_rot, h
         )
         pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, self.elapsed + h)
@@ -198,9 +197,7 @@ class ToolStopMotion(_ToolMotion):
 
     def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
         """Return set-point and state after ``h`` seconds."""
-        twist = _approach_twist(
-            self.twist, STILL, self.acceleration * h, self.acceleration_rot * h
-        )
+        twist = _approach_twist(self.twist, STILL, self.acceleration, self.acceleration_rot, h)
         pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, 0.0)
 
@@ -222,17 +219,17 @@ def _speed_call_is_over(duration: float | None, elapsed: float, reached: bool) -
     return elapsed >= duration - _ROUNDING
 
 
-def _approach_twist(twist: Vector6, target: Vector6, step: float, step_rot: float) -> Vector6:
-    linear = _approach(twist[:3], target[:3], step)
-    angular = _approach(twist[3:], target[3:], step_rot)
-    return (*linear, *angular)
+def _approach_twist(
+    twist: Vector6, target: Vector6, acceleration: float, acceleration_rot: float, h: float
+) -> Vector6:
+    """
+    Return the twist ``h`` seconds nearer to the target, or the target.
 
-
-def _approach(now: Vector3, target: Vector3, step: float) -> Vector3:
-    """Return the vector a step nearer to the target, or the target."""
-    change = subtract(target, now)
-    size = norm(change)
-    return target if size <= step else add(now, scale(change, step / size))
+    It changes along a straight line, so translation and rotation arrive together.
+    """
+    change = subtract6(target, twist)
+    time = max(norm(change[:3]) / acceleration, norm(change[3:]) / acceleration_rot)
+    return target if time <= h else add_scaled6(twist, change, h / time)
 
 
 def _integrated_pose(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
