@@ -496,7 +496,7 @@ def way_of(snippet: str) -> np.ndarray:
         snippet = snippet.replace('127.0.0.1', robot.config.host).replace(
             'headless_mode=True',
             'headless_mode=True, reverse_port=0, script_sender_port=0, trajectory_port=0, '
-            'script_command_port=0, robot_receive_timeout=1.0, max_state_age=0.0',
+            'script_command_port=0, robot_receive_timeout=2.0, max_state_age=0.0',
         )
         places = [robot.state().T_base_tcp.position]
         with subprocess.Popen(

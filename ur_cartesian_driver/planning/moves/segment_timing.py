@@ -88,6 +88,12 @@ class SegmentTimings:
         """Begin with what is asked for, and change it until all limits are kept."""
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
+        # How long the samples take at the speed limit of the tool, and at that of an arc [s].
+        distance = blend_samples.tool_distance
+        self._tool_time = distance / (options.max_tool_speed or inf)
+        radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
+        self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
+        self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
         #: Where speeds and times come from, with remarks on what the limits changed.
         self.requests = requests = SpeedRequests(geometries, options, model, running)
         n = len(geometries)
@@ -221,7 +227,9 @@ class SegmentTimings:
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
         at_sample = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * samples.s, 0.0))
-        over = at_sample * np.maximum(samples.joint_time, self._tool_times())
+        over = at_sample * np.maximum(
+            np.maximum(samples.joint_time, self._tool_time), self._arc_time
+        )
         worst = np.flatnonzero(over > _WITHIN)
         if not len(worst):
             return
@@ -234,27 +242,9 @@ class SegmentTimings:
         np.minimum.at(speed, row[~on_wire], there[~on_wire] / over[~on_wire])
         self._slowed_at[row] = worst
 
-    def _tool_times(self) -> Floats:
-        """Return the times of the samples in blends at the speed limits of the tool."""
-        times: Floats = self._samples.tool_distance / np.minimum(
-            self._options.max_tool_speed or inf, self._arc_speeds()
-        )
-        return times
-
-    def _arc_speeds(self) -> Floats:
-        """Return how fast the tool may pass the samples, where its blend is an arc [m/s]."""
-        radius = self._geometries.path.arc_radius[self._samples.index - self._geometries.begin]
-        speeds: Floats = np.sqrt(self._options.max_linear_acceleration * radius)
-        return speeds
-
     def _is_slowed_in_arc(self) -> Flags:
         """Tell which segments are slowed because of the arc of a blend (n,)."""
-        samples, arc_speeds = self._samples, self._arc_speeds()
-        times = np.maximum(
-            samples.joint_time, samples.tool_distance / (self._options.max_tool_speed or inf)
-        )
-        in_arc = np.append(samples.tool_distance / arc_speeds > times, False)  # -1 = none
-        slowed: Flags = in_arc[self._slowed_at]
+        slowed: Flags = np.append(self._arc_leads, False)[self._slowed_at]  # -1 = none
         return slowed
 
     def _limit_name(self, row: int) -> str:
@@ -262,14 +252,14 @@ class SegmentTimings:
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
             return self.requests.limits.name(row)
-        if self._is_slowed_in_arc()[row]:
+        if self._arc_leads[sample]:
             point = samples.index[sample]
             radius = self._geometries.path.arc_radius[point - self._geometries.begin]
             return (
                 f'max_linear_acceleration = {self._options.max_linear_acceleration:g} m/s^2 (in '
                 f'the blend at point {point}, an arc with a radius of {1e3 * radius:.3g} mm)'
             )
-        if samples.joint_time[sample] < self._tool_times()[sample]:
+        if samples.joint_time[sample] < self._tool_time[sample]:
             return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
         joint = int(samples.joint[sample])
         return (
