@@ -234,7 +234,9 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         context,
     )
     goal.record_end()
-    if phase not in BEFORE and not row.cause[0].startswith(FOREIGN_MOTION):
+    # An arm that sets out after the last packet has moved unseen.
+    is_unseen = phase == 'arming' and outcome.code is ErrorCode.CONNECTION_LOST
+    if not (phase in BEFORE or is_unseen or row.cause[0].startswith(FOREIGN_MOTION)):
         goal.check_place(context)
     has_crashed = row.state_after is ConnectionState.DISCONNECTED and 'crash' in row.cause
     # A program may make outputs safe and end in the very moment in which its goal succeeds.
@@ -261,7 +263,8 @@ async def check_waiting_goal(cell, goal, row, phase, context):
     await cell.until(cell.at_rest, row.rest_within, context)
     await cell.sleep(WATCH_TIME)
     assert goal.motion.outcome is None, context
-    assert cell.at_rest(), context
+    # servoj may swing around its last set-point once more while the slider goes down.
+    await cell.until(cell.at_rest, CREEP_TIME, context)
     if cell.robot.controller.programs.state is RuntimeState.PAUSED:
         assert not goal.is_process_on(), context
         goal.may_end_in_pause = phase == 'settling'
