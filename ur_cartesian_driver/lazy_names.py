@@ -3,8 +3,9 @@
 """
 Names of a package that are imported when they are used.
 
-A module imports its packages, and with them what their ``__init__`` imports. So a command would
-wait for a simulator that it does not use, and the robot process for a planner.
+Importing a module runs the ``__init__`` of each package around it. If that imported all that the
+package offers, a command would wait for a simulator that it does not use, and the robot process
+for a planner.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]
     """
     Return the ``__getattr__`` of a package.
 
-    :param modules: by the name of a module, the names that the package offers from it, apart by
-        spaces.
+    :param modules: names that the package offers, separated by spaces, by the module that
+        defines them.
     """
     homes = {name: module for module, names in modules.items() for name in names.split()}
 

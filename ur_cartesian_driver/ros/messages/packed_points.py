@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Points and segments in flat arrays: from rows to a ``PackedPoints``.
+Points and segments in flat arrays: rows as a ``PackedPoints``, and goals with one.
 
 rclpy makes ten objects of each point of the plain form, and some 0.1 ms of work. A flat array is
 one object, and one copy.
