@@ -15,7 +15,7 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup hooks demo demo-two test lint format docs bench release-check clean
+.PHONY: help setup hooks demo demo-two test random lint format docs bench release-check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -40,6 +40,9 @@ demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its o
 
 test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
 	$(bin)/pytest --no-skips $(PYTEST_ARGS)
+
+random: $(stamp)  ## The random tests with all their cases (RANDOM_SEED=N draws others)
+	RANDOM_SHARE=1 $(bin)/pytest -m random -n 2 --timeout 3600
 
 lint: $(stamp)  ## Formatting, ruff, mypy, the rules for imports, spelling
 	$(bin)/ruff format --check

@@ -186,13 +186,15 @@ def test_files_of_other_programs(name, count, box):
     assert corners(np.array(found.goal.waypoints.poses)) == pytest.approx(box, abs=1.0)
 
 
-def test_a_recording_of_ur_rtde_is_exact():
+def test_a_recording_of_ur_rtde_is_exact(tmp_path):
     goal = import_file(FOREIGN / 'ur_rtde.csv').goal
     assert goal.waypoints[-1].pose.position == pytest.approx((-0.4619, -0.0833, 0.4879), abs=1e-6)
     assert goal.waypoints[-1].pose.angle_to(ARM.forward(HOME)) < 1e-5
     spaced = (FOREIGN / 'ur_rtde.csv').read_text().replace(',', ' ')  # as the client of UR has it
+    file = tmp_path / 'spaced.csv'
+    file.write_text(spaced)
     into = PathCollector()
-    collect_csv(spaced, ImportOptions(), into)
+    collect_csv(file, ImportOptions(), into)
     assert len(into) == 113
 
 

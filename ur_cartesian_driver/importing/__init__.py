@@ -9,15 +9,21 @@ all. What the goal has not is said, with the lines of the file: nothing is dropp
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 import os
 from pathlib import Path
 from typing import Any
 
 from ur_cartesian_driver.goal_files.garbage import uncollected
-from ur_cartesian_driver.importing.csv_file import collect_csv
-from ur_cartesian_driver.importing.dxf_file import collect_dxf
-from ur_cartesian_driver.importing.gcode_file import collect_gcode
+from ur_cartesian_driver.importing import (
+    csv_file,
+    recording_file,
+    ros_messages_file,
+    urscript_file,
+)
+from ur_cartesian_driver.importing.dxf import dxf_file
+from ur_cartesian_driver.importing.gcode import gcode_file
+from ur_cartesian_driver.importing.import_format import ImportFormat, Term, Treatment
 from ur_cartesian_driver.importing.import_options import (
     CodeOutput,
     ImportOptions,
@@ -27,41 +33,37 @@ from ur_cartesian_driver.importing.import_options import (
 )
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
-from ur_cartesian_driver.importing.recording_file import collect_recording
-from ur_cartesian_driver.importing.ros_messages_file import collect_message, collect_yaml
-from ur_cartesian_driver.importing.urscript_file import collect_urscript
 
 __all__ = [
     'FORMATS',
     'BrokenFile',
     'CodeOutput',
+    'ImportFormat',
     'ImportNote',
     'ImportOptions',
     'ImportedGoal',
+    'Term',
     'ToolOrientation',
+    'Treatment',
     'import_file',
     'import_message',
     'parse_code_output',
     'parse_length',
 ]
 
-_TEXTS: dict[str, Callable[[str, ImportOptions, PathCollector], None]] = {
-    'csv': collect_csv,
-    'gcode': collect_gcode,
-    'dxf': collect_dxf,
-    'ros': collect_yaml,
-    'urscript': collect_urscript,
+#: The formats by their names.
+FORMATS: Mapping[str, ImportFormat] = {
+    module.FORMAT.name: module.FORMAT
+    for module in (
+        csv_file,
+        gcode_file,
+        dxf_file,
+        ros_messages_file,
+        urscript_file,
+        recording_file,
+    )
 }
-_RECORDING = 'recording'
-FORMATS = (*_TEXTS, _RECORDING)
-_SUFFIXES = {
-    **dict.fromkeys(('.csv', '.tsv', '.txt'), 'csv'),
-    **dict.fromkeys(('.gcode', '.nc', '.ngc', '.gco', '.g', '.tap', '.cnc', '.mpf'), 'gcode'),
-    '.dxf': 'dxf',
-    **dict.fromkeys(('.yaml', '.yml'), 'ros'),
-    **dict.fromkeys(('.script', '.urscript'), 'urscript'),
-    **dict.fromkeys(('.npz', '.part'), _RECORDING),
-}
+_BY_SUFFIX = {suffix: form for form in FORMATS.values() for suffix in form.suffixes}
 
 
 @uncollected()
@@ -77,16 +79,15 @@ def import_file(
     :raises OSError: the file cannot be opened.
     """
     path, options = Path(file), options or ImportOptions()
-    form = form or _SUFFIXES.get(path.suffix.lower(), '')
-    into = PathCollector()
-    if form == _RECORDING:
-        collect_recording(path, into)
-    elif form in _TEXTS:
-        _TEXTS[form](_text(path), options, into)
-    else:
+    found = FORMATS.get(form) if form else _BY_SUFFIX.get(path.suffix.lower())
+    if found is None:
         raise BrokenFile(
-            0, f'{path.suffix!r} is no suffix of a known format; give one of {", ".join(FORMATS)}'
+            0,
+            f'{form or path.suffix!r} is no {"" if form else "suffix of a "}known format; '
+            f'give one of {", ".join(FORMATS)}',
         )
+    into = PathCollector()
+    found.collect(path, options, into)
     return goal_of_path(into.path(), options, into.remarks)
 
 
@@ -99,16 +100,5 @@ def import_message(message: Any, options: ImportOptions | None = None) -> Import
     :raises BrokenFile: it is none of these, or a value is none of its field.
     """
     into, options = PathCollector(), options or ImportOptions()
-    collect_message(message, options, into)
+    ros_messages_file.collect_message(message, options, into)
     return goal_of_path(into.path(), options, into.remarks)
-
-
-def _text(path: Path) -> str:
-    """Return the text of a file; old programs write Latin-1."""
-    data = path.read_bytes()
-    try:
-        return data.decode('utf-8-sig')
-    except UnicodeDecodeError:
-        if b'\0' in data:
-            raise BrokenFile(0, 'this is a binary file, and no text') from None
-        return data.decode('latin-1')

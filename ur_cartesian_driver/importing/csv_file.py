@@ -15,10 +15,13 @@ from collections.abc import Callable
 import csv
 from dataclasses import dataclass
 from math import isfinite, radians, sqrt
+from pathlib import Path
 import re
 
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
 from ur_cartesian_driver.motion.pose import Quaternion, quaternion_from_rotation_vector
 from ur_cartesian_driver.path.orientations import roll_pitch_yaw
 
@@ -90,13 +93,13 @@ class _Column:
     title: str
 
 
-def collect_csv(text: str, options: ImportOptions, into: PathCollector) -> None:
+def collect_csv(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Read a table.
 
     :raises BrokenFile: a line is none of a table.
     """
-    lines = text.splitlines()
+    lines = file_lines(file_text(file))
     first = next(
         (i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith('#')),
         None,
@@ -229,3 +232,12 @@ def _quaternion(row: dict[str, float]) -> Quaternion:
     if not abs(length - 1.0) < 0.01:
         raise ValueError(f'the quaternion has the length {length:.4g}, but must have 1')
     return (x / length, y / length, z / length, w / length)
+
+
+FORMAT = ImportFormat(
+    name='csv',
+    suffixes=('.csv', '.tsv', '.txt'),
+    terms=term_table(),
+    others='Every other column is left out, and said.',
+    collect=collect_csv,
+)

@@ -229,7 +229,9 @@ class PathCollector:
         :raises BrokenFile: that are no points.
         """
         if not self._positions:
-            raise BrokenFile(0, 'there is no point of a path in the file')
+            remarks = [remark.text() for remark in self.remarks.result()]
+            left_out = f'; left out: {"; ".join(remarks)}' if remarks else ''
+            raise BrokenFile(0, f'there is no point of a path in the file{left_out}')
         plain = np.array(self._plain, dtype=np.int64)
         return ImportedPath(
             positions=np.array(self._positions, dtype=np.float64),

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from os import PathLike
+from pathlib import Path
 
 import numpy as np
 
 from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
+from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Posture, SegmentType
@@ -21,7 +23,7 @@ _OUTPUTS = (
 )
 
 
-def collect_recording(file: str | PathLike[str], into: PathCollector) -> None:
+def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Read a recording; its lines are packets, counted from 1.
 
@@ -78,3 +80,12 @@ def _check_packets(recording: Recording) -> None:
     ):
         if wrong.any():
             raise BrokenFile(int(np.argmax(wrong)) + 1, why, 'packet')
+
+
+FORMAT = ImportFormat(
+    name='recording',
+    suffixes=('.npz', '.part'),
+    terms=term_table(),
+    others='Every other stream of a recording is left out.',
+    collect=collect_recording,
+)

@@ -11,13 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import file_text
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import Posture, SegmentType
 from ur_cartesian_driver.motion.pose_rows import compose_rows
@@ -91,12 +94,13 @@ class _Text(str):
         return made
 
 
-def collect_yaml(text: str, options: ImportOptions, into: PathCollector) -> None:
+def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Read the first message of what ``ros2 topic echo`` has printed.
 
     :raises BrokenFile: it is not YAML, or none of the messages.
     """
+    text = file_text(file)
     try:
         # The composer of libyaml crashes where a text nests very deeply; its parser does not.
         depth = 0
@@ -283,3 +287,12 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
             posture=Posture(names=JOINT_NAMES, values=tuple(q)),
             time=time if timed else None,
         )
+
+
+FORMAT = ImportFormat(
+    name='ros',
+    suffixes=('.yaml', '.yml'),
+    terms=term_table(),
+    others='Every other field is left out, and said.',
+    collect=collect_yaml,
+)

@@ -16,10 +16,13 @@ from dataclasses import replace
 import functools
 import inspect
 from math import pi
+from pathlib import Path
 from typing import Any
 
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import ArcMode, IOCommand, OutputKind, Posture, SegmentType
@@ -77,13 +80,13 @@ _SILENT_NAMES = {'inv', 'sync', 'time', 'tool_contact', 'end_freedrive_mode', 's
 _WAIT = {'interpreter_mode', 'popup', 'servoc', 'speedj', 'speedl', 'stopj', 'stopl'}
 
 
-def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> None:
+def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Run a program and collect its moves.
 
     :raises BrokenFile: it is no program, fails, or does not end.
     """
-    program = _with_one_round(_parsed(text), into)
+    program = _with_one_round(_parsed(file_text(file)), into)
     config = SimulatorConfig(model=options.arm.model.name)
     controller = Controller(config, controller_builtins)
     controller.motion.T_flange_tcp = options.T_flange_tcp
@@ -114,7 +117,7 @@ def collect_urscript(text: str, options: ImportOptions, into: PathCollector) -> 
 
 def _parsed(text: str) -> ScriptProgram:
     """Return a program, or statements without one around them, as offline programming writes."""
-    lines = text.splitlines()
+    lines = file_lines(text)
     begins = next((line.strip() for line in lines if line.strip() and line.strip()[0] != '#'), '')
     try:
         if begins.startswith(('def ', 'sec ')):
@@ -408,3 +411,12 @@ class _Moves:
                 'set_tcp', f'set the active TCP to p[{numbers}], to which the points belong'
             )
         motion.T_flange_tcp = offset if any(six(pose, 'pose')) else IDENTITY
+
+
+FORMAT = ImportFormat(
+    name='urscript',
+    suffixes=('.script', '.urscript'),
+    terms=term_table(),
+    others='Every other function is left out, and said.',
+    collect=collect_urscript,
+)

@@ -12,10 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import acos, atan2, ceil, cos, hypot, pi, sin
+from pathlib import Path
 import re
 
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.vectors import Vector3
 
@@ -80,13 +83,13 @@ _WORDS_LEFT_OUT = {
 _SAME_RADIUS, _SAME_RADIUS_SHARE = 2e-5, 0.005
 
 
-def collect_gcode(text: str, options: ImportOptions, into: PathCollector) -> None:
+def collect_gcode(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Read a program.
 
     :raises BrokenFile: a line is no G-code, or cannot be done.
     """
-    _Program(options, into, text).run()
+    _Program(options, into, file_text(file)).run()
 
 
 class _Program:
@@ -94,7 +97,7 @@ class _Program:
 
     def __init__(self, options: ImportOptions, into: PathCollector, text: str) -> None:
         self._options, self._into = options, into
-        self._lines = text.splitlines()
+        self._lines = file_lines(text)
         self._position: list[float] = [0.0, 0.0, 0.0]
         #: What G92 added to the coordinates.
         self._shift = [0.0, 0.0, 0.0]
@@ -379,3 +382,12 @@ class _Program:
             )
         height = max(0.0, square) ** 0.5 * (1.0 if radius > 0.0 else -1.0) * turn
         return (ax + bx) / 2.0 - height * dy / chord, (ay + by) / 2.0 + height * dx / chord
+
+
+FORMAT = ImportFormat(
+    name='gcode',
+    suffixes=('.gcode', '.nc', '.ngc', '.gco', '.g', '.tap', '.cnc', '.mpf'),
+    terms=term_table(),
+    others='Every other code refuses the file.',
+    collect=collect_gcode,
+)

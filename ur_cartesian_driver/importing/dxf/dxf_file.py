@@ -13,10 +13,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import io
 from math import atan, hypot, pi, tan
+from pathlib import Path
 from typing import Any
 
+from ur_cartesian_driver.importing.import_format import ImportFormat, term_table
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.vectors import Vector3, vector3
 
@@ -45,7 +48,7 @@ class _Contour:
         return _Contour(self.line, self.points[::-1], [None, *self.vias[:0:-1]])
 
 
-def collect_dxf(text: str, options: ImportOptions, into: PathCollector) -> None:
+def collect_dxf(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
     Read the model space of a drawing, in the order of the file.
 
@@ -59,6 +62,7 @@ def collect_dxf(text: str, options: ImportOptions, into: PathCollector) -> None:
             'DXF needs ezdxf, which is not installed; install it by pip install ezdxf, or the '
             "extra 'import' of this package"
         ) from None
+    text = file_text(file)
     places = _Places(text)
     try:
         drawing = ezdxf.read(io.StringIO(text))
@@ -109,7 +113,7 @@ class _Places:
     """Where the entities of a drawing begin."""
 
     def __init__(self, text: str) -> None:
-        lines = text.splitlines()
+        lines = file_lines(text)
         self.last_line = len(lines)
         self._by_handle: dict[str, int] = {}
         self._by_kind: dict[str, list[int]] = {}
@@ -258,3 +262,12 @@ def _bulge(
         yield from _bulge(mx, my, bx, by, half)
     else:
         yield (mx, my), (bx, by)
+
+
+FORMAT = ImportFormat(
+    name='dxf',
+    suffixes=('.dxf',),
+    terms=term_table(),
+    others='Every other entity is left out, and said.',
+    collect=collect_dxf,
+)

@@ -1,0 +1,64 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Write the tables of doc/importing.md from the tables that the readers use.
+
+A test compares page and tables; after a change of a table, run::
+
+    python scripts/make_import_tables.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ur_cartesian_driver.importing import FORMATS, ImportFormat, Term, Treatment
+
+PAGE = Path(__file__).resolve().parents[1] / 'doc' / 'importing.md'
+_BEGIN, _END = '<!-- terms of {} -->', '<!-- end of terms -->'
+
+
+def table(form: ImportFormat) -> str:
+    """Return the table of a format: a row for each topic, a column for each treatment."""
+    topics = dict.fromkeys(term.topic for term in form.terms.values())
+    rows = [
+        f'| | {" | ".join(each.value for each in Treatment)} |',
+        '| --- ' * (len(Treatment) + 1) + '|',
+        *(
+            f'| {topic} | {" | ".join(_cell(form, topic, each) or "-" for each in Treatment)} |'
+            for topic in topics
+        ),
+    ]
+    return '\n'.join([*rows, '', form.others, ''])
+
+
+def _cell(form: ImportFormat, topic: str, treatment: Treatment) -> str:
+    """Return the terms of a cell; those with the same reason stand together before it."""
+    by_reason: dict[str, list[Term]] = {}
+    for term in form.terms.values():
+        if term.topic == topic and term.treatment is treatment:
+            by_reason.setdefault(term.reason, []).append(term)
+    return '; '.join(
+        ', '.join(f'`{term.name}`' for term in terms) + (f': {reason}' if reason else '')
+        for reason, terms in by_reason.items()
+    ).replace('|', '\\|')
+
+
+def page_with_tables(page: str) -> str:
+    """Return the page with each table between its marks made anew."""
+    return ''.join(_parts(page))
+
+
+def _parts(page: str) -> Iterator[str]:
+    for form in FORMATS.values():
+        begin = _BEGIN.format(form.name)
+        before, found, rest = page.partition(begin)
+        assert found, f'{PAGE.name} has no {begin}'
+        _, end, page = rest.partition(_END)
+        yield f'{before}{begin}\n\n{table(form)}\n{end}'
+    yield page
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page_with_tables(PAGE.read_text(encoding='utf-8')), encoding='utf-8')

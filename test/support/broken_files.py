@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Files of a format that are cut, mixed, or changed in single characters, and what may follow."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import Random
+import re
+
+from ur_cartesian_driver.importing import BrokenFile, import_file, ImportedGoal, ImportOptions
+
+#: Characters that mean something in one format or another, and some that mean nothing in any.
+_CHARACTERS = '0123456789.,;:-+eE \t\n"\'()[]{}#%=/*_<>&|!xyzGMNFSTO\0\x0c\x85\u2028\u00b0\u20ac'
+#: What a sentence names the place by.
+_PLACE = re.compile(r'^(line|row|packet|point|entity) \w+: ')
+#: Faults of a whole file, which no line is to blame for.
+_WHOLE_FILE = re.compile(
+    r'^(there is no point|the file is empty|this is a binary file|the file begins as|'
+    r'the drawing does not say|it is nested too deeply)'
+)
+
+
+def broken(files: Sequence[str], random: Random) -> str:
+    """Return one of the files with one to four faults."""
+    text = random.choice(files)
+    for _ in range(random.randint(1, 4)):
+        if not text:
+            break
+        at = random.randrange(len(text))
+        fault = random.randrange(7)
+        if fault == 0:  # cut off
+            text = text[:at]
+        elif fault == 1:  # the middle is missing
+            text = text[:at] + text[min(len(text), at + random.randint(1, 80)) :]
+        elif fault == 2:  # the tail of another
+            other = random.choice(files)
+            text = text[:at] + other[random.randrange(len(other)) :]
+        elif fault == 3:  # a line at another place
+            lines = text.split('\n')
+            lines.insert(random.randrange(len(lines)), random.choice(lines))
+            text = '\n'.join(lines)
+        elif fault == 4:  # a line is missing
+            lines = text.split('\n')
+            del lines[random.randrange(len(lines))]
+            text = '\n'.join(lines)
+        else:  # a character
+            text = text[:at] + random.choice(_CHARACTERS) + text[at + random.randint(0, 1) :]
+    return text
+
+
+def broken_texts(files: Sequence[str], count: int, random: Random) -> Iterator[str]:
+    """Return so many broken files."""
+    return (broken(files, random) for _ in range(count))
+
+
+def goal_or_sentence(
+    file: Path, text: str, options: ImportOptions | None = None
+) -> ImportedGoal | str:
+    """
+    Import a text by the suffix of a file; assert that a refusal is one sentence with its place.
+
+    :returns: the goal, or the sentence.
+    """
+    file.write_text(text, encoding='utf-8', newline='', errors='surrogatepass')
+    try:
+        return import_file(file, options)
+    except BrokenFile as error:
+        sentence = str(error)
+    assert '\n' not in sentence, sentence
+    assert sentence.endswith('.'), sentence
+    assert not sentence.endswith('..'), sentence
+    assert 'Error' not in sentence, sentence
+    assert _PLACE.match(sentence) or _WHOLE_FILE.match(sentence), sentence
+    return sentence

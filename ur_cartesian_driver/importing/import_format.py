@@ -1,0 +1,86 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A format of files: its suffixes, its reader, and the treatment of each term that it knows.
+
+Reader and documentation use the same table of terms, so that what the page promises is what the
+reader does. Nothing is read as something else, and nothing is dropped in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from types import MappingProxyType
+
+from ur_cartesian_driver.importing.import_options import ImportOptions
+from ur_cartesian_driver.importing.imported_path import PathCollector
+
+
+class Treatment(Enum):
+    """What a reader does with a term of its format."""
+
+    #: It has its effect on the goal.
+    HONOURED = 'honoured'
+    #: It has none; a remark says so with its lines.
+    LEFT_OUT = 'left out, and said'
+    #: The file is refused, with the line.
+    REFUSED = 'refused'
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A word, code, entity, column or statement that the documents of a format name."""
+
+    #: As the format writes it.
+    name: str
+    #: The row of the documentation that it stands in.
+    topic: str
+    treatment: Treatment
+    #: Why it is left out, or what to do instead: the words of the remark or the refusal.
+    reason: str = ''
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportFormat:
+    """A format, as :func:`~ur_cartesian_driver.importing.import_file` finds it."""
+
+    name: str
+    #: In lower case, with their dot.
+    suffixes: tuple[str, ...]
+    terms: Mapping[str, Term]
+    #: The treatment of terms that the table does not have, a sentence for the documentation.
+    others: str
+    #: Reads a file; raises BrokenFile, ImportError where a package is missing, or OSError.
+    collect: Callable[[Path, ImportOptions, PathCollector], None]
+
+
+def term_table(*rows: Iterable[Term]) -> Mapping[str, Term]:
+    """
+    Return terms by their names.
+
+    :raises ValueError: a name stands twice.
+    """
+    table: dict[str, Term] = {}
+    for row in rows:
+        for term in row:
+            if table.setdefault(term.name, term) is not term:
+                raise ValueError(f'the term {term.name!r} stands twice')
+    return MappingProxyType(table)
+
+
+def honoured(topic: str, *names: str) -> tuple[Term, ...]:
+    """Return terms that have their effect."""
+    return tuple(Term(name, topic, Treatment.HONOURED) for name in names)
+
+
+def left_out(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
+    """Return terms that are left out and said."""
+    return tuple(Term(name, topic, Treatment.LEFT_OUT, reason) for name in names)
+
+
+def refused(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
+    """Return terms that refuse the file."""
+    return tuple(Term(name, topic, Treatment.REFUSED, reason) for name in names)

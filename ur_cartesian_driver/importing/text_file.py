@@ -1,0 +1,52 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The text of a file, whatever program wrote it, and its lines."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+import re
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile
+
+# str.splitlines() also splits at form feeds, 0x85 and U+2028, which end a line in none of the
+# formats: the numbers of all later lines would be wrong.
+_LINE_END = re.compile(r'\r\n|\n|\r')
+# The longer mark first: that of UTF-16 begins that of UTF-32.
+_MARKS = (
+    (codecs.BOM_UTF32_LE, 'utf-32'),
+    (codecs.BOM_UTF32_BE, 'utf-32'),
+    (codecs.BOM_UTF8, 'utf-8-sig'),
+    (codecs.BOM_UTF16_LE, 'utf-16'),
+    (codecs.BOM_UTF16_BE, 'utf-16'),
+)
+
+
+def file_text(path: Path) -> str:
+    """
+    Return the text of a file: UTF-8, UTF-16 or UTF-32 by its mark, or Windows-1252.
+
+    :raises BrokenFile: it is binary.
+    :raises OSError: it cannot be opened.
+    """
+    data = path.read_bytes()
+    encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError:
+        if encoding != 'utf-8':
+            raise BrokenFile(0, f'the file begins as {encoding}, and is not') from None
+        # Old programs write the code page of their Windows; Latin-1 has its five missing bytes.
+        text = data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
+    if '\0' in text:
+        raise BrokenFile(0, 'this is a binary file, and no text')
+    return text
+
+
+def file_lines(text: str) -> list[str]:
+    """Return the lines of a text without their ends: CR, LF, or both."""
+    lines = _LINE_END.split(text)
+    if not lines[-1]:
+        del lines[-1]
+    return lines
