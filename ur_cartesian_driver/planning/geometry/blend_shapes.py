@@ -140,11 +140,11 @@ def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s:
     # The center lies rho / sin(opening / 2) from the waypoint.
     depth = rho / np.maximum(np.sin(0.5 * opening), 1e-12) - rho * np.cos(phi)
     circle = waypoint + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
-    # Straight on, or straight back, there is no circle.
-    fraction = np.abs(1.0 - 2.0 * s)[:, None]
-    straight = waypoint + fraction * (np.where(s[:, None] < 0.5, start, end) - waypoint)
+    # Without a circle it is the chord: straight on through the waypoint. Straight back it is the
+    # point where the segment is left, as the circle shrinks there when the opening does.
+    chord = start + s[:, None] * (end - start)
     has_circle = (opening > _STRAIGHT) & (opening < np.pi - _STRAIGHT)
-    return np.where(has_circle[:, None], circle, straight)
+    return np.where(has_circle[:, None], circle, chord)
 
 
 def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
