@@ -14,8 +14,10 @@ import yaml
 from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
-#: A goal nests less; the fast loader crashes where a text nests a thousand times as much.
+#: A goal nests less. The loaders end by a crash, an exception or a sentence of their own where a
+#: text nests a thousand times as much.
 _MAX_DEPTH = 100
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # ten times as fast, where it was built
 
 
 class GoalFileError(ValueError):
@@ -34,16 +36,18 @@ def read_goal_file(source: str | os.PathLike[str]) -> Message:
     text = source if isinstance(source, str) else Path(source).read_text(encoding='utf-8')
     name = '' if isinstance(source, str) else f'{os.fspath(source)}: '
     try:
-        values = yaml.load(text, Loader=_loader(text))  # both of them are safe
+        _check_depth(text)
+        values = yaml.load(text, Loader=_Loader)  # both of them are safe
         return with_defaults({} if values is None else values)
     except yaml.YAMLError as error:
         raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
-    except RecursionError:
-        raise GoalFileError(f'{name}the goal is nested too deeply to be one.') from None
     except FieldError as error:
         raise GoalFileError(f'{name}{error}') from None
-    except ValueError as error:  # PyYAML's, of a date that does not exist, say
-        raise GoalFileError(f'{name}{str(error).rstrip(".")}.') from None
+    except ValueError as error:  # Python's, of a date that does not exist, say
+        raise GoalFileError(
+            f'{name}a value cannot be read: {str(error).rstrip(".")}; correct it, or put it in '
+            'quotes.'
+        ) from None
 
 
 @uncollected()
@@ -55,20 +59,21 @@ def goal_text(fields: Mapping[str, Any]) -> str:
     return text
 
 
-def _loader(text: str) -> Any:
-    """Return the faster loader, if there is one and the text does not nest so that it crashes."""
-    fast = getattr(yaml, 'CSafeLoader', None)
-    if fast is None:
-        return yaml.SafeLoader
+def _check_depth(text: str) -> None:
+    """
+    Refuse a text that nests more than any goal.
+
+    :raises FieldError: it does.
+    """
     depth = 0
-    for event in yaml.parse(text, Loader=fast):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > _MAX_DEPTH:
-                return yaml.SafeLoader
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-    return fast
+    for event in yaml.parse(text, Loader=_Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _MAX_DEPTH:
+            line = event.start_mark.line + 1 if event.start_mark else 0
+            raise FieldError(
+                f'line {line}: this is nested more than {_MAX_DEPTH} times, too deeply for a goal.'
+            )
 
 
 class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]  # chosen at run time
