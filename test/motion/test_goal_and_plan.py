@@ -113,8 +113,7 @@ def test_a_path_of_unequal_columns_is_refused(wrong):
 def test_a_path_cannot_be_written_to():
     path = reference()
     for array in (path.poses, path.point, path.time):
-        with pytest.raises(ValueError, match='read-only'):
-            array[0] = 1
+        assert not array.flags.writeable
 
 
 def test_the_duration_of_a_plan_is_the_sum_of_its_segments():

@@ -60,8 +60,7 @@ def test_columns_have_the_units_of_the_fields_and_nobody_changes_them():
     assert points.poses[2].tolist() == [0.3, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0]
     assert points.twists.shape == points.jerks.shape == (3, 6)
     for column in (points.times, points.poses, points.twists, points.jerks):
-        with pytest.raises(ValueError, match='read-only'):
-            column[0] = 1.0
+        assert not column.flags.writeable
 
 
 def test_a_table_stays_one_whatever_replaces_its_points():

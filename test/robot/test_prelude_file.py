@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every mistake in a script prelude is a sentence with its line; what is right is callable."""
 
+import errno
+import os
+
 import pytest
 
 from ur_cartesian_driver.driver import DriverConfig
@@ -79,7 +82,7 @@ def test_a_file_that_is_none_is_refused(tmp_path):
     (tmp_path / 'latin.script').write_bytes('# gr\u00f6\u00dfe'.encode('latin-1'))
     (tmp_path / 'long.script').write_text('#' * 200_001)
     for name, reason in (
-        ('nothing.script', 'No such file or directory.'),
+        ('nothing.script', f'{os.strerror(errno.ENOENT)}.'),
         ('latin.script', 'it is not text in UTF-8.'),
         ('long.script', 'has more than 200000 characters.'),
     ):
