@@ -44,12 +44,16 @@ test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
 random: $(stamp)  ## The random tests with all their cases (RANDOM_SEED=N draws others)
 	RANDOM_SHARE=1 $(bin)/pytest -m random -n 2 --timeout 3600
 
+# Lint reads the texts that git tracks, whatever else users have written into the checkout. Where
+# there is no git, the tools get no files and look for them.
+tracked = git grep --no-color -Ilz '' -- $(1) 2>/dev/null | xargs -0
+
 lint: $(stamp)  ## Formatting, ruff, mypy, the rules for imports, spelling
-	$(bin)/ruff format --check
-	$(bin)/ruff check
-	$(bin)/mypy
+	$(call tracked,'*.py') $(bin)/ruff format --check
+	$(call tracked,'*.py') $(bin)/ruff check
+	$(call tracked,'*.py' ':!*setup.py' ':!doc' ':!launch') $(bin)/mypy
 	$(bin)/lint-imports --no-logo
-	$(bin)/codespell
+	$(call tracked,) $(bin)/codespell
 
 format: $(stamp)  ## Sort the imports and format all Python
 	$(bin)/ruff check --select I --fix

@@ -14,6 +14,7 @@ import subprocess
 import sys
 
 import pytest
+from tracked_files import tracked_files
 
 import ur_cartesian_driver
 
@@ -30,7 +31,7 @@ NAMES_WITHOUT_A_CONCEPT = ('common', 'helper', 'manager', 'misc', 'util')
 
 def modules():
     """Return our own modules, by path in the package; an installed package also has others."""
-    paths = (path.relative_to(PACKAGE) for path in PACKAGE.rglob('*.py'))
+    paths = (path.relative_to(PACKAGE) for path in tracked_files(PACKAGE, '**/*.py'))
     return {
         path.as_posix(): PACKAGE / path
         for path in sorted(paths)
@@ -87,7 +88,7 @@ def test_a_module_says_its_licence_and_what_it_is_for(name):
 
 @pytest.mark.parametrize(
     'path',
-    sorted(Path(__file__).parent.rglob('*.py')),
+    tracked_files(Path(__file__).parent, '**/*.py'),
     ids=lambda p: p.relative_to(Path(__file__).parent).as_posix(),
 )
 def test_a_test_says_its_licence(path):

@@ -4,11 +4,15 @@
 
 from pathlib import Path
 import re
+import shutil
+import subprocess
+import sys
 
 import pytest
 import yaml
 
 CHECKOUT = Path(__file__).resolve().parents[1]
+MISSPELT = 'te' + 'h'
 HOOKS = CHECKOUT / '.pre-commit-config.yaml'
 pytestmark = pytest.mark.skipif(not HOOKS.is_file(), reason='only a checkout has these files')
 
@@ -24,10 +28,56 @@ def without_options(command):
     return ' '.join(word for word in command.split() if not word.startswith('--'))
 
 
+def lint_commands(folder):
+    """Return the commands of `make lint` in a folder, as make prints them."""
+    make = ['make', '-n', '-f', str(CHECKOUT / 'Makefile'), '-o', '.venv/.installed', 'lint']
+    printed = subprocess.run(make, cwd=folder, capture_output=True, text=True, check=True)
+    return [line for line in printed.stdout.splitlines() if '.venv/bin/' in line]
+
+
 def test_a_commit_is_checked_as_by_make_lint(hooks):
-    recipe = re.search(r'^lint:.*\n((?:\t.*\n)+)', (CHECKOUT / 'Makefile').read_text(), re.M)[1]
-    checks = {without_options(line.replace('$(bin)', '.venv/bin')) for line in recipe.splitlines()}
+    checks = {without_options(line.rpartition('xargs -0 ')[2]) for line in lint_commands(CHECKOUT)}
     assert checks == {without_options(hook['entry']) for hook in hooks if 'stages' not in hook}
+
+
+@pytest.fixture
+def project(tmp_path):
+    """Return a folder with our settings and a module without faults, that git tracks."""
+    for name in ('Makefile', 'pyproject.toml'):
+        shutil.copy2(CHECKOUT / name, tmp_path)
+    (tmp_path / 'examples').mkdir()
+    (tmp_path / 'examples' / 'good.py').write_text("NAME: str = 'good'\n")
+    subprocess.run(['git', 'init', '--quiet'], cwd=tmp_path, check=True)
+    subprocess.run(['git', 'add', '--all'], cwd=tmp_path, check=True)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_what_a_user_writes_into_a_checkout_is_not_linted(project):
+    """Each tool finds a fault of its own in the same files once git tracks them."""
+
+    def refusing_tools():
+        return [
+            command.split('.venv/bin/')[1].split()[0]
+            for command in lint_commands(project)
+            if 'lint-imports' not in command  # it reads the package only
+            and subprocess.run(
+                command.replace('.venv/bin', str(Path(sys.executable).parent)),
+                shell=True,
+                cwd=project,
+                capture_output=True,
+                check=False,
+            ).returncode
+        ]
+
+    for folder in ('', 'doc', 'examples', 'my goals'):
+        (project / folder).mkdir(exist_ok=True)
+        (project / folder / 'own.py').write_text(f'import os\nx: int  = "{MISSPELT}"\n')
+        (project / folder / 'demo.html').write_text(f'<p>{MISSPELT}</p>')
+        (project / folder / 'goal.yaml').write_text(f'{MISSPELT}: 1')
+    assert refusing_tools() == []
+    subprocess.run(['git', 'add', '--all'], cwd=project, check=True)
+    assert refusing_tools() == ['ruff', 'ruff', 'mypy', 'codespell']
 
 
 def test_the_hooks_run_the_tools_of_the_environment(hooks):

@@ -13,6 +13,7 @@ from time import monotonic, sleep
 from pages import assert_shows, CHECKOUT, console_examples
 import pytest
 from robot_cell import run_cell
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.cli.commands import code_text, goal_file
@@ -53,7 +54,7 @@ def examples(document, *names):
 def all_examples(*names):
     return [
         pytest.param(commands, shown, id=f'{document.stem}-{" ".join(commands[-1][1:])}')
-        for document in sorted(CHECKOUT.glob('doc/*.md'))
+        for document in tracked_files(CHECKOUT, 'doc/*.md')
         if document.stem not in FOLLOWED
         for commands, shown in examples(document, *names)
         if 'validate' in names or len(commands) == 2
@@ -168,4 +169,4 @@ def test_every_goal_for_an_error_is_in_the_document():
         for word in words
         if word.startswith('errors/')
     }
-    assert used == {f'errors/{path.stem}' for path in folder.glob('*.yaml')}
+    assert used == {f'errors/{path.stem}' for path in tracked_files(folder, '*.yaml')}

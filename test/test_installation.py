@@ -17,6 +17,7 @@ import sys
 from time import monotonic
 
 import pytest
+from tracked_files import tracked_files
 
 import ur_cartesian_driver
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -70,7 +71,7 @@ def test_every_module_can_be_imported():
 
 @pytest.mark.parametrize('kind', GENERATED)
 def test_every_interface_file_has_its_generated_class(kind):
-    files = {path.stem for path in (share_path() / kind).glob(f'*.{kind}')}
+    files = {path.stem for path in tracked_files(share_path() / kind, f'*.{kind}')}
     module = importlib.import_module(f'{NAME}.{kind}')
     classes = {
         name.split('_')[0]  # without _Goal, _Request and their like
@@ -81,7 +82,7 @@ def test_every_interface_file_has_its_generated_class(kind):
     assert classes == files
 
 
-@pytest.mark.parametrize('path', sorted((share_path() / 'config' / 'examples').glob('*.yaml')))
+@pytest.mark.parametrize('path', tracked_files(share_path() / 'config' / 'examples', '*.yaml'))
 def test_every_example_is_a_goal_of_the_installed_action(path):
     goal = load_goal(path)
     assert goal.trajectory.points or goal.packed.poses

@@ -8,6 +8,7 @@ import re
 from builtin_interfaces.msg import Duration
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -236,7 +237,7 @@ def interface_files():
     return sorted(
         path
         for kind in ('msg', 'srv', 'action')
-        for path in (share_path() / kind).glob(f'*.{kind}')
+        for path in tracked_files(share_path() / kind, f'*.{kind}')
     )
 
 

@@ -11,6 +11,7 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
+from tracked_files import tracked_files
 import yaml
 
 from ur_cartesian_driver.resources import share_path
@@ -87,7 +88,7 @@ def test_every_interface_file_is_built():
     there = {
         f'{path.parent.name}/{path.name}'
         for kind in ('msg', 'srv', 'action')
-        for path in (CHECKOUT / kind).iterdir()
+        for path in tracked_files(CHECKOUT / kind, '*')
     }
     assert named == there
 
@@ -192,7 +193,7 @@ def test_the_launch_file_of_the_simulator_knows_the_arguments_of_the_other():
 
 
 def test_a_launch_file_starts_an_executable_that_is_installed():
-    for path in sorted((share_path() / 'launch').glob('*.launch.py')):
+    for path in tracked_files(share_path() / 'launch', '*.launch.py'):
         started = [
             keyword.value
             for node in ast.walk(ast.parse(path.read_text()))
@@ -259,9 +260,9 @@ def test_the_licence_of_everything_foreign_is_named():
     named = set(re.findall(r'(?<![\w-])([A-Za-z][\w-]+)(?:\[\w+\])?[<>]=?\d', listed))
     named = {re.sub('(ros-jazzy|colcon)-.*', r'\1', name) for name in named}
     folders = {
-        str(folder.relative_to(CHECKOUT))
+        str(file.relative_to(CHECKOUT).parent)
         for kind in ('golden', 'files')
-        for folder in CHECKOUT.glob(f'test/*/{kind}')
+        for file in tracked_files(CHECKOUT, f'test/*/{kind}/*')
     }
     assert {'viser', 'airo-models', 'codespell', 'cmake'} < named
     assert 'test/importing/files' in folders

@@ -17,6 +17,7 @@ import threading
 from xml.etree import ElementTree
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -35,7 +36,7 @@ DOCUMENTS = [
     CHECKOUT / 'QUALITY_DECLARATION.md',
     CHECKOUT / 'SECURITY.md',
     CHECKOUT / 'benchmark' / 'README.md',
-    *sorted(CHECKOUT.glob('doc/**/*.md')),
+    *tracked_files(CHECKOUT, 'doc/**/*.md'),
 ]
 #: Programs that the documents start and that are no part of this package.
 FOREIGN = {
@@ -477,7 +478,7 @@ def test_every_example_is_listed():
     text = (CHECKOUT / 'doc' / 'goals.md').read_text(encoding='utf-8')
     listed = re.findall(r'\]\(\.\./config/examples/(\w+)\.yaml\)', text)
     assert sorted(listed) == sorted(
-        path.stem for path in (share_path() / 'config' / 'examples').glob('*.yaml')
+        path.stem for path in tracked_files(share_path() / 'config' / 'examples', '*.yaml')
     )
 
 
@@ -508,5 +509,5 @@ def test_diagrams_are_those_of_the_tables():
     make_diagrams = script('make_diagrams')
     directory = CHECKOUT / 'doc' / 'diagrams'
     assert {
-        path.name: path.read_text(encoding='utf-8') for path in directory.glob('*.md')
+        path.name: path.read_text(encoding='utf-8') for path in tracked_files(directory, '*.md')
     } == make_diagrams.pages(), 'run python scripts/make_diagrams.py'

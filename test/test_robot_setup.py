@@ -16,6 +16,7 @@ import re
 import socket
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.motion.state_age import explain_age
@@ -36,12 +37,12 @@ pytestmark = pytest.mark.skipif(not PAGES[0].is_file(), reason='only a checkout 
 
 #: Where the sentences come from; the simulator says what a robot says itself.
 SOURCES = [
-    *PACKAGE.glob('robot/**/*.py'),
-    *PACKAGE.glob('driver/**/*.py'),
+    *tracked_files(PACKAGE, 'robot/**/*.py'),
+    *tracked_files(PACKAGE, 'driver/**/*.py'),
     PACKAGE / 'motion' / 'state_age.py',
     PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
-    *PACKAGE.glob('sim/**/*.py'),
+    *tracked_files(PACKAGE, 'sim/**/*.py'),
 ]
 ROBOT_PROGRAM = PACKAGE / 'program' / 'driver.script'
 

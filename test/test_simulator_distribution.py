@@ -16,6 +16,7 @@ import tomllib
 import zipfile
 
 import pytest
+from tracked_files import tracked_files
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
@@ -80,7 +81,7 @@ def test_the_wheel_has_these_rooms_and_nothing_of_the_driver(wheel):
 def test_the_whole_simulator_is_in_the_wheel(wheel):
     sim = CHECKOUT / DRIVER / 'sim'
     assert {place for place in modules(wheel) if place.startswith('sim/')} == {
-        f'sim/{path.relative_to(sim).as_posix()}' for path in sim.rglob('*.py')
+        f'sim/{path.relative_to(sim).as_posix()}' for path in tracked_files(sim, '**/*.py')
     }
 
 

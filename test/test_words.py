@@ -14,6 +14,8 @@ from pathlib import Path
 import re
 import tokenize
 
+from tracked_files import tracked_files
+
 import ur_cartesian_driver
 
 TESTS = Path(__file__).resolve().parent
@@ -124,7 +126,7 @@ def own_modules(folder: Path) -> list[Path]:
     """Return the modules below a folder without what the build has made."""
     return [
         path
-        for path in sorted(folder.rglob('*.py'))
+        for path in tracked_files(folder, '**/*.py')
         if not (folder == PACKAGE and path.relative_to(folder).parts[0] in GENERATED)
     ]
 

@@ -22,6 +22,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from tracked_files import tracked_files
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState, DriverConfig
@@ -41,7 +42,7 @@ FOLDER = FilePath(__file__).resolve().parents[2] / 'examples'
 #: By set-points, which keep to the clock, or against a part. In virtual time they are carried out
 #: by test_path_offsets.py, test_presses.py, test_replaced_tails.py and test_stall.py.
 IN_VIRTUAL_TIME = {'tracked_seam', 'grind', 'replanned', 'stall'}
-EXAMPLES = sorted({path.stem for path in FOLDER.glob('*.py')} - {'on_robot'})
+EXAMPLES = sorted({path.stem for path in tracked_files(FOLDER, '*.py')} - {'on_robot'})
 NAMES = [name for name in EXAMPLES if name not in IN_VIRTUAL_TIME]
 
 pytestmark = [

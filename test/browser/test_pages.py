@@ -16,6 +16,7 @@ from example_goals import PRELUDE_ARGUMENTS
 from matplotlib.image import imread
 import numpy as np
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver import Driver, DriverConfig
@@ -23,7 +24,7 @@ from ur_cartesian_driver.path import Path as ArmPath
 
 pytest.importorskip('playwright.sync_api')
 
-EXAMPLES = sorted(Path(__file__).parents[2].glob('config/examples/*.yaml'))
+EXAMPLES = tracked_files(Path(__file__).parents[2], 'config/examples/*.yaml')
 #: Right of the text, above the time bar.
 SIZE = {'width': 640, 'height': 360}
 VIEW = {'x': 290, 'y': 0, 'width': 350, 'height': 310}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.goal_files import GoalFileError
 from ur_cartesian_driver.motion.errors import InvalidGoal
@@ -377,7 +378,7 @@ def test_a_mistake_is_a_sentence_where_it_is_made(make, sentence):
 
 @pytest.mark.parametrize(
     'path',
-    sorted((share_path() / 'config' / 'examples').glob('*.yaml')),
+    tracked_files(share_path() / 'config' / 'examples', '*.yaml'),
     ids=lambda path: path.stem,
 )
 def test_the_examples_are_paths(path, tmp_path):

@@ -5,6 +5,7 @@ from math import pi
 from example_goals import OPTIONS
 import numpy as np
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -18,7 +19,7 @@ from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 
 FOLDER = share_path() / 'config' / 'examples'
-NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))
+NAMES = [path.stem for path in tracked_files(FOLDER, '*.yaml')]
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 ELBOW = 2
 

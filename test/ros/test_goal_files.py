@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from rosidl_parser.definition import AbstractSequence, BasicType, NamespacedType
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files import (
@@ -23,7 +24,7 @@ from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.messages.goal_messages import goal_message
 
-EXAMPLES = sorted((share_path() / 'config' / 'examples').glob('**/*.yaml'))
+EXAMPLES = tracked_files(share_path() / 'config' / 'examples', '**/*.yaml')
 
 
 def schema_of(kind):

@@ -13,6 +13,7 @@ from pathlib import Path
 import re
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.robot_state import RuntimeState
@@ -22,8 +23,8 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 HERE = Path(__file__).parent
-PROGRAMS = sorted((HERE / 'programs').rglob('*.script'))
-CASES = sorted((HERE.parent / 'urscript' / 'cases').rglob('*.script'))
+PROGRAMS = tracked_files(HERE / 'programs', '**/*.script')
+CASES = tracked_files(HERE.parent / 'urscript' / 'cases', '**/*.script')
 EXPECT = re.compile(r'# expect(?P<error> error)?: (?P<text>.*)')
 GOLDEN = json.loads((HERE / 'golden' / 'pose_math.json').read_text())
 

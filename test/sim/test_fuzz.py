@@ -20,6 +20,7 @@ import struct
 from typing import Any
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -76,7 +77,7 @@ SCRIPTS = [
     b'def c():\n  movej([0.1, -1.5, 1.5, -1.5, -1.5, 0.0])\n  speedl([0, 0, 0.1, 0, 0, 0])\nend\n',
     *(
         text
-        for path in sorted((HERE / 'programs').glob('*.script'))
+        for path in tracked_files(HERE / 'programs', '*.script')
         if b'socket_' not in (text := path.read_bytes())
     ),
 ]

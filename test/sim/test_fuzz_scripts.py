@@ -18,13 +18,17 @@ import time
 from typing import Any
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.motion.robot_state import RuntimeState
 from ur_cartesian_driver.sim.builtins import controller_builtins
 
 HERE = Path(__file__).parent
 REAL = sorted(
-    [*(HERE / 'programs').glob('*.script'), *(HERE.parent / 'urscript').rglob('*.script')]
+    [
+        *tracked_files(HERE / 'programs', '*.script'),
+        *tracked_files(HERE.parent / 'urscript', '**/*.script'),
+    ]
 )
 WORDS = re.compile(r'"[^"\n]*"|[A-Za-z_]\w*|\d+\.?\d*|\s+|.')
 DIGITS_AND_QUOTE = tuple('0123456789"')

@@ -17,6 +17,7 @@ import re
 from typing import Any
 
 import pytest
+from tracked_files import tracked_files
 
 from ur_cartesian_driver.urscript import (
     CompileError,
@@ -28,7 +29,7 @@ from ur_cartesian_driver.urscript import (
     to_text,
 )
 
-CASES = sorted((Path(__file__).parent / 'cases').rglob('*.script'))
+CASES = tracked_files(Path(__file__).parent / 'cases', '**/*.script')
 EXPECT = re.compile(r'# expect(?P<kind>| error| compile error): ?(?P<text>.*)')
 FRAME = 0.002  # [s]
 MAX_FRAMES = 1000
