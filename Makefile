@@ -15,7 +15,7 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup hooks demo demo-two test random lint format docs bench release-check clean
+.PHONY: help setup lock hooks demo demo-two test random lint format docs bench release-check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -24,10 +24,13 @@ setup: $(stamp)  ## Make .venv with ROS 2, the tools and this package (PYTHON=py
 
 # Modules of the package count at once; only what is built or installed asks for another set-up.
 $(stamp): $(wildcard msg/* srv/* action/* cmake/*) CMakeLists.txt setup.py package.xml \
-		pyproject.toml requirements-dev.txt scripts/setup.sh
+		pyproject.toml requirements-dev.txt requirements.lock scripts/setup.sh
 	@echo 'Setting up $(VENV): about two minutes the first time.'
 	VENV=$(VENV) scripts/setup.sh
 	@touch $@
+
+lock: $(stamp)  ## Renew requirements.lock: the newest versions that the ranges admit
+	VENV=$(VENV) scripts/lock.sh --upgrade
 
 hooks: $(stamp)  ## Check formatting, types and the message at each git commit
 	$(bin)/pre-commit install

@@ -5,6 +5,7 @@
 #
 #   scripts/setup.sh
 #   PYTHON=python3.12 VENV=.venv312 scripts/setup.sh
+#   NEWEST=1 scripts/setup.sh     the newest versions, not those of requirements.lock
 set -euo pipefail
 cd "$(dirname "$0")/.."
 venv=${VENV:-.venv}
@@ -50,12 +51,13 @@ done
 sys.exit(not pathlib.Path(s.get_path("include"), "Python.h").exists())' ||
   fail "Python.h is missing: install the development files of $("$python" -V) (python3-dev)."
 
+lock=(--constraint requirements.lock)
+[ -z "${NEWEST:-}" ] || lock=(--upgrade)
 "$python" -m uv --version >/dev/null 2>&1 ||
-  "$python" -m pip install --quiet --disable-pip-version-check 'uv>=0.5,<1'
-install() { "$venv/bin/uv" pip install --quiet --python "$python" "$@"; }
+  "$python" -m pip install --quiet --disable-pip-version-check "${lock[@]}" 'uv>=0.5,<1'
+install() { "$venv/bin/uv" pip install --quiet --python "$python" "${lock[@]}" "$@"; }
 
 # One description of what the build needs: the same list serves `pip install .`.
-"$python" -c 'import tomllib
-print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' |
+"$python" scripts/build_requirements.py |
   install --requirement requirements-dev.txt --requirement -
 PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,export,import,plot,show,test]'

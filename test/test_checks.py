@@ -86,18 +86,36 @@ def test_the_hooks_run_the_tools_of_the_environment(hooks):
         assert hook['entry'].startswith('.venv/bin/'), hook['id']
 
 
-def test_the_public_ci_runs_what_has_to_pass_here():
-    workflow = yaml.safe_load((CHECKOUT / '.github' / 'workflows' / 'ci.yml').read_text())
-    (job,) = workflow['jobs'].values()
-    assert [step.get('run') or step['uses'].split('@')[0] for step in job['steps']] == [
-        'actions/checkout',
-        'actions/setup-python',
-        '.ci/run',
-    ]
+@pytest.fixture(scope='module')
+def jobs():
+    workflow = CHECKOUT / '.github' / 'workflows' / 'ci.yml'
+    return yaml.safe_load(workflow.read_text())['jobs']
+
+
+def test_the_public_ci_runs_what_has_to_pass_here(jobs):
+    for name, command in (('ci', '.ci/run'), ('newest', '.ci/run newest')):
+        assert [step.get('run') or step['uses'].split('@')[0] for step in jobs[name]['steps']] == [
+            'actions/checkout',
+            'actions/setup-python',
+            command,
+        ]
     assert (CHECKOUT / '.ci' / 'run').stat().st_mode & 0o100
 
 
-def test_the_public_ci_has_every_python_that_is_supported():
-    workflow = (CHECKOUT / '.github' / 'workflows' / 'ci.yml').read_text()
+def test_only_the_newest_versions_of_everything_may_fail(jobs):
+    assert [name for name, job in jobs.items() if job.get('continue-on-error')] == ['newest']
+
+
+def test_an_unknown_job_is_refused_with_those_that_there_are():
+    run = [str(CHECKOUT / '.ci' / 'run'), 'newst']
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        ".ci/run: there is no job 'newst'; name newest, or none for everything.\n"
+    )
+
+
+def test_the_public_ci_has_every_python_that_is_supported(jobs):
     classifiers = re.findall(r'Python :: (3\.\d+)', (CHECKOUT / 'setup.py').read_text())
-    assert sorted(re.findall(r'^ +(3\.\d+)$', workflow, re.M)) == sorted(classifiers)
+    _, python, _ = jobs['ci']['steps']
+    assert python['with']['python-version'].split() == classifiers

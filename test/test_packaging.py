@@ -5,11 +5,15 @@
 import ast
 import importlib
 from importlib import metadata, resources
+import itertools
 from pathlib import Path
 import re
 import sys
+import tomllib
 from xml.etree import ElementTree
 
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 import pytest
 from tracked_files import tracked_files
 import yaml
@@ -248,6 +252,47 @@ def test_rosdep_knows_the_keys_of_package_xml():
     known = [key for source in listed.values() for key in source['keys']]
     assert sorted(used) == sorted(known)
     assert all(re.fullmatch('[0-9a-f]{40}', source['commit']) for source in listed.values())
+
+
+def requirements():
+    """Return what the builds, the installations, their extras and the developers require."""
+    declared = {
+        ast.unparse(node.targets[0]): ast.literal_eval(node.value)
+        for node in ast.parse((CHECKOUT / 'setup.py').read_text()).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in ('REQUIRES', 'EXTRAS')
+    }
+    builds = (
+        tomllib.loads(path.read_text())['build-system']['requires']
+        for path in (CHECKOUT / 'pyproject.toml', CHECKOUT / 'simulator' / 'pyproject.toml')
+    )
+    texts = [
+        *declared['REQUIRES'],
+        *itertools.chain(*declared['EXTRAS'].values(), *builds),
+        *(CHECKOUT / 'requirements-dev.txt').read_text().splitlines(),
+    ]
+    return [Requirement(text) for text in texts if text and not text.startswith('#')]
+
+
+@needs_checkout
+def test_the_lock_has_a_version_in_the_range_of_every_requirement():
+    locked = {}
+    for line in (CHECKOUT / 'requirements.lock').read_text().splitlines():
+        if match := re.match(r'([\w.-]+)==(\S+)', line):
+            locked.setdefault(match[1], []).append(match[2])
+    outside = [
+        str(requirement)
+        for requirement in requirements()
+        if not (versions := locked.get(canonicalize_name(requirement.name)))
+        or not all(map(requirement.specifier.contains, versions))
+    ]
+    assert outside == [], 'run make lock'
+    assert len(requirements()) > 70
+
+
+@needs_checkout
+def test_the_lock_names_no_place_to_install_from():
+    text = (CHECKOUT / 'requirements.lock').read_text()
+    assert re.findall(r'.*(?:://|^-|\s--|@ ).*', text, re.MULTILINE) == []
 
 
 @needs_checkout

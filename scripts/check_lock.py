@@ -1,0 +1,45 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Refuse an environment that has what requirements.lock does not name, or another version of it.
+
+Run it with the Python of that environment: ``.venv/bin/python scripts/check_lock.py``.
+"""
+
+from importlib.metadata import distributions
+from pathlib import Path
+import re
+import sys
+
+LOCK = Path(__file__).resolve().parents[1] / 'requirements.lock'
+#: Our own packages.
+OWN = {'ur-cartesian-driver', 'ur-controller-sim'}
+
+
+def normalized(name: str) -> str:
+    """Return a name as the lock has it: https://packaging.python.org/specifications/name-normalization."""
+    return re.sub(r'[-_.]+', '-', name).lower()
+
+
+def locked() -> set[tuple[str, str]]:
+    """Return names and versions; a package has several where they depend on the Python."""
+    return set(re.findall(r'^([\w.-]+)==(\S+)', LOCK.read_text(encoding='utf-8'), re.MULTILINE))
+
+
+def main() -> None:
+    """Compare, and end with what is not in the lock."""
+    installed = {
+        (normalized(found.name), found.version)
+        for found in distributions()
+        if found.read_text('RECORD')  # the wheels of ROS bring distributions that have none
+    }
+    others = sorted(
+        f'{name} {version}' for name, version in installed - locked() if name not in OWN
+    )
+    if others:
+        sys.exit(f'{sys.prefix} has what requirements.lock does not name: {", ".join(others)}.')
+    sys.stdout.write(f'{sys.prefix}: {len(installed)} packages, each as in requirements.lock.\n')
+
+
+if __name__ == '__main__':
+    main()
