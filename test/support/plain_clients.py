@@ -18,7 +18,7 @@ import time
 from typing import Any, Self
 
 #: For an answer [s].
-TIMEOUT = 10.0
+TIMEOUT = 30.0
 STATE, MESSAGE = 16, 20
 TEXT, SAFETY_MODE, ERROR, KEY, EXCEPTION = 0, 5, 6, 7, 10
 
