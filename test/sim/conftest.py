@@ -67,5 +67,5 @@ def make_bench() -> type[Bench]:
 @pytest.fixture
 def robot():
     """Run a robot on free ports, 20 times as fast as time."""
-    with SimulatedRobot(SimulatorConfig(**FREE, rate=20.0, when_late='wait')) as robot:
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=20.0)) as robot:
         yield robot

@@ -38,7 +38,9 @@ def test_cycles_go_on_while_a_large_program_is_compiled():
             wait_for(lambda: is_playing(robot))
         passed, cycles = time.monotonic() - began, robot.state().timestamp - cycles
         assert passed > 0.2, 'compiling was too short to see anything'
-        assert cycles > 0.7 * passed
+        # One that waited for the compiler would have done none. Both share an interpreter and,
+        # on a busy computer, less than a processor.
+        assert cycles > 0.1 * passed
 
 
 def test_a_program_that_is_stopped_while_it_is_compiled_does_not_start():

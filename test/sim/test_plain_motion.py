@@ -26,7 +26,7 @@ START = 0.16
 @pytest.fixture(scope='module')
 def robot():
     """Run a robot twice as fast as time."""
-    with SimulatedRobot(SimulatorConfig(**FREE, rate=2.0, when_late='wait')) as robot:
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=2.0)) as robot:
         yield robot
 
 

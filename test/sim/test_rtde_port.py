@@ -98,7 +98,7 @@ def test_every_cycle_is_sent_once_and_the_clock_has_been_running_for_a_while(rob
 )
 def test_timestamps_advance_by_one_cycle_for_every_client(settings, cycle):
     with (
-        SimulatedRobot(SimulatorConfig(**FREE, **settings, when_late='wait')) as robot,
+        SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot,
         Wire(robot.ports.rtde) as one,
         Wire(robot.ports.rtde) as two,
     ):

@@ -10,8 +10,14 @@ from typing import Any, Self
 
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
 
-#: Settings of a simulated robot, each of a type of its own.
-FREE: dict[str, Any] = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
+#: Settings of a simulated robot, each of a type of its own: free ports, and no jump of its time
+#: where this computer does something else.
+FREE: dict[str, Any] = {
+    'rtde_port': 0,
+    'primary_port': 0,
+    'dashboard_port': 0,
+    'when_late': 'wait',
+}
 HOST = '127.0.0.1'
 
 
