@@ -5,6 +5,7 @@
 import gc
 from importlib.util import find_spec
 import os
+import socket
 
 from hypothesis import settings
 import pytest
@@ -24,6 +25,14 @@ def pytest_collection_finish():
     """
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def closed_port():
+    """Return a port that refuses connections; nobody else can open it meanwhile."""
+    with socket.socket() as bound:
+        bound.bind(('127.0.0.1', 0))
+        yield bound.getsockname()[1]
 
 
 def pytest_addoption(parser):

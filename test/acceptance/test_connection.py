@@ -170,12 +170,9 @@ def test_an_arm_without_power_is_left_alone(make_driver, ur_sim):
     assert ur_sim.state().robot_mode.name == 'POWER_OFF'
 
 
-def test_a_robot_that_does_not_answer_is_named():
-    with socket.socket() as unused:
-        unused.bind(('127.0.0.1', 0))
-        port = unused.getsockname()[1]
-    with Driver(DriverConfig(robot_loop='thread', rtde_port=port)) as driver:
-        with pytest.raises(RobotNotReady, match=f'127.0.0.1 port {port}'):
+def test_a_robot_that_does_not_answer_is_named(closed_port):
+    with Driver(DriverConfig(robot_loop='thread', rtde_port=closed_port)) as driver:
+        with pytest.raises(RobotNotReady, match=f'127.0.0.1 port {closed_port}'):
             driver.wait_ready(1.0)
         assert driver.state is None
 

@@ -320,22 +320,20 @@ def test_polyscope_x_before_its_robot_api_refuses_and_the_rest_works(make_driver
     assert answer.ok, answer.text
 
 
-def test_a_robot_whose_dashboard_is_closed_works_and_says_so(make_driver):
-    with socket.create_server(('127.0.0.1', 0)) as closed:
-        port = closed.getsockname()[1]
-    driver = make_driver(dashboard_port=port)
+def test_a_robot_whose_dashboard_is_closed_works_and_says_so(make_driver, closed_port):
+    driver = make_driver(dashboard_port=closed_port)
     driver.wait_ready(READY)
     answer = driver.dashboard('power on')
     assert not answer.ok
-    assert f'127.0.0.1 port {port}' in answer.text
+    assert f'127.0.0.1 port {closed_port}' in answer.text
     assert driver.set_tcp(NOZZLE).ok
     assert driver.status.serial_number == ''
 
 
-def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver):
-    with socket.create_server(('127.0.0.1', 0)) as closed:
-        port = closed.getsockname()[1]
-    driver = make_driver(rtde_port=port, primary_port=port, dashboard_port=port)
+def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver, closed_port):
+    driver = make_driver(
+        rtde_port=closed_port, primary_port=closed_port, dashboard_port=closed_port
+    )
     for answer in (
         driver.dashboard('power on'),
         driver.dashboard_line('running'),

@@ -95,14 +95,10 @@ def test_a_dashboard_that_says_nothing_does_not_hold_anybody(monkeypatch):
     run(test)
 
 
-def test_nobody_there_is_named():
+def test_nobody_there_is_named(closed_port):
     async def test():
-        server = await asyncio.start_server(lambda reader, writer: None, '127.0.0.1', 0)
-        port = server.sockets[0].getsockname()[1]
-        server.close()
-        await server.wait_closed()
-        with pytest.raises(OSError, match=f'127.0.0.1 port {port}'):
-            await DashboardConnection('127.0.0.1', port).request('play')
+        with pytest.raises(OSError, match=f'127.0.0.1 port {closed_port}'):
+            await DashboardConnection('127.0.0.1', closed_port).request('play')
 
     run(test)
 

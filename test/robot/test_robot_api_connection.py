@@ -12,7 +12,6 @@ import asyncio
 import contextlib
 import http.server
 import json
-import socket
 import threading
 
 import pytest
@@ -301,11 +300,9 @@ def test_a_robot_that_does_not_answer_holds_neither_the_caller_nor_the_loop(monk
         asyncio.run(asyncio.wait_for(test(), 10.0))
 
 
-def test_nobody_there_is_named():
-    with socket.create_server(('127.0.0.1', 0)) as closed:
-        port = closed.getsockname()[1]
-    with pytest.raises(OSError, match=rf'port {port} \(Robot API\): connection refused'):
-        asyncio.run(RobotApiConnection('127.0.0.1', port, NEWEST).request('robotmode'))
+def test_nobody_there_is_named(closed_port):
+    with pytest.raises(OSError, match=rf'port {closed_port} \(Robot API\): connection refused'):
+        asyncio.run(RobotApiConnection('127.0.0.1', closed_port, NEWEST).request('robotmode'))
 
 
 def test_an_answer_without_end_is_not_read(monkeypatch):

@@ -111,11 +111,9 @@ end
     assert {p for p, _ in received} == {port}
 
 
-def test_a_refused_connection_is_false_at_once(robot):
-    with socket.create_server((HOST, 0)) as server:
-        port = server.getsockname()[1]
+def test_a_refused_connection_is_false_at_once(robot, closed_port):
     with Primary(robot.ports.primary) as wire:
-        wire.send(f'def a():\n  textmsg(socket_open("{HOST}", {port}))\nend\n'.encode())
+        wire.send(f'def a():\n  textmsg(socket_open("{HOST}", {closed_port}))\nend\n'.encode())
         assert wire.await_(TextMessage).text == 'False'
 
 
