@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+import re
 
 from ur_cartesian_driver.importing import FORMATS, ImportFormat, Term, Treatment
 
@@ -40,9 +41,31 @@ def _cell(form: ImportFormat, topic: str, treatment: Treatment) -> str:
         if term.topic == topic and term.treatment is treatment:
             by_reason.setdefault(term.reason, []).append(term)
     return '; '.join(
-        ', '.join(f'`{term.name}`' for term in terms) + (f': {reason}' if reason else '')
+        ', '.join(_ranges([term.name for term in terms])) + (f': {reason}' if reason else '')
         for reason, terms in by_reason.items()
     ).replace('|', '\\|')
+
+
+def _ranges(names: list[str]) -> Iterator[str]:
+    """Return names as code; three and more that count up, such as M3, M4, M5, as one range."""
+    count = len(names)
+    first = 0
+    while first < count:
+        last = first
+        while last + 1 < count and names[last + 1] == _next(names[last]):
+            last += 1
+        if last - first < 2:
+            last = first
+            yield f'`{names[first]}`'
+        else:
+            yield f'`{names[first]}` to `{names[last]}`'
+        first = last + 1
+
+
+def _next(name: str) -> str:
+    """Return the name with the next number; empty = it has no whole number."""
+    match = re.fullmatch(r'([A-Z])(\d+)', name)
+    return f'{match[1]}{int(match[2]) + 1}' if match else ''
 
 
 def page_with_tables(page: str) -> str:

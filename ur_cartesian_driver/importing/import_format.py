@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import PathCollector
@@ -57,13 +58,16 @@ class ImportFormat:
     collect: Callable[[Path, ImportOptions, PathCollector], None]
 
 
-def term_table(*rows: Iterable[Term]) -> Mapping[str, Term]:
+_T = TypeVar('_T', bound=Term)
+
+
+def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
     """
     Return terms by their names.
 
     :raises ValueError: a name stands twice.
     """
-    table: dict[str, Term] = {}
+    table: dict[str, _T] = {}
     for row in rows:
         for term in row:
             if table.setdefault(term.name, term) is not term:

@@ -32,6 +32,9 @@ _KINDS = {
     'analog': OutputKind.STANDARD_ANALOG,
 }
 _LENGTH = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*)\s*', re.IGNORECASE)
+_CODE_WORD = re.compile(r'([A-Z])(-?[0-9]+(?:\.[0-9]+)?)')
+#: S, or an M-code with the values that it has to have.
+_CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 
 
 class ToolOrientation(Enum):
@@ -67,7 +70,7 @@ class CodeOutput:
 
 def parse_code_output(text: str) -> tuple[str, CodeOutput]:
     """
-    Return code and output of ``M3=standard:2:1`` or ``S=analog:0:10000``.
+    Return code and output of ``M3=standard:2:1``, ``M280 S40=tool:0:1`` or ``S=analog:0:10000``.
 
     :raises ValueError: the text is none of these.
     """
@@ -75,18 +78,19 @@ def parse_code_output(text: str) -> tuple[str, CodeOutput]:
         code, rest = text.upper().split('=')
         kind, pin, value = rest.lower().split(':')
         output = CodeOutput(_KINDS[kind], int(pin), float(value))
-        # M03 and M3 are one code.
-        word = re.fullmatch(r'(M)0*(\d+)|(S)', code)
-        if word is None:
+        if _CODE.fullmatch(code) is None:
             raise KeyError(code)
-        code = ''.join(part for part in word.groups() if part)
+        # M03 and M3 are one code, S40 and S40.0 one value.
+        words = [f'{word[1]}{float(word[2]):g}' for word in _CODE_WORD.finditer(code)]
+        code = ' '.join(words) or 'S'
         output.command(1.0 if code == 'S' else output.value)
         if code == 'S' and not output.value > 0.0:
             raise ValueError
     except (KeyError, ValueError):
         raise ValueError(
-            f'{text!r} is not of the form CODE=KIND:PIN:VALUE, such as M3=standard:2:1 or '
-            'S=analog:0:10000; kinds are standard, configurable, tool and analog'
+            f'{text!r} is not of the form CODE=KIND:PIN:VALUE, such as M3=standard:2:1, '
+            "'M280 S40=standard:0:1' or S=analog:0:10000; kinds are standard, configurable, tool "
+            'and analog'
         ) from None
     return code, output
 

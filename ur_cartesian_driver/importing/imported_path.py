@@ -175,6 +175,7 @@ class PathCollector:
         }
         self._postures: dict[int, Posture] = {}
         self._outputs: list[IOCommand] = []
+        self._left_out: set[int] = set()
         self.remarks = ImportNotes()
         self.frame = ''
 
@@ -222,18 +223,25 @@ class PathCollector:
         """Switch an output at the newest point, at the first one if there is none yet."""
         self._outputs.append(replace(output, waypoint=max(0, len(self) - 1)))
 
+    def leave_out(self, rows: range, what: str, why: str) -> None:
+        """Take points back, and say so; the tool is lifted before the next point."""
+        self._left_out.update(rows)
+        for row in rows:
+            self.remarks.add(self._plain[row][0], what, why)
+
     def path(self) -> ImportedPath:
         """
         Return what was collected.
 
         :raises BrokenFile: that are no points.
         """
-        if not self._positions:
+        kept = [row for row in range(len(self)) if row not in self._left_out]
+        if not kept:
             remarks = [remark.text() for remark in self.remarks.result()]
             left_out = f'; left out: {"; ".join(remarks)}' if remarks else ''
             raise BrokenFile(0, f'there is no point of a path in the file{left_out}')
         plain = np.array(self._plain, dtype=np.int64)
-        return ImportedPath(
+        path = ImportedPath(
             positions=np.array(self._positions, dtype=np.float64),
             lines=plain[:, 0],
             types=plain[:, 1],
@@ -245,6 +253,11 @@ class PathCollector:
             outputs=tuple(self._outputs),
             frame=self.frame,
         )
+        if not self._left_out:
+            return path
+        path = path.take(np.array(kept, dtype=np.int64))
+        gaps = np.diff(kept, prepend=kept[0] - 1) > 1
+        return replace(path, travels=path.travels | gaps, lifts=path.lifts | gaps)
 
     def _column(self, name: str) -> Floats:
         width, given = _OPTIONAL[name], self._optional[name]

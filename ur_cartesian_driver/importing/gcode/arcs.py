@@ -1,0 +1,136 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Arcs, circles and helices of G2 and G3: their centre, and the points that describe them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import acos, atan2, ceil, cos, hypot, pi, sin
+
+from ur_cartesian_driver.motion.vectors import Vector3
+
+#: The axes of an arc in each plane, and the one that it may rise along: right-handed.
+PLANES = {'G17': (0, 1, 2), 'G18': (2, 0, 1), 'G19': (1, 2, 0)}
+#: The radii at both ends of an arc may differ by so much [m], or by this share, but never by more
+#: than the last [m]: LinuxCNC and GRBL.
+_RADIUS_TOLERANCE, _RADIUS_SHARE, _MAX_RADIUS_TOLERANCE = 5e-6, 1e-3, 5e-4
+#: An arc that turns by less [rad] is a full circle: LinuxCNC.
+_FULL_CIRCLE = 1e-6
+#: Lower is no rise [m].
+_MIN_RISE = 1e-6
+_MAX_LINES = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArcWords:
+    """The words of an arc [m]."""
+
+    plane: tuple[int, int, int]
+    #: G2 = -1, G3 = 1.
+    direction: int
+    #: Of the centre in the plane, or None with a radius.
+    centre: tuple[float, float] | None
+    radius: float
+    turns: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arc:
+    """A part of a circle or a helix [m, rad]."""
+
+    plane: tuple[int, int, int]
+    centre: tuple[float, float]
+    start: Sequence[float]
+    end: Sequence[float]
+    begin: float
+    #: Signed, all turns.
+    sweep: float
+    radii: tuple[float, float]
+
+    @property
+    def rises(self) -> bool:
+        """Tell whether it leaves its plane."""
+        axis = self.plane[2]
+        return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
+
+    def place(self, share: float) -> Vector3:
+        """Return a place on it; between two radii it is a spiral, as in LinuxCNC."""
+        if share == 1.0:
+            x, y, z = self.end
+            return (x, y, z)
+        a, b, c = self.plane
+        angle = self.begin + share * self.sweep
+        radius = self.radii[0] + share * (self.radii[1] - self.radii[0])
+        point = [0.0, 0.0, 0.0]
+        point[a] = self.centre[0] + radius * cos(angle)
+        point[b] = self.centre[1] + radius * sin(angle)
+        point[c] = self.start[c] + share * (self.end[c] - self.start[c])
+        return (point[0], point[1], point[2])
+
+    def lines(self, tolerance: float) -> list[Vector3]:
+        """
+        Return the ends of lines that are nowhere farther from it.
+
+        :raises ValueError: there would be too many.
+        """
+        step = 2.0 * acos(max(0.0, 1.0 - min(1.0, tolerance / max(self.radii))))
+        count = max(2, ceil(abs(self.sweep) / max(step, 1e-6)))
+        if count > _MAX_LINES:
+            raise ValueError(f'the helix would need {count} lines; give a larger tolerance')
+        return [self.place(i / count) for i in range(1, count + 1)]
+
+    def arcs(self) -> Iterator[tuple[Vector3, Vector3]]:
+        """Return arcs through three points, as the robot takes them: the middle and the end."""
+        # A half circle is known best by three points.
+        count = ceil(abs(self.sweep) / (0.9 * pi))
+        for i in range(count):
+            yield self.place((i + 0.5) / count), self.place((i + 1) / count)
+
+
+def arc_between(start: Sequence[float], end: Sequence[float], words: ArcWords) -> Arc:
+    """
+    Return the arc.
+
+    :raises ValueError: there is none; a sentence without a full stop.
+    """
+    a, b, _ = words.plane
+    ax, ay, bx, by = start[a], start[b], end[a], end[b]
+    cx, cy = words.centre or _centre_of_radius(ax, ay, bx, by, words)
+    radius, other = hypot(ax - cx, ay - cy), hypot(bx - cx, by - cy)
+    tolerance = min(max(_RADIUS_TOLERANCE, _RADIUS_SHARE * radius), _MAX_RADIUS_TOLERANCE)
+    if abs(radius - other) > tolerance or not radius > 0.0:
+        raise ValueError(
+            f'the arc begins {1e3 * radius:.6g} mm and ends {1e3 * other:.6g} mm from its centre'
+        )
+    begin = atan2(ay - cy, ax - cx)
+    sweep = words.direction * (atan2(by - cy, bx - cx) - begin) % (2.0 * pi)
+    if sweep < _FULL_CIRCLE:
+        sweep += 2.0 * pi
+    return Arc(
+        plane=words.plane,
+        centre=(cx, cy),
+        start=tuple(start),
+        end=tuple(end),
+        begin=begin,
+        sweep=words.direction * (sweep + 2.0 * pi * (words.turns - 1)),
+        radii=(radius, other),
+    )
+
+
+def _centre_of_radius(
+    ax: float, ay: float, bx: float, by: float, words: ArcWords
+) -> tuple[float, float]:
+    """Return the centre of an arc by its radius, negative for more than a half circle."""
+    dx, dy, radius = bx - ax, by - ay, words.radius
+    chord = hypot(dx, dy)
+    if chord < _MIN_RISE:
+        raise ValueError('an arc with R ends where it begins; give I and J for a circle')
+    if chord > 2.0 * (abs(radius) + _RADIUS_TOLERANCE):
+        raise ValueError(
+            f'the arc spans {1e3 * chord:.6g} mm, more than twice its radius '
+            f'{1e3 * abs(radius):.6g} mm'
+        )
+    height = max(0.0, radius * radius - 0.25 * chord * chord) ** 0.5
+    height *= words.direction if radius > 0.0 else -words.direction
+    return (ax + bx) / 2.0 - height * dy / chord, (ay + by) / 2.0 + height * dx / chord

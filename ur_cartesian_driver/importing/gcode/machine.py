@@ -1,0 +1,349 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The machine that executes a program, line by line.
+
+The codes of a line act in the order of RS274/NGC: modes, feed, spindle and outputs, offsets, the
+motion, and the end of the program after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+import re
+
+from ur_cartesian_driver.importing.gcode.codes import Code, code_on_line, CODES, NO_OUTPUT, Stage
+from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
+from ur_cartesian_driver.importing.gcode.subprograms import LineSequence
+from ur_cartesian_driver.importing.gcode.switching import CodeOutputs
+from ur_cartesian_driver.importing.gcode.toolpath import Toolpath
+from ur_cartesian_driver.importing.gcode.words import Block, read_line
+from ur_cartesian_driver.importing.import_format import Treatment
+from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
+from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+
+_MOTIONS = frozenset(('G0', 'G1', 'G2', 'G3'))
+_OF_MOTION = frozenset('XYZIJKRP')
+# W of Prusa is no axis, and U and W of a lathe are X and Z.
+_AXIS_WORDS = frozenset('XYZABCE')
+#: They go to a place of the machine along the axes that they name, and all if none.
+_WITH_AXES = ('G28', 'G30', 'G53')
+_UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
+#: The numbers of work offsets in G10.
+_FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
+
+_Words = dict[str, float]
+
+
+class GcodeMachine:
+    """Executes a program and collects its points."""
+
+    def __init__(self, lines: Sequence[str], options: ImportOptions, into: PathCollector) -> None:
+        """Begin at the first line."""
+        self._lines, self._into = lines, into
+        self._sequence = LineSequence(lines)
+        self._outputs = CodeOutputs(options.outputs, into)
+        self._path = Toolpath(options, into)
+        self._line = 0
+        self._has_begun = self._seen_percent = False
+        self._frame = _FRAMES[0]
+        self._feed_per_turn = self._surface_speed = self._is_lathe = False
+        #: The lines of G0 while S is above 0.
+        self._powered_travels: list[int] = []
+
+    def run(self) -> None:
+        """
+        Execute the program.
+
+        :raises BrokenFile: a line is no G-code, or cannot be done.
+        """
+        for number, line in self._sequence:
+            self._line = number
+            block = read_line(number, line)
+            if block is not None:
+                self._execute(block)
+        self._finish()
+
+    def _finish(self) -> None:
+        """Say what only the whole program tells."""
+        self._outputs.finish()
+        for line in self._powered_travels if not self._path.coordinates.is_named('Z') else ():
+            self._into.remarks.add(
+                line, 'G0 while S is on', 'the output stays on; a laser mode would switch it off'
+            )
+        if self._is_lathe and self._path.share_of_x is None:
+            self._into.remarks.add(0, 'X of a lathe', 'a radius, because there is no G7')
+        self._path.coordinates.finish(self._into)
+
+    def _omit(self, what: str, why: str) -> None:
+        self._into.remarks.add(self._line, what, why)
+
+    def _fail(self, text: str) -> BrokenFile:
+        return BrokenFile(self._line, text)
+
+    # ---- a line --------------------------------------------------------------------------------
+
+    def _execute(self, block: Block) -> None:
+        codes, words, bare = block
+        if len(codes) > 1 or bare or (codes and codes[0] not in _MOTIONS):
+            self._obey(codes, words, bare)
+            return
+        if codes:
+            self._path.motion = codes[0]
+        self._has_begun = True
+        self._take_words(words)
+        if words:
+            self._move(words)
+
+    def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
+        """Execute a line with other codes than one of a motion."""
+        rows = [self._row(code, words) for code in codes]
+        if len(rows) == 1 and rows[0].alone:
+            self._do(codes[0], rows[0], words, bare)
+            return
+        self._check_codes(codes, rows, words)
+        own = [
+            {letter: words.pop(letter) for letter in row.words if letter in words} for row in rows
+        ]
+        self._check_words(codes, rows, own, words, bare)
+        self._has_begun |= codes[0][0] in 'GM'
+        spindle = any(row.group == 'spindle' for row in rows)
+        todo = list(zip(codes, rows, own, strict=True))
+        for stage in Stage:
+            if stage is Stage.OUTPUT:
+                self._take_words(words, beside_spindle=spindle)
+            if stage is Stage.END and words:
+                self._say_what_acts_before(codes)
+                self._move(words)
+            for code, row, values in todo:
+                if row.stage is stage:
+                    self._do(code, row, values, bare)
+
+    def _row(self, code: str, words: Mapping[str, float]) -> Code:
+        row = code_on_line(code, words)
+        if row is None:
+            raise self._fail(f'{code} is not known; remove it, or write it as moves')
+        if row.treatment is Treatment.REFUSED:
+            raise self._fail(f'{row.name} is not read: {row.reason}')
+        return row
+
+    def _check_codes(self, codes: Sequence[str], rows: Sequence[Code], words: _Words) -> None:
+        groups: dict[str, str] = {}
+        for code, row in zip(codes, rows, strict=True):
+            if row.group and groups.setdefault(row.group, code) != code:
+                raise self._fail(f'{groups[row.group]} and {code} exclude each other on a line')
+            if (
+                row.group == 'unit'
+                and 'F' in words
+                and self._path.unit not in (None, _UNITS[code])
+            ):
+                raise self._fail(
+                    f'F beside {code} is of one unit or the other; give it in a line after'
+                )
+
+    def _check_words(
+        self,
+        codes: Sequence[str],
+        rows: Sequence[Code],
+        own: Sequence[_Words],
+        words: _Words,
+        bare: str,
+    ) -> None:
+        """Refuse words that could belong to one code or to another."""
+        for letter in bare:
+            if not any(letter in row.bare for row in rows):
+                raise self._fail(f'{letter} has no number')
+        has_motion = not _MOTIONS.isdisjoint(codes)
+        shared = _OF_MOTION if not {'G2', 'G3'}.isdisjoint(codes) else {*AXES}
+        for code, row, values in zip(codes, rows, own, strict=True):
+            if has_motion and not row.moves_away and not shared.isdisjoint(values):
+                raise self._fail(f'{code} and a motion cannot share {min(shared & {*values})}')
+            others = set(words) - ((_OF_MOTION | {'F', 'T'}) if has_motion else {'T'})
+            if any(each.group == 'spindle' for each in rows):
+                others.discard('S')
+            if row.name == 'other M-codes':
+                others &= _OF_MOTION
+            if row.name == 'G53' and not values:
+                raise self._fail('G53 needs coordinates on its line')
+            if others and (row.alone or row.name == 'other M-codes'):
+                raise self._fail(
+                    f'{min(others)} could belong to {code} or not; give {code} a line of its own'
+                )
+
+    def _do(self, code: str, row: Code, own: _Words, bare: str) -> None:
+        """Carry out a code with its own words."""
+        if row.name in _DO:
+            _DO[row.name](self, code, own)
+        elif row.treatment is Treatment.LEFT_OUT:
+            if code[0] == 'M' and (row.reason == NO_OUTPUT or code in self._outputs):
+                self._outputs.switch(self._line, code, own)
+            else:
+                self._omit(code, row.reason)
+        if row.moves_away:
+            named = {*own, *bare} & _AXIS_WORDS if row.name in _WITH_AXES else set()
+            self._path.coordinates.lose(
+                ''.join(named.intersection(AXES)) if named else AXES, self._line
+            )
+
+    def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
+        """Take the words that belong to no code, and leave those of a motion."""
+        if words.keys() <= _OF_MOTION:
+            return
+        for letter in [each for each in words if each not in _OF_MOTION]:
+            value = words.pop(letter)
+            row = CODES.get(letter)
+            if letter == 'F':
+                self._set_feed(value)
+            elif letter == 'S' and not self._surface_speed:
+                self._outputs.set_power(self._line, value, beside_spindle=beside_spindle)
+            elif letter == 'S':
+                self._omit('word S', CODES['G96'].reason)
+            elif letter == 'W' or (letter == 'U' and not self._has_v):
+                raise self._fail(f'{letter} is not read: {CODES["W"].reason}')
+            elif not row or not row.reason or (letter in 'HD' and words.keys() & _OF_MOTION):
+                raise self._fail(f'{letter}{value:g} belongs to no code of its line')
+            else:
+                self._omit(f'word {letter}', row.reason)
+
+    def _move(self, words: _Words) -> None:
+        if self._path.motion == 'G0' and self._outputs.drives_power:
+            self._powered_travels.append(self._line)
+        self._path.move(self._line, words)
+
+    def _say_what_acts_before(self, codes: Sequence[str]) -> None:
+        for code in codes:
+            if code in ('M5', 'M9') and code in self._outputs:
+                self._omit(
+                    f'{code} beside a motion',
+                    'it acts before the motion, as in RS274/NGC; some controls do it afterwards',
+                )
+
+    # ---- codes ---------------------------------------------------------------------------------
+
+    def _set_feed(self, value: float) -> None:
+        if not value > 0.0:
+            raise self._fail(f'F{value:g} is no feed')
+        if self._feed_per_turn:
+            self._omit('word F', 'after G99 a lathe gives it per turn, so it is no speed')
+            self._path.feed = None
+        else:
+            self._path.feed = value * self._path.length(self._line) / 60.0
+
+    def _set_plane(self, code: str, _: _Words) -> None:
+        self._path.plane = code
+
+    def _set_unit(self, code: str, _: _Words) -> None:
+        self._path.unit = _UNITS[code]
+
+    def _set_distance(self, code: str, _: _Words) -> None:
+        if code in ('G90', 'G91'):
+            self._path.relative = code == 'G91'
+        else:
+            self._path.relative_centre = code == 'G91.1'
+
+    def _set_diameter(self, code: str, _: _Words) -> None:
+        self._path.share_of_x = 0.5 if code == 'G7' else 1.0
+
+    def _set_feed_mode(self, code: str, _: _Words) -> None:
+        self._feed_per_turn = code == 'G99'
+
+    def _set_spindle_mode(self, code: str, _: _Words) -> None:
+        self._surface_speed = code == 'G96'
+        if code != 'G97':
+            self._is_lathe = True
+            self._omit(code, CODES['G96'].reason)
+
+    def _set_motion(self, code: str, _: _Words) -> None:
+        self._path.motion = '' if code == 'G80' else code
+
+    def _set_frame(self, code: str, own: _Words) -> None:
+        frame = f'{code} P{own["P"]:g}' if 'P' in own else code
+        if frame == self._frame:
+            return
+        if len(self._into):
+            raise self._fail(
+                f'{frame} is a second work offset after {self._frame}; use one file for each'
+            )
+        self._frame, self._path.coordinates = frame, Coordinates()
+
+    def _set_offset(self, code: str, own: _Words) -> None:
+        lengths = self._path.lengths(self._line, own)
+        for letter in own:
+            if letter not in AXES and (row := CODES[letter]):
+                self._omit(f'word {letter}', row.reason)
+        if not own:
+            raise self._fail(f'{code} without coordinates differs among machines; give them')
+        where = self._path.coordinates
+        if code == 'G52':
+            where.shift(self._line, lengths)
+        elif begun := where.preset(self._line, lengths):
+            self._omit(f'{code} before a motion in {begun}', 'the program begins there')
+
+    def _cancel_offset(self, code: str, _: _Words) -> None:
+        self._path.coordinates.cancel_preset(code, self._line)
+
+    def _set_table(self, code: str, own: _Words) -> None:
+        """Set a work offset (G10 L2), or the coordinates in it of the present place (G10 L20)."""
+        number = own.get('P', 0.0)
+        kind = f'{code} L{own["L"]:g}'
+        if number and (number not in range(1, 10) or _FRAMES[int(number) - 1] != self._frame):
+            self._omit(f'{kind} P{number:g}', 'this work offset is not in use')
+        elif own['L'] == 20.0:
+            self._path.coordinates.preset_origin(self._line, self._path.lengths(self._line, own))
+        elif len(self._into) or own.get('R'):
+            raise self._fail(f'{kind} moves or turns the frame in use; use one file for each')
+        else:
+            self._omit(kind, CODES[kind].reason)
+
+    def _switch(self, code: str, own: _Words) -> None:
+        self._outputs.switch(self._line, code, own)
+
+    def _end(self, code: str, _: _Words) -> None:
+        self._outputs.end(self._line, code)
+        self._sequence.end()
+
+    def _call(self, _: str, own: _Words) -> None:
+        self._sequence.call(self._line, own)
+
+    def _return(self, code: str, own: _Words) -> None:
+        if not self._sequence.back(self._line, own):
+            self._omit(f'{code} in the main program', 'it is executed once')
+
+    def _percent(self, *_: object) -> None:
+        if self._has_begun or self._seen_percent:
+            self._sequence.end()
+        self._seen_percent = True
+
+    def _number(self, _: str, own: _Words) -> None:
+        self._sequence.meet_number(self._line, int(own['O']), is_first=not self._has_begun)
+
+    @cached_property
+    def _has_v(self) -> bool:
+        """Tell whether U and V are the second pair of axes of a wire, and no steps of a lathe."""
+        return any(re.search(r'V\s*[-+.0-9]', line, re.I) for line in self._lines)
+
+
+_Action = Callable[[GcodeMachine, str, _Words], None]
+_DO: Mapping[str, _Action] = {
+    name: action
+    for names, action in (
+        ('G0 G1 G2 G3 G80', GcodeMachine._set_motion),
+        ('G17 G18 G19', GcodeMachine._set_plane),
+        ('G20 G21', GcodeMachine._set_unit),
+        ('G90 G91 G90.1 G91.1', GcodeMachine._set_distance),
+        ('G7 G8', GcodeMachine._set_diameter),
+        ('G94 G98 G99', GcodeMachine._set_feed_mode),
+        ('G96 G97', GcodeMachine._set_spindle_mode),
+        ('G54 G55 G56 G57 G58 G59 G54.1 G59.1 G59.2 G59.3 G154', GcodeMachine._set_frame),
+        ('G52 G92', GcodeMachine._set_offset),
+        ('G92.1 G92.2 G92.3', GcodeMachine._cancel_offset),
+        ('M3 M4 M5 M7 M8 M9', GcodeMachine._switch),
+        ('M2 M30', GcodeMachine._end),
+        ('M98', GcodeMachine._call),
+        ('M99', GcodeMachine._return),
+        ('%', GcodeMachine._percent),
+        ('O', GcodeMachine._number),
+    )
+    for name in names.split()
+} | {name: GcodeMachine._set_table for name in ('G10 L2', 'G10 L20')}

@@ -1,0 +1,131 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The order in which the lines of a program are executed: subprograms by M98 and M99."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import re
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile
+
+_NUMBER_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?[O:]\s*([0-9]{1,8})\s*(?:[(;].*)?', re.I)
+_END_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?M\s*0*(?:2|30)\b', re.I)
+#: As deep as Fanuc and LinuxCNC.
+_MAX_DEPTH = 10
+#: Of all subprograms together.
+_MAX_LINES = 200_000
+#: Fanuc writes repetitions and a number of four digits into one P: P51002 is 5 times O1002.
+_PACKED = 10_000
+
+
+@dataclass(slots=True)
+class _Call:
+    number: int
+    #: The index of its first line, and of the line to go on at.
+    first: int
+    back: int
+    repeats_left: int
+
+
+class LineSequence:
+    """Yields the lines of a program with their numbers; calls change what comes next."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        """Begin at the first line."""
+        self._lines = lines
+        self._next = 0
+        self._calls: list[_Call] = []
+        self._in_subprograms = 0
+
+    def __iter__(self) -> Iterator[tuple[int, str]]:
+        """Yield the number of the line from 1, and the line."""
+        while self._next < len(self._lines):
+            self._next += 1
+            if self._calls:
+                self._in_subprograms += 1
+                if self._in_subprograms > _MAX_LINES:
+                    raise BrokenFile(
+                        self._next, f'subprograms have more than {_MAX_LINES} lines to execute'
+                    )
+            yield self._next, self._lines[self._next - 1]
+        if self._calls:
+            raise BrokenFile(
+                len(self._lines), f'the subprogram O{self._calls[-1].number} has no M99'
+            )
+
+    def end(self) -> None:
+        """Execute no further line."""
+        self._calls.clear()
+        self._next = len(self._lines)
+
+    def meet_number(self, line: int, number: int, *, is_first: bool) -> None:
+        """Pass the line with the number of a program; a program that runs into one is broken."""
+        if self._calls:
+            raise BrokenFile(line, f'the subprogram O{self._calls[-1].number} has no M99 before')
+        if not is_first:
+            raise BrokenFile(line, f'the program runs into O{number}; end it by M30 before')
+
+    def call(self, line: int, words: dict[str, float]) -> None:
+        """
+        Go on at a subprogram (M98 P- L-).
+
+        :raises BrokenFile: the file has no such subprogram.
+        """
+        number, repeats = words.get('P'), words.get('L', 1.0)
+        if number is None or set(words) - {'P', 'L'}:
+            raise BrokenFile(line, 'M98 needs the number of a subprogram in P, and takes L beside')
+        if number < 1.0 or number % 1.0 or repeats % 1.0 or not 0.0 <= repeats <= 9999.0:
+            raise BrokenFile(line, f'M98 P{number:g} L{repeats:g} has no number that is meant')
+        first = self._first_line(line, int(number))
+        if first is None and 'L' not in words and number >= _PACKED:
+            repeats, number = divmod(number, _PACKED)
+            first = self._first_line(line, int(number))
+        if first is None:
+            raise BrokenFile(line, f'O{number:g} is not in the file, and other files are not read')
+        if len(self._calls) == _MAX_DEPTH:
+            raise BrokenFile(line, f'subprograms are nested more than {_MAX_DEPTH} deep')
+        if repeats:
+            self._calls.append(_Call(int(number), first, self._next, int(repeats) - 1))
+            self._next = first
+
+    def back(self, line: int, words: dict[str, float]) -> bool:
+        """
+        Go on behind the call (M99); return False in the main program.
+
+        :raises BrokenFile: it is to go on elsewhere.
+        """
+        if words:
+            raise BrokenFile(line, 'M99 with a place to go on at is not read')
+        if not self._calls:
+            if any(map(_END_LINE.match, self._lines[line:])):
+                raise BrokenFile(
+                    line, 'M99 ends the main program; put it before its subprograms, with M30'
+                )
+            self.end()
+            return False
+        call = self._calls[-1]
+        if call.repeats_left:
+            call.repeats_left -= 1
+            self._next = call.first
+        else:
+            self._calls.pop()
+            self._next = call.back
+        return True
+
+    def _first_line(self, line: int, number: int) -> int | None:
+        """Return the index of the first line of a subprogram; None = it is not there."""
+        found = self._first_lines.get(number, [])
+        if len(found) > 1:
+            raise BrokenFile(line, f'O{number} is there twice, in lines {found[0]} and {found[1]}')
+        return found[0] if found else None
+
+    @cached_property
+    def _first_lines(self) -> dict[int, list[int]]:
+        found: dict[int, list[int]] = {}
+        for index, text in enumerate(self._lines, start=1):
+            if match := _NUMBER_LINE.fullmatch(text):
+                found.setdefault(int(match[1]), []).append(index)
+        return found

@@ -1,0 +1,174 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The motions of a program: its modal state, and the points to which lines and arcs lead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ur_cartesian_driver.importing.gcode.arcs import arc_between, ArcWords, PLANES
+from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
+from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
+from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.vectors import Vector3
+
+_CENTRE = 'IJK'
+_MAX_TURNS = 1000
+
+
+class Toolpath:
+    """Collects the points of motions, in the modes that the codes set."""
+
+    def __init__(self, options: ImportOptions, into: PathCollector) -> None:
+        """Begin in the modes of RS274/NGC, at an unknown place."""
+        self._options, self._into = options, into
+        self.coordinates = Coordinates()
+        #: G0 to G3; empty = none has been given, or G80 has ended it.
+        self.motion = ''
+        #: G17 to G19; empty = none has been given, so it is G17.
+        self.plane = ''
+        self.relative, self.relative_centre = False, True
+        #: [m]; None = not given.
+        self.unit = LENGTH_UNITS.get(options.unit)
+        #: [m/s]; None = not given, or of a kind that is no speed.
+        self.feed: float | None = None
+        #: The part of X that counts: a half where X is a diameter; None = nobody has said.
+        self.share_of_x: float | None = None
+        self._has_begun = False
+
+    def length(self, line: int) -> float:
+        """Return the unit of lengths [m]."""
+        if self.unit is None:
+            self.unit = LENGTH_UNITS['mm']
+            self._into.remarks.add(line, 'no G20 or G21 before', 'lengths are in mm')
+        return self.unit
+
+    def lengths(self, line: int, words: Mapping[str, float]) -> dict[int, float]:
+        """Return the coordinates among some words by their axes [m]."""
+        share = self.share_of_x or 1.0
+        return {
+            axis: words[name] * self.length(line) * (share if axis == 0 else 1.0)
+            for axis, name in enumerate(AXES)
+            if name in words
+        }
+
+    def move(self, line: int, words: Mapping[str, float]) -> None:
+        """
+        Carry out a motion.
+
+        :param words: its coordinates, and those of an arc.
+        :raises BrokenFile: it cannot be meant.
+        """
+        if not self.motion:
+            raise BrokenFile(line, 'coordinates without G0, G1, G2 or G3 before')
+        where = self.coordinates
+        start, known_before = where.place[:], where.states[:]
+        go = where.go_by if self.relative else where.go_to
+        unit, count = self.unit or self.length(line), 0
+        for axis, name in enumerate(AXES):
+            if name in words:
+                count += 1
+                go(axis, words[name] * (unit if axis else unit * (self.share_of_x or 1.0)))
+        is_arc = self.motion in ('G2', 'G3')
+        if is_arc or not self._has_begun:
+            is_known = where.start_is_known(known_before)
+            if is_known and not self._has_begun:
+                where.record(0)
+                self._into.add(line, start, travel=True)
+            self._has_begun = True
+            if is_arc:
+                self._arc(line, start if is_known else None, words)
+                return
+        if count < len(words):
+            extra = ' and '.join(name for name in words if name not in AXES)
+            raise BrokenFile(line, f'{self.motion} is a line, and has no {extra}')
+        self._add(line, where.place[:])
+
+    def _add(
+        self,
+        line: int,
+        place: Sequence[float],
+        kind: SegmentType = SegmentType.LINEAR,
+        via: Vector3 | None = None,
+    ) -> None:
+        where = self.coordinates
+        is_travel = self.motion == 'G0' or where.is_away
+        if not is_travel and self.feed is None and self._options.speed is None:
+            self._into.remarks.add(line, f'{self.motion} without F', "its speed is the driver's")
+        lift = where.is_away
+        if where.has_changed:
+            where.record(len(self._into))
+        self._into.add(
+            line,
+            place,
+            kind,
+            travel=is_travel,
+            lift=lift,
+            via=via,
+            speed=None if is_travel else self.feed,
+        )
+
+    def _arc(self, line: int, start: Sequence[float] | None, words: Mapping[str, float]) -> None:
+        end = self.coordinates.place[:]
+        if start is None:
+            self._into.remarks.add(
+                line, f'{self.motion} from an unknown place', 'only its end is taken'
+            )
+            self._add(line, end)
+            return
+        try:
+            arc = arc_between(start, end, self._arc_words(line, start, words))
+            lines = arc.lines(self._options.tolerance) if arc.rises else []
+        except ValueError as error:
+            raise BrokenFile(line, str(error)) from None
+        if lines:
+            self._into.remarks.add(
+                line, f'{self.motion} with a rise', f'a helix, made of {len(lines)} lines'
+            )
+            for place in lines:
+                self._add(line, place)
+            return
+        for via, place in arc.arcs():
+            self._add(line, place, SegmentType.CIRCULAR, via)
+
+    def _arc_words(
+        self, line: int, start: Sequence[float], words: Mapping[str, float]
+    ) -> ArcWords:
+        """
+        Return what the words of an arc say.
+
+        :raises ValueError: too little, or a contradiction.
+        """
+        if not self.plane and 'Z' in words and 'Y' not in words and 'J' not in words:
+            raise ValueError('an arc along X and Z needs G17 or G18 before, which say its plane')
+        plane = PLANES[self.plane or 'G17']
+        names = tuple(_CENTRE[axis] for axis in plane)
+        unit, turns = self.length(line), words.get('P', 1.0)
+        given = [name for name in names[:2] if name in words]
+        if turns % 1.0 or not 1.0 <= turns <= _MAX_TURNS:
+            raise ValueError(f'P{turns:g} of an arc is no number of turns from 1 to {_MAX_TURNS}')
+        if words.get(names[2]):
+            raise ValueError(f'an arc in {self.plane or "G17"} has no {names[2]}')
+        if 'R' in words:
+            if given:
+                raise ValueError(f'an arc has {given[0]} or R, and not both')
+            centre = None
+        elif len(given) < (1 if self.relative_centre else 2):
+            raise ValueError(f'the arc needs {names[0]} and {names[1]}, or R')
+        else:
+            u, v = (words.get(name, 0.0) * unit for name in names[:2])
+            a, b = plane[:2]
+            place = self.coordinates.absolute
+            centre = (
+                (start[a] + u, start[b] + v)
+                if self.relative_centre
+                else (place(a, u), place(b, v))
+            )
+        return ArcWords(
+            plane=plane,
+            direction=-1 if self.motion == 'G2' else 1,
+            centre=centre,
+            radius=words.get('R', 0.0) * unit,
+            turns=int(turns),
+        )

@@ -1,0 +1,164 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From a line of a program to its codes and words.
+
+The grammar is that of RS274/NGC: blanks and case mean nothing, a number has no exponent, a letter
+stands once in a line. Commands of printers have other forms; they are known by their beginning.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+import re
+from typing import NamedTuple
+
+from ur_cartesian_driver.importing.gcode.codes import code_named, CODES
+from ur_cartesian_driver.importing.imported_path import BrokenFile
+
+_COMMENT = re.compile(r'\([^()]*\)|;.*')
+_MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
+# Stands for a comment until it is clear that it divides no word; no file has this character.
+_MARK = '\0'
+_DIVIDED_WORD = re.compile(rf'[A-Z]{_MARK}+[-+.0-9]|[-+.0-9]{_MARK}+[.0-9]')
+# Fifteen digits are more than a float keeps, and more than any length needs.
+_NUMBER = r'[-+]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)'
+_WORD = re.compile(rf'([A-Z])({_NUMBER})')
+_BLOCK = re.compile(rf'(?:[A-Z]{_NUMBER})+')
+_WORDS_BEFORE = re.compile(rf'(?:[A-Z]{_NUMBER})*')
+_BARE_LETTER = re.compile(r'[A-Z](?![-+.0-9])')
+_LINE_NUMBER = re.compile(r'N-?[0-9]+(?:\.[0-9]+)?')
+_CHECKSUM = re.compile(r'\*[0-9]+$')
+# Behind the number of a code, as in G92E0, the letter is a word.
+_EXPONENT = re.compile(r'[A-FH-LN-Z][ \t]*[-+]?[0-9.]+E[-+]?[0-9]+(?![0-9.])', re.I)
+_M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
+_QUOTED = re.compile(r'"[^"]*"')
+_NAME = re.compile(r'\s*([A-Za-z_]{2}\w*)')
+_OTHER_FILE = 'M98 P"'
+_PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
+
+
+class Block(NamedTuple):
+    """The codes of a line, and its other words in their order."""
+
+    codes: list[str]
+    words: dict[str, float]
+    #: Letters without a number, such as the axes of G28 X Y.
+    bare: str = ''
+
+
+def read_line(number: int, line: str) -> Block | None:
+    """
+    Return the codes and words of a line; None = it has none.
+
+    Lines that are no words, such as ``%``, come as a block with the name of their row in the
+    table of codes.
+
+    :param number: of the line, for sentences about it.
+    :raises BrokenFile: it is no G-code.
+    """
+    text = line
+    if ';' in line or '(' in line:
+        text = _COMMENT.sub(_MARK, line)
+    text = text.replace(' ', '').replace('\t', '')
+    # Some foreign letters have capitals of ours.
+    text = text.upper() if text.isascii() else text
+    if not text:
+        return None
+    if _MARK in text:
+        if _DIVIDED_WORD.search(text):
+            raise BrokenFile(number, 'a comment divides a word')
+        text = text.replace(_MARK, '')
+        if message := _MESSAGE.search(line):
+            block = _block(number, line, text) if text else Block([], {})
+            return block._replace(codes=[*block.codes, f'({message[1].upper()},'])
+        if not text:
+            return None
+    return _block(number, line, text)
+
+
+def _block(number: int, line: str, text: str) -> Block:
+    if text[0] in 'MN':
+        if (name := _printer_code(text)) is not None:
+            return Block([name], {})
+        text = _LINE_NUMBER.sub('', text, count=1) if text[0] == 'N' else text
+    if _BLOCK.fullmatch(text) is None or text[0] == 'O':
+        return _odd_block(number, line, text)
+    # Blanks tell an exponent from the word of an extruder.
+    if 'E' in text and _EXPONENT.search(line) and _EXPONENT.search(_COMMENT.sub('', line)):
+        raise BrokenFile(
+            number,
+            f'{_shown(line)} has an exponent, which G-code has not; the word of an extruder '
+            'needs a blank before',
+        )
+    codes: list[str] = []
+    words: dict[str, float] = {}
+    for letter, value in _WORD.findall(text):
+        if letter in 'GM':
+            codes.append(_code_name(letter, value))
+        elif letter in words:
+            raise BrokenFile(number, f'{letter} is there twice')
+        else:
+            words[letter] = float(value)
+    return Block(codes, words)
+
+
+@lru_cache(maxsize=1024)
+def _code_name(letter: str, value: str) -> str:
+    """Return the name of a code: G01 and G1. are G1."""
+    return f'{letter}{float(value):.15g}'
+
+
+def _printer_code(text: str) -> str | None:
+    """Return the code of a line with a text behind, or with values that are no numbers."""
+    match = _M_CODE.match(text)
+    entry = code_named(name := _code_name('M', match[1])) if match else None
+    if match is None or entry is None:
+        return None
+    rest = text[match.end() :]
+    plain = _BLOCK.fullmatch(rest) or re.search(r'G[0-9]', _QUOTED.sub('', rest))
+    return name if entry.text or (entry.alone and not plain) else None
+
+
+def _odd_block(number: int, line: str, text: str) -> Block:
+    """Return the block of a line that is no row of words with numbers."""
+    first = text[:1]
+    if first in ('%', '/', ''):
+        return Block([first] if first else [], {})
+    if first == '$':
+        return Block([text[:2] if text[:2] in CODES else '$'], {})
+    if first in 'O:':
+        found = _PROGRAM_NUMBER.fullmatch(text)
+        return Block(['O'], {'O': float(found[1])}) if found else Block(['o-word'], {})
+    named = _NAME.match(line)
+    if named and (name := named[1].upper()) and code_named(name):
+        return Block([name], {})
+    if (without := _CHECKSUM.sub('', text)) != text:
+        return _block(number, line, without)
+    bare = ''.join(_BARE_LETTER.findall(text))
+    without = _BARE_LETTER.sub('', text)
+    if bare and not named and text[:3] != 'M98' and _BLOCK.fullmatch(without):
+        return _block(number, line, without)._replace(bare=bare)
+    for sign in '#[=':
+        if sign in text:
+            raise BrokenFile(
+                number, f'{_shown(line)} has {sign}, which is not read: {CODES[sign].reason}'
+            )
+    if text.startswith('M98'):
+        raise BrokenFile(number, f'{_shown(line)} is not read: {CODES[_OTHER_FILE].reason}')
+    rest = text[_WORDS_BEFORE.match(text).end() :]  # type: ignore[union-attr]  # matches ''
+    if rest[0] == '.':
+        raise BrokenFile(number, f'{_shown(line)} has a number with two points')
+    if '(' in rest or ')' in rest:
+        raise BrokenFile(number, f'{_shown(line)} has a parenthesis without the other one')
+    if rest[0].isdigit():
+        raise BrokenFile(number, f'{_shown(line)} has more digits than a number that is meant')
+    if re.match(r'[A-Z]([^A-Z_]|$)', rest) or (not named and 'A' <= rest[0] <= 'Z'):
+        raise BrokenFile(number, f'{rest[0]} has no number')
+    raise BrokenFile(number, f'{_shown(line)} is no G-code')
+
+
+def _shown(line: str) -> str:
+    """Return the beginning of a line in quotes."""
+    line = line.strip()
+    return repr(line if len(line) < 60 else f'{line[:56]}...')
