@@ -1,0 +1,9 @@
+(an imitation of a program in ISO for a Heidenhain TNC)
+%PART G71 *
+N10 G30 G17 X+0 Y+0 Z-20 *
+N20 G31 G90 X+100 Y+100 Z+0 *
+N30 T1 G17 S4000 *
+N40 G00 G40 G90 Z+250 *
+N50 X-20 Y+50 *
+N60 G01 Z-5 F200 *
+N9999 %PART G71 *

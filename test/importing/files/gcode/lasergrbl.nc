@@ -1,0 +1,14 @@
+;an imitation of LaserGRBL, line to line
+G90
+M4 S0
+G0 X5 Y5 S0
+G1 F1000
+G1 X15 S128
+X20 S255
+X25 S64
+S0
+Y5.1
+X20 S255
+X5 S0
+M5
+G0 X0 Y0

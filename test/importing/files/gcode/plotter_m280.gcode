@@ -1,0 +1,20 @@
+; an imitation of a plotter whose pen is lifted by a servo (Marlin)
+G21
+G90
+G28 X Y
+M280 P0 S40 ; pen up
+G0 X10 Y10 F6000
+M280 P0 S90 ; pen down
+G4 P150
+G1 X50 Y10 F2000
+G1 X50 Y40
+G1 X10 Y10
+M280 P0 S40
+G4 P150
+G0 X60 Y20
+M280 P0 S90
+G4 P150
+G1 X80 Y20 F2000
+M280 P0 S40
+G0 X0 Y0
+M84
