@@ -78,7 +78,7 @@ def read_line(number: int, line: str) -> Block | None:
 
 
 def _block(number: int, line: str, text: str) -> Block:
-    if text[0] in 'MN':
+    if text[:1] in ('M', 'N'):
         if (name := _printer_code(text)) is not None:
             return Block([name], {})
         text = _LINE_NUMBER.sub('', text, count=1) if text[0] == 'N' else text
