@@ -351,6 +351,21 @@ def test_arguments_of_builtins_are_checked_against_their_python_signature() -> N
     assert 'gain' in caught.value.reason
 
 
+@pytest.mark.parametrize(
+    ('statement', 'reason'),
+    [
+        ('x = my_plane_1', "there is no variable 'my_plane_1'"),
+        ('rq_open_and_wait()', "there is no function 'rq_open_and_wait'"),
+        ('run step_counter()', "there is no thread 'step_counter'"),
+        ('sin(1, 2)', 'sin(): too many positional arguments'),
+    ],
+)
+def test_names_are_reported_as_they_are_written(statement: str, reason: str) -> None:
+    with pytest.raises(CompileError) as caught:
+        ScriptInterpreter(parse(f'def f(): {statement} end'), core_builtins())
+    assert caught.value.reason == reason
+
+
 def test_the_first_unknown_name_in_the_text_is_reported() -> None:
     with pytest.raises(CompileError) as caught:
         machine('def g():\n  one()\nend\ntwo()')

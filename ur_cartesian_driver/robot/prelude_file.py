@@ -52,8 +52,7 @@ def compile_prelude(text: str, name: str) -> Prelude:
     try:
         statements = parse_line(text).body
     except CompileError as error:
-        reason = error.reason or error.text.rstrip(':').replace('_', ' ')
-        raise ValueError(f'script_prelude: {name}, line {error.line}: {reason}.') from None
+        raise ValueError(f'script_prelude: {name}, line {error.line}: {error.reason}.') from None
     calls, local_names = taken_names()
     lines: dict[str, int] = {}
     variables: set[str] = set()

@@ -20,7 +20,7 @@ class CompileError(Exception):
     :param reason: one clause for people, such as what was expected.
     """
 
-    def __init__(self, line: int, column: int, text: str, reason: str = '') -> None:
+    def __init__(self, line: int, column: int, text: str, reason: str) -> None:
         super().__init__(line, column, text, reason)
         self.line = line
         self.column = column
@@ -28,8 +28,7 @@ class CompileError(Exception):
         self.reason = reason
 
     def __str__(self) -> str:
-        reason = f' ({self.reason})' if self.reason else ''
-        return f'{self.line}:{self.column}: {self.text}{reason}'
+        return f'{self.line}:{self.column}: {self.text} ({self.reason})'
 
 
 class RuntimeException(Exception):
@@ -54,6 +53,11 @@ class RuntimeException(Exception):
         return f'Runtime error ({self.line}:{self.column}): {self.text}'
 
 
-def name_not_found(name: str, line: int, column: int) -> CompileError:
-    """Return the error for a name that is unknown in its scope."""
-    return CompileError(line, column, f'compile_error_name_not_found:{name}:')
+def name_not_found(kind: str, name: str, line: int, column: int) -> CompileError:
+    """
+    Return the error for a name that is unknown in its scope.
+
+    :param kind: variable, function or thread.
+    """
+    text = f'compile_error_name_not_found:{name}:'
+    return CompileError(line, column, text, f'there is no {kind} {name!r}')

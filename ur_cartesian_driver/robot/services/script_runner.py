@@ -61,8 +61,7 @@ class ScriptRunner:
         try:
             kind = await _kind(call.script)
         except CompileError as error:
-            reason = error.reason or error.text.rstrip(':').replace('_', ' ')
-            return failed(f'The script was not sent: line {error.line}: {reason}.')
+            return failed(f'The script was not sent: line {error.line}: {error.reason}.')
         if self._link.robot is None:
             return failed(self._link.status.message)
         if self._is_running:

@@ -197,7 +197,7 @@ class _NameChecker:
                 continue
             if isinstance(node, tree.NameExpression):
                 if node.identifier not in scope.locals and node.identifier not in scope.globals:
-                    raise name_not_found(node.identifier, node.line, node.column)
+                    raise name_not_found('variable', node.identifier, node.line, node.column)
             elif isinstance(node, tree.CallExpression):
                 self._call(scope, node)
             elif isinstance(node, tree.RunExpression):
@@ -233,13 +233,13 @@ class _NameChecker:
                 _check_arguments(call, signature)
                 self._fitting.add(form)
         else:
-            raise name_not_found(call.function, call.line, call.column)
+            raise name_not_found('function', call.function, call.line, call.column)
 
     @staticmethod
     def _run(scope: Scope, run: tree.RunExpression) -> None:
         callee = scope.function(run.thread)
         if callee is None or callee.definition is None or callee.definition.kind != 'thread':
-            raise name_not_found(run.thread, run.line, run.column)
+            raise name_not_found('thread', run.thread, run.line, run.column)
 
 
 def _check_arguments(call: tree.CallExpression, signature: inspect.Signature) -> None:
@@ -256,4 +256,4 @@ def _check_arguments(call: tree.CallExpression, signature: inspect.Signature) ->
 def call_error(call: tree.CallExpression, reason: str) -> CompileError:
     """Return the error for a call whose arguments do not fit the function."""
     text = f'compile_error_wrong_arguments:{call.function}:'
-    return CompileError(call.line, call.column, text, reason)
+    return CompileError(call.line, call.column, text, f'{call.function}(): {reason}')
