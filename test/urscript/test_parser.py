@@ -125,6 +125,21 @@ def test_a_syntax_error_quotes_the_line_and_says_what_is_missing() -> None:
     assert str(error) == f'3:3: {error.text} ({error.reason})'
 
 
+@pytest.mark.parametrize(
+    ('statement', 'reason'),
+    [
+        ('for i in range(3):', "there is no 'for'; count in a 'while' loop"),
+        ('import socket', "there is no 'import'; this may be a file of Python"),
+        ('i += 1', "there is no assignment such as '+='; write 'a = a + b'"),
+        ("textmsg('a')", 'a string stands in double quotes'),
+    ],
+)
+def test_statements_of_other_languages_are_named(statement: str, reason: str) -> None:
+    with pytest.raises(CompileError) as caught:
+        parse(program(f'  {statement}'))
+    assert (caught.value.line, caught.value.reason) == (2, reason)
+
+
 def refusal(text: str) -> CompileError | None:
     try:
         parse(text)

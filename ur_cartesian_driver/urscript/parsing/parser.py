@@ -51,6 +51,15 @@ from ur_cartesian_driver.urscript.parsing.expression_parser import CONSTANTS, Ex
 from ur_cartesian_driver.urscript.parsing.scanner import Token, TokenKind
 from ur_cartesian_driver.urscript.parsing.token_reader import source_position
 
+#: Statements of other languages that people try.
+_OF_OTHERS = {
+    'for': "there is no 'for'; count in a 'while' loop",
+    'elseif': "'elseif' is written 'elif'",
+    'import': "there is no 'import'; this may be a file of Python",
+    'from': "there is no 'import'; this may be a file of Python",
+    **dict.fromkeys('+-*/', "there is no assignment such as '+='; write 'a = a + b'"),
+}
+
 
 def parse(text: str) -> tree.ScriptProgram:
     """
@@ -328,7 +337,8 @@ class Parser(ExpressionParser):
             target, tree.CallExpression | tree.MethodCallExpression | tree.RunExpression
         ):
             at = self._token if self._same_line() else start
-            raise self.error('a statement is an assignment or a call', at)
+            reason = _OF_OTHERS.get(start.text) or _OF_OTHERS.get(at.text)
+            raise self.error(reason or 'a statement is an assignment or a call', at)
         return tree.CallStatement(call=target, **source_position(start))
 
     def _assignment(

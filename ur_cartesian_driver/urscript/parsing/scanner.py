@@ -101,6 +101,8 @@ def scan(text: str) -> list[Token]:
             kind, word = TokenKind.STRING, word[1:-1]
         elif word == '"':
             raise syntax_error(text, line, column, 'a string is not closed on its line')
+        elif word == "'":
+            raise syntax_error(text, line, column, 'a string stands in double quotes')
         else:
             raise syntax_error(text, line, column, f'{word!r} has no meaning here')
         tokens.append(Token(kind, word, line, column))
