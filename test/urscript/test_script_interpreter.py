@@ -277,6 +277,51 @@ def test_a_thread_that_exceeds_its_budget_ends_the_program_with_a_position() -> 
     assert 100 <= running.variables['i'] <= 250
 
 
+def test_a_total_budget_bounds_all_frames_and_threads_together() -> None:
+    text = (
+        'def f(): thread t(): while True: y = 1 sync() end end run t() while True: sync() end end'
+    )
+    running = ScriptInterpreter(parse(text), {'sync': sync}, total_budget=1000)
+    frames = 0
+    while running.running:
+        running.step()
+        frames += 1
+    assert running.error is not None
+    assert running.error.text == BUDGET_EXCEEDED
+    assert 20 < frames < 200
+
+
+@pytest.mark.parametrize(
+    'loop',
+    [
+        'a = a + 1',
+        'b = a',
+        'b = -a',
+        'x = a == a',
+        'x = length(a)',
+        'a.insert(0, 1)',
+        'm = [a, a]',
+        's = struct(a=a)',
+    ],
+)
+def test_long_values_cost_as_many_nodes_as_they_have_items(loop: str) -> None:
+    text = f'def f(): a = make_list(50000, 0) n = 0 while True: {loop} n = n + 1 end end'
+    running = ScriptInterpreter(parse(text), core_builtins(), instruction_budget=1_000_000)
+    running.step()
+    assert running.error is not None
+    assert running.error.text == BUDGET_EXCEEDED
+    rounds = running.variables['n']
+    assert rounds < (320 if 'insert' in loop else 21)
+
+
+def test_structs_in_structs_cannot_double_for_ever() -> None:
+    text = 'def f(): s = struct(a=1) while True: s = struct(a=s, b=s) end end'
+    running = ScriptInterpreter(parse(text), core_builtins(), instruction_budget=10_000_000)
+    running.step()
+    assert running.error is not None
+    assert 'more than 100000 items' in running.error.text
+
+
 def test_the_budget_is_fresh_in_every_frame_and_for_every_thread() -> None:
     loop = 'i = 0\nwhile i < 50:\ni = i + 1\nend\nsync()\n'
     text = f'def f():\nthread t():\n{loop * 5}end\nrun t()\n{loop * 5}end'

@@ -18,6 +18,7 @@ from typing import Any
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import (
     bounded,
+    check_size,
     copy,
     INT_MAX,
     INT_MIN,
@@ -34,6 +35,9 @@ from ur_cartesian_driver.urscript.script_values import (
 from ur_cartesian_driver.urscript.script_values import (
     make_list as make_list_value,
 )
+
+#: Rows of a matrix that can be inverted: the time grows with their cube. The manual has no limit.
+MAX_INVERSE = 100
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
 _HEXADECIMAL = re.compile(r'[+-]?0[xX][0-9a-fA-F]+')
@@ -271,6 +275,8 @@ def inv(m: Value) -> Matrix:
     n = len(rows)
     if n != len(rows[0]):
         raise RuntimeException('inv: the matrix is not square')
+    if n > MAX_INVERSE:
+        raise RuntimeException(f'inv: a matrix with more than {MAX_INVERSE} rows is too large')
     for i, row in enumerate(rows):
         row.extend(1.0 if i == j else 0.0 for j in range(n))
     for i in range(n):
@@ -288,7 +294,7 @@ def inv(m: Value) -> Matrix:
 
 def struct(**fields: Value) -> Struct:
     """Return a struct with these fields."""
-    return Struct(dict(fields))
+    return check_size(Struct(dict(fields)))
 
 
 def integer_to_binary_list(x: Value) -> list[bool]:

@@ -20,11 +20,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
 import operator
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple, TypeGuard, TypeVar
 
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
 Value = Any
+T = TypeVar('T')
 
 NESTED_LIST = 'Type error: a list holds lists only as the rows of a matrix'
 
@@ -128,14 +129,42 @@ def copy(value: Value) -> Value:
     return value
 
 
+#: Types whose values have a size.
+SIZED = frozenset({list, Matrix, Struct})
+
+
+def size_of(value: Value) -> int:
+    """Return how many plain values a value holds."""
+    kind = type(value)
+    if kind is list:
+        return sum(map(size_of, value)) if Struct in map(type, value) else len(value)
+    if kind is Matrix:
+        return len(value.rows) * len(value.rows[0])
+    return sum(map(size_of, value.fields.values())) if kind is Struct else 1
+
+
+def work_on(a: Value, b: Value) -> int:
+    """Return how many plain values an operation on two values looks at."""
+    if isinstance(a, Matrix) and isinstance(b, Matrix):
+        return size_of(a) * b.shape[1]
+    return size_of(a) + size_of(b)
+
+
+def check_size(value: T) -> T:
+    """Return a value that holds others if it is not too large; structs in structs may double."""
+    if size_of(value) > MAX_LIST_LENGTH:
+        raise RuntimeException(f'more than {MAX_LIST_LENGTH} items are not possible')
+    return value
+
+
 def make_list(items: Sequence[Value]) -> Value:
     """Return the value of `[items]`: a matrix if the items are lists."""
     kinds = set(map(type, items))
     if list in kinds and len(kinds) == 1:
-        return Matrix([item[:] for item in items])
+        return check_size(Matrix([item[:] for item in items]))
     if kinds & {list, Matrix}:
         raise RuntimeException(NESTED_LIST)
-    return [copy(item) for item in items] if Struct in kinds else list(items)
+    return check_size([copy(item) for item in items]) if Struct in kinds else list(items)
 
 
 def make_pose(items: Sequence[Value]) -> ScriptPose:

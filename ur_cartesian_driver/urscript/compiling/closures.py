@@ -69,6 +69,9 @@ class Runtime(Protocol):
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
         """Raise: the thread used up its budget without yielding."""
 
+    def pay_for(self, items: int, line: int, column: int) -> None:
+        """Pay for the items of a long value, which takes longer than a node."""
+
     def switches_now(self) -> bool:
         """Tell whether another thread goes on before the next statement."""
 

@@ -85,7 +85,14 @@ class ExpressionCompiler:
         numbers = [_number(item) for item in node.items]
         if None in numbers:
             items = [self.expression(item) for item in node.items]
-            return self._positioned(node, items, lambda frame, found: make(found))
+            runtime, sized = self._runtime, values.SIZED
+
+            def made(frame: StackFrame, found: list[Value]) -> Value:
+                if found and type(found[0]) in sized:
+                    runtime.pay_for(sum(map(values.size_of, found)), node.line, node.column)
+                return make(found)
+
+            return self._positioned(node, items, made)
         value = make(numbers)  # which cannot fail
         signs = sum(isinstance(item, tree.UnaryExpression) for item in node.items)
         run = (lambda frame: value[:]) if is_list else (lambda frame: value)
@@ -96,15 +103,20 @@ class ExpressionCompiler:
         code = self.expression(node)
         if self._is_temporary(node):
             return code
-        run = code.run
-        mutable = (list, values.Matrix, values.Struct)
+        run, runtime, sized = code.run, self._runtime, values.SIZED
+        place = node.line, node.column
+
+        def copied(value: Value) -> Value:
+            runtime.pay_for(values.size_of(value), *place)
+            return values.copy(value)
 
         def plain(frame: StackFrame) -> Value:
             value = run(frame)
-            return values.copy(value) if type(value) in mutable else value
+            return copied(value) if type(value) in sized else value
 
         def steps(frame: StackFrame) -> ScriptSteps:
-            return values.copy((yield from run(frame)))
+            value = yield from run(frame)
+            return copied(value) if type(value) in sized else value
 
         return CompiledNode(steps if code.suspends else plain, code.suspends, code.weight)
 
@@ -168,24 +180,33 @@ class ExpressionCompiler:
 
     def _unary(self, node: tree.UnaryExpression) -> CompiledNode:
         operate = values.UNARY[node.operator]
-        operand = self.expression(node.operand)
-        return self._positioned(node, [operand], lambda frame, found: operate(found[0]))
+        return self._positioned(
+            node, [self.copied_expression(node.operand)], lambda frame, found: operate(found[0])
+        )
 
     def _binary(self, node: tree.BinaryExpression) -> CompiledNode:
-        operate = values.BINARY[node.operator]
+        on_values = values.BINARY[node.operator]
+        on_floats = values.ON_FLOATS.get(node.operator, on_values)
         left, right = self.expression(node.left), self.expression(node.right)
         run_left, run_right = left.run, right.run
+        runtime, sized = self._runtime, values.SIZED
+
+        def operate(a: Value, b: Value) -> Value:
+            if type(a) in sized or type(b) in sized:
+                runtime.pay_for(values.work_on(a, b), node.line, node.column)
+            return on_values(a, b)
+
         if left.suspends or right.suspends:
             return self._positioned(node, [left, right], lambda frame, found: operate(*found))
-
-        on_floats = values.ON_FLOATS.get(node.operator, operate)
 
         def run(frame: StackFrame) -> Value:
             a, b = run_left(frame), run_right(frame)
             try:
                 if type(a) is float and type(b) is float:
                     return on_floats(a, b)
-                return operate(a, b)
+                if type(a) in sized or type(b) in sized:
+                    return operate(a, b)
+                return on_values(a, b)
             except RuntimeException as error:
                 raise error.at(node.line, node.column) from None
 
@@ -319,17 +340,22 @@ class ExpressionCompiler:
         arguments = [self.copied_expression(argument.value) for argument in node.arguments]
         names = [argument.name for argument in node.arguments if argument.name is not None]
         split = len(arguments) - len(names)
-        runtime = self._runtime
+        runtime, sized = self._runtime, values.SIZED
         call_location = (node.line, node.column)
 
         def finish(frame: StackFrame, found: list[Value]) -> Value:
             runtime.thread.location = call_location
             try:
                 if names:
-                    return builtin(*found[:split], **dict(zip(names, found[split:], strict=True)))
-                return builtin(*found)
+                    named = dict(zip(names, found[split:], strict=True))
+                    value = builtin(*found[:split], **named)
+                else:
+                    value = builtin(*found)
             except Exception as error:
                 raise _from_builtin(node, error) from error
+            if type(value) in sized:
+                runtime.pay_for(values.size_of(value), *call_location)
+            return value
 
         call = sequence(arguments, finish)
         if inspect.isgeneratorfunction(builtin):
@@ -365,6 +391,8 @@ class ExpressionCompiler:
             try:
                 if isinstance(target, values.RemoteObject):
                     return target.call(node.method, arguments)
+                # Moving the items of a list up is quicker than to copy them.
+                runtime.pay_for(values.size_of(target) // 16, *call_location)
                 return call_method(target, node.method, arguments)
             except Exception as error:
                 raise _from_builtin(node, error, node.method) from error

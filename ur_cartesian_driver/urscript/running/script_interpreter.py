@@ -88,6 +88,7 @@ class ScriptInterpreter:
         generator function each bare `yield` gives up the rest of the frame, and its return value
         is the value of the call. Arguments are passed by position and name as in Python.
     :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
+    :param total_budget: nodes that all threads together may evaluate in the life of the program.
     :param thread_delay: frames after which a new thread begins.
     :param interleaving: draws where threads are switched; None = only where one takes time.
     :param lazily: compile each function when it is called for the first time: much sooner ready,
@@ -101,6 +102,7 @@ class ScriptInterpreter:
         builtins: Mapping[str, Builtin],
         *,
         instruction_budget: int = 100_000,
+        total_budget: int | None = None,
         thread_delay: int = 0,
         interleaving: Random | None = None,
         lazily: bool = False,
@@ -116,6 +118,8 @@ class ScriptInterpreter:
         self._random = interleaving
         self._thread_delay = thread_delay
         self._budget = instruction_budget
+        #: What is left of the total budget; None = there is no bound.
+        self.fuel_left = total_budget
         self._is_secondary = program.kind == 'sec'
         self._current: _Thread | None = None
         self._halted = False
@@ -129,7 +133,8 @@ class ScriptInterpreter:
             text = f'syntax_error_on_line:{program.line}:{program.name}:'
             reason = 'the program is nested too deeply'
             raise CompileError(program.line, program.column, text, reason) from None
-        self._threads = [_Thread(0, main.steps(), None)]
+        self._main = _Thread(0, main.steps(), None)
+        self._threads = [self._main]
         #: Number of threads started so far; the next one gets this number.
         self.threads_started = 1
         #: Compiles lines for the running program.
@@ -152,9 +157,19 @@ class ScriptInterpreter:
         return None if self._current is None else self._current.number
 
     @property
+    def threads(self) -> int:
+        """How many threads there are, the main one included."""
+        return sum(thread.alive for thread in self._threads)
+
+    @property
     def location(self) -> tuple[int, int]:
         """Line and column of the running call."""
         return (0, 0) if self._current is None else self._current.location
+
+    @property
+    def main_location(self) -> tuple[int, int]:
+        """Line and column of the newest call of the main thread."""
+        return self._main.location
 
     @property
     def variables(self) -> dict[str, Value]:
@@ -219,6 +234,9 @@ class ScriptInterpreter:
     def _resume(self, thread: _Thread) -> None:
         """Let one thread run up to its next yield."""
         self.fuel = thread.fuel
+        if self.fuel_left is not None:
+            self.fuel = min(self.fuel, self.fuel_left)
+        available = self.fuel
         self._current = thread
         ended = True
         try:
@@ -236,7 +254,9 @@ class ScriptInterpreter:
             self.error, self._halted = recursion_error(*thread.location), True
         finally:
             self._current = None
-            thread.fuel = self.fuel
+            thread.fuel -= available - self.fuel
+            if self.fuel_left is not None:
+                self.fuel_left -= available - self.fuel
         if ended:
             self._end(thread)
 
@@ -258,6 +278,12 @@ class ScriptInterpreter:
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
         """Raise: the thread used up its budget without yielding."""
         raise RuntimeException(BUDGET_EXCEEDED, line, column)
+
+    def pay_for(self, items: int, line: int, column: int) -> None:
+        """Pay for the items of a long value; raise where the thread cannot."""
+        self.fuel -= items
+        if self.fuel < 0:
+            self.raise_budget_exceeded(line, column)
 
     def switches_now(self) -> bool:
         """Tell whether another thread goes on before the next statement."""
