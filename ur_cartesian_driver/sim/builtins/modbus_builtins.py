@@ -53,13 +53,21 @@ class ModbusBuiltins(BuiltinGroup):
         signal_type: Value,
         signal_name: Value,
         sequential_mode: Value = False,
+        register_count: Value = 1,
     ) -> None:
-        """Add or replace a signal: 0, 1 = digital input, output; 2, 3 = register read, written."""
+        """
+        Add or replace a signal: 0, 1 = digital input, output; 2, 3 = register read, written.
+
+        :param register_count: with more than one its value is a list.
+        """
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
         index(signal_address, 'signal_address', 2**16)
+        count = index(register_count, 'register_count', MAX_REGISTERS + 1)
         value, is_output = SIGNAL_TYPES[index(signal_type, 'signal_type', 4)]
-        self._signals[text(signal_name, 'signal_name')] = _Signal(value, is_output)
+        self._signals[text(signal_name, 'signal_name')] = _Signal(
+            [value] * count if count > 1 else value, is_output, registers_to_write=count
+        )
 
     def modbus_add_rw_signal(
         self,
