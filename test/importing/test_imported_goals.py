@@ -19,10 +19,11 @@ from ur_cartesian_driver.importing import (
     ToolOrientation,
 )
 from ur_cartesian_driver.importing.csv_file import collect_csv
+from ur_cartesian_driver.importing.imported_goal import goal_of_path
 from ur_cartesian_driver.importing.imported_path import PathCollector
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal import InputKind, InputWait, Posture, SegmentType
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
@@ -83,6 +84,55 @@ def test_an_imported_path_is_carried_out(tmp_path, robot, name):
     radii = np.array(goal.segments.blend_radii)
     for pose, radius in zip(np.array(goal.waypoints.poses), radii, strict=True):
         assert np.linalg.norm(places - pose[:3], axis=1).min() < radius + 1e-4
+
+
+def collected(*points):
+    """Return what was collected: positions, rests [s], and whether the arm waits there."""
+    into = PathCollector()
+    for line, (position, dwell, waits, lift) in enumerate(points, 1):
+        into.add(line, position, dwell=dwell or None, lift=lift)
+        if waits:
+            into.wait(
+                InputWait(
+                    waypoint=0, input=InputKind.STANDARD_DIGITAL, pin=3, value=1.0, timeout=5.0
+                )
+            )
+    return into
+
+
+@pytest.mark.parametrize(
+    'options',
+    [{}, {'simplify': 1e-3}, {'blend': 0.01}, {'lift': 0.02}],
+    ids=['plain', 'simplified', 'with blends', 'lifted'],
+)
+def test_rests_and_waits_stay_at_their_points(options):
+    into = collected(
+        ((0.0, 0.0, 0.0), 0.0, False, False),
+        ((0.01, 0.0, 0.0), 0.5, False, False),
+        ((0.02, 0.0, 0.0), 0.0, False, False),
+        ((0.02, 0.0, 0.0), 0.0, False, False),
+        ((0.03, 0.0, 0.0), 0.0, True, False),
+        ((0.04, 0.0, 0.0), 0.0, False, True),
+        ((0.05, 0.0, 0.0), 0.25, False, False),
+    )
+    goal = goal_of_path(into.path(), ImportOptions(**options), into.remarks).goal
+    x = np.array(goal.waypoints.poses)[:, 0]
+    rests = {round(x[row], 6): dwell for row, dwell in enumerate(goal.segments.dwells) if dwell}
+    assert rests == {0.01: 0.5, 0.05: 0.25}
+    (wait,) = goal.input_waits
+    assert x[wait.waypoint] == pytest.approx(0.03)
+    stops = [row for row in range(len(x)) if round(x[row], 6) in (0.01, 0.03)]
+    assert not goal.segments.blend_radii[stops].any()
+
+
+def test_a_turn_of_a_joint_on_the_spot_stays():
+    into = PathCollector()
+    for line, turn in enumerate((0.0, 0.0, 2.0 * pi), 1):
+        posture = Posture(names=('wrist_3_joint',), values=(turn,))
+        into.add(line, (0.0, 0.0, 0.0), SegmentType.JOINT, posture=posture)
+    goal = goal_of_path(into.path(), ImportOptions(), into.remarks).goal
+    assert [goal.waypoints.postures[row].values for row in (0, 1)] == [(0.0,), (2.0 * pi,)]
+    assert len(goal.waypoints) == 2
 
 
 def test_a_recording_becomes_a_path(tmp_path, robot):

@@ -16,6 +16,8 @@ from ur_cartesian_driver.importing.imported_path import (
     ImportedPath,
     ImportNote,
     ImportNotes,
+    SAME_POINT,
+    SAME_TURN,
 )
 from ur_cartesian_driver.importing.simplification import simplify
 from ur_cartesian_driver.motion.goal import SegmentType
@@ -31,8 +33,6 @@ from ur_cartesian_driver.motion.pose_rows import (
     transform_rows,
 )
 
-#: A point that is as near as this to the one before, and turned as little, is the same one.
-SAME_POINT, SAME_TURN = 5e-6, 1e-4
 #: Farther away is no robot arm: millimetres read as metres, say [m].
 MAX_DISTANCE = 20.0
 #: Straight down, x along y of the frame.
@@ -91,7 +91,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         SegmentRows.plain(len(path)),
         types=path.types,
         blend_radii=_blends(path, options, speeds, remarks),
-        dwells=np.zeros(len(path)),
+        dwells=np.nan_to_num(path.dwells),
         velocities=np.zeros(len(path)) if times.any() else speeds,
         accelerations=np.zeros(len(path)) if times.any() else accelerations,
         vias=vias,
@@ -111,6 +111,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         segments=segments,
         frame_id=options.frame or path.frame,
         io_commands=path.outputs,
+        input_waits=path.waits,
     )
     return ImportedGoal(goal=goal, remarks=remarks.result(), lines=path.lines)
 
@@ -205,8 +206,13 @@ def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
     still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
         angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
     )
+    # An arc that ends where it begins is no arc through a third point; the joints may turn at a
+    # place, and the arm rest there.
     still &= path.types[1:] != SegmentType.CIRCULAR
-    # An arc that ends where it begins is no arc through a third point.
+    for row in rows_where(still):
+        posture = path.postures.get(row + 1)
+        still[row] = posture is None or posture == path.postures.get(row)
+    still &= ~path.rests[1:]
     if not still.any():
         return path
     # Of slow drifts every now and then one point has to stay.
@@ -293,11 +299,10 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
     first = np.cumsum(count) - count  # where the copies of a row begin
     raised = np.zeros(len(order), dtype=bool)
     positions = path.positions[order]
-    outputs = tuple(
-        # What is switched at a point is switched after its last copy, and before the tool goes up.
-        replace(output, waypoint=int(first[output.waypoint] + count[output.waypoint] - 1))
-        for output in path.outputs
-    )
+    last = first + count - 1
+    # What is switched at a point is switched after its last copy, and before the tool goes up.
+    outputs = tuple(replace(o, waypoint=int(last[o.waypoint])) for o in path.outputs)
+    waits = tuple(replace(w, waypoint=int(last[w.waypoint])) for w in path.waits)
     for row in rows:
         up, across = int(first[row]), int(first[row]) + 1
         positions[up] = path.positions[row - 1]
@@ -316,13 +321,13 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
         },
         **{name: getattr(path, name)[order] for name in ('speeds', 'accelerations', 'blends')},
         times=np.full(len(order), np.nan),
+        dwells=np.where(np.isin(np.arange(len(order)), last), path.dwells[order], np.nan),
         lines=np.where(raised, 0, path.lines[order]),
         positions=positions,
         quaternions=lifted,
-        postures={
-            int(first[row] + count[row] - 1): posture for row, posture in path.postures.items()
-        },
+        postures={int(last[row]): posture for row, posture in path.postures.items()},
         outputs=outputs,
+        waits=waits,
     )
 
 
@@ -349,6 +354,7 @@ def _blends(
 ) -> Floats:
     """Return radii (n,) that fit between the points; where none fits the arm stops."""
     radii = np.where(np.isnan(path.blends), options.blend, path.blends)
+    radii[path.rests] = 0.0
     radii[-1] = 0.0
     if len(path) < 2:
         return radii
@@ -367,6 +373,6 @@ def _blends(
     for row in rows_where((radii > 0.0) & (fits == 0.0)):
         remarks.add(int(path.lines[row]), 'blend', 'none fits, the arm stops there')
     stops = int((fits[:-1] == 0.0).sum())
-    if stops and not options.blend:
+    if stops and not options.blend and np.isnan(path.blends).any():
         remarks.add(0, f'the arm stops at {stops} inner points', 'give a blend if it should not')
     return fits

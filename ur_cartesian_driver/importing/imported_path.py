@@ -15,7 +15,13 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import ArcMode, IOCommand, Posture, SegmentType
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    InputWait,
+    IOCommand,
+    Posture,
+    SegmentType,
+)
 from ur_cartesian_driver.motion.pose_rows import Floats
 from ur_cartesian_driver.motion.vectors import Vector3
 
@@ -28,8 +34,11 @@ _OPTIONAL = {
     'accelerations': 1,
     'blends': 1,
     'times': 1,
+    'dwells': 1,
 }
 UNKNOWN3: Vector3 = (nan, nan, nan)
+#: A point that is as near as this to the one before, and turned as little, is the same one.
+SAME_POINT, SAME_TURN = 5e-6, 1e-4
 
 
 class BrokenFile(ValueError):
@@ -131,14 +140,24 @@ class ImportedPath:
     accelerations: Floats
     blends: Floats
     times: Floats
+    #: (n,) how long the arm rests at the point.
+    dwells: Floats
     #: By row.
     postures: Mapping[int, Posture] = field(default_factory=dict)
     outputs: tuple[IOCommand, ...] = ()
+    waits: tuple[InputWait, ...] = ()
     frame: str = ''
 
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.positions)
+
+    @property
+    def rests(self) -> NDArray[np.bool_]:
+        """At which points (n,) the arm rests for a time, or waits for an input."""
+        found = self.dwells > 0.0
+        found[[wait.waypoint for wait in self.waits]] = True
+        return found
 
     def take(self, rows: NDArray[np.int64]) -> ImportedPath:
         """Return rows, in rising order; outputs of a row that is gone move to the one before."""
@@ -154,6 +173,7 @@ class ImportedPath:
                 )
                 for output in self.outputs
             ),
+            waits=tuple(replace(wait, waypoint=new_row[wait.waypoint]) for wait in self.waits),
         )
 
 
@@ -176,6 +196,7 @@ class PathCollector:
         self._postures: dict[int, Posture] = {}
         self._outputs: list[IOCommand] = []
         self._left_out: set[int] = set()
+        self._waits: list[InputWait] = []
         self.remarks = ImportNotes()
         self.frame = ''
 
@@ -200,6 +221,7 @@ class PathCollector:
         acceleration: float | None = None,
         blend: float | None = None,
         time: float | None = None,
+        dwell: float | None = None,
     ) -> None:
         """Add a point; the fields are those of :class:`ImportedPath`, None = unknown."""
         row = len(self._positions)
@@ -213,6 +235,7 @@ class PathCollector:
             ('accelerations', acceleration),
             ('blends', blend),
             ('times', time),
+            ('dwells', dwell),
         ):
             if value is not None:
                 self._optional[name][row] = value
@@ -228,6 +251,10 @@ class PathCollector:
         self._left_out.update(rows)
         for row in rows:
             self.remarks.add(self._plain[row][0], what, why)
+
+    def wait(self, wait: InputWait) -> None:
+        """Wait at the newest point."""
+        self._waits.append(replace(wait, waypoint=len(self) - 1))
 
     def path(self) -> ImportedPath:
         """
@@ -251,6 +278,7 @@ class PathCollector:
             **{name: self._column(name) for name in _OPTIONAL},
             postures=self._postures,
             outputs=tuple(self._outputs),
+            waits=tuple(self._waits),
             frame=self.frame,
         )
         if not self._left_out:

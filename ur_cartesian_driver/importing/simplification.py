@@ -74,8 +74,7 @@ def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> Impo
 
 def _ends_of_runs(path: ImportedPath) -> list[int]:
     """Return the rows that have to stay, beside the first: between them are equal lines."""
-    n = len(path)
-    stays = np.zeros(n, dtype=bool)
+    stays = path.rests
     stays[-1] = True
     lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
     stays |= ~lines
