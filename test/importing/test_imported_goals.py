@@ -74,6 +74,22 @@ def test_a_file_of_each_format_is_planned(tmp_path, robot, name):
     assert len(planned(found.goal, robot).segments) == len(found.goal.waypoints)
 
 
+def test_a_program_with_stops_is_planned(tmp_path, robot):
+    """Outputs around a wait, rests, a time, and turns of the tool and of a joint on the spot."""
+    (tmp_path / 'stops.script').write_text(
+        'movej([0.1, -1.5, 1.5, -1.5, -1.5, 0])\nset_digital_out(1, True)\n'
+        'while not get_digital_in(3): sync() end\nsleep(0.5)\nset_digital_out(1, False)\n'
+        'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]), t=2)\n'
+        'set_analog_out(0, 0.4)\nsleep(1)\n'
+        'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0, 0, 0, 0.5]))\n'
+        'q = get_joint_positions()\nmovej([q[0], q[1], q[2], q[3], q[4], q[5] + d2r(360)])\n'
+    )
+    goal = import_file(tmp_path / 'stops.script').goal
+    segments = planned(goal, robot).segments
+    assert len(segments) == len(goal.waypoints) + 3  # the wait, and two rests
+    assert float(segments[3].duration) == pytest.approx(2.0, abs=1e-6)
+
+
 @pytest.mark.parametrize('name', ['a.nc', 'a.script'])
 def test_an_imported_path_is_carried_out(tmp_path, robot, name):
     (tmp_path / name).write_text(FILES[name])

@@ -19,7 +19,6 @@ from ur_cartesian_driver.importing import (
     csv_file,
     recording_file,
     ros_messages_file,
-    urscript_file,
 )
 from ur_cartesian_driver.importing.dxf import dxf_file
 from ur_cartesian_driver.importing.gcode import gcode_file
@@ -33,6 +32,7 @@ from ur_cartesian_driver.importing.import_options import (
 )
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
+from ur_cartesian_driver.importing.script import urscript_file
 
 __all__ = [
     'FORMATS',

@@ -1,0 +1,125 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where the arm is while a program runs, as far as the file tells.
+
+Before the first move nobody knows it, and after lines alone nobody knows the joints. Most programs
+never ask for them, so inverse kinematics waits until one does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ur_cartesian_driver.importing.import_options import ImportOptions
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.urscript import RuntimeException, to_text, Value
+from ur_cartesian_driver.urscript.script_values import ScriptPose
+
+
+class ArmPlace:
+    """The place, kept also in the motion generator that the functions of the controller read."""
+
+    def __init__(self, controller: Controller, options: ImportOptions) -> None:
+        """Begin where nobody knows."""
+        self._motion, self._arm = controller.motion, options.arm
+        self._model = options.arm.model.name
+        self._motion.T_flange_tcp = options.T_flange_tcp
+        #: Whether the pose, and the joints, follow from the file.
+        self.is_known = self.knows_joints = False
+        #: The last pose of the tool, and its TCP; None = that of the joints.
+        self._last: tuple[Pose, Pose] | None = None
+        #: Poses of the flange since the joints were asked for last.
+        self._flange_poses: list[Pose] = []
+        #: The lines of the calls that set a TCP, and their poses as text.
+        self.set_tcps: dict[Pose, tuple[int, str]] = {}
+        #: Joint positions that a program has asked for by a pose, which is the same on any arm.
+        self.solutions: set[tuple[Value, ...]] = set()
+
+    @property
+    def tcp(self) -> Pose:
+        """The active TCP."""
+        return self._motion.T_flange_tcp
+
+    @property
+    def pose(self) -> Pose:
+        """The pose of the active TCP."""
+        if self._last is None:
+            return self._motion.T_base_tcp
+        pose, tcp = self._last
+        return pose if tcp == self.tcp else pose @ tcp.inverse() @ self.tcp
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the joints are those of the last pose."""
+        return not self._flange_poses
+
+    def of_arm(self, tcp: Pose) -> str:
+        """Return what the places of joint positions depend on."""
+        return f'their places are those of a {self._model} with the TCP {_text(tcp)}'
+
+    def forward(self, q: Vector6, tcp: Pose) -> Pose:
+        """Return the pose of a TCP at joint positions."""
+        return self._arm.forward(q) @ tcp
+
+    def go_to(self, pose: Pose) -> None:
+        """Put the tool to a pose."""
+        self._last = pose, self.tcp
+        self._flange_poses.append(pose @ self.tcp.inverse())
+        self.is_known = True
+
+    def turn_to(self, q: Vector6) -> None:
+        """Put the arm to joint positions."""
+        self._motion.teleport(q)
+        self._last = None
+        self._flange_poses.clear()
+        self.is_known = self.knows_joints = True
+
+    def joints(self) -> Vector6:
+        """
+        Return the joints, each pose as near to the one before as can be.
+
+        :raises RuntimeException: the arm cannot reach a pose.
+        """
+        for pose in self._flange_poses:
+            self._motion.teleport(self.solution(pose @ self.tcp, self._motion.q))
+        self._flange_poses.clear()
+        return self._motion.q
+
+    def solution(self, pose: Pose, near: Vector6) -> Vector6:
+        """
+        Return the joints for a pose that are nearest to others.
+
+        :raises RuntimeException: there are none.
+        """
+        q = nearest(self._arm, pose @ self.tcp.inverse(), near)
+        if q is None:
+            raise RuntimeException(self.unreachable(_text(pose)))
+        return q
+
+    def unreachable(self, pose: str) -> str:
+        """Return the clause about a pose that the arm cannot reach."""
+        return (
+            f'a {self._model} cannot reach {pose} with the TCP {_text(self.tcp)}; name your arm '
+            'and its TCP in the options'
+        )
+
+    def assumption(self, say: Callable[[str], None], *, of_joints: bool) -> None:
+        """Say what is taken for a place that the file does not tell."""
+        if not self.is_known:
+            say(
+                'where the arm stands before its first move is not in the file; '
+                f'{_text(self.pose)} of a {self._model} is taken'
+            )
+        elif of_joints and not self.knows_joints:
+            say(
+                'the joints before a move to joint positions are not in the file; those of a '
+                f'{self._model} that are nearest to its home are taken'
+            )
+
+
+def _text(pose: Pose) -> str:
+    return to_text(ScriptPose(*pose.rotation_vector()))

@@ -1,0 +1,265 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The moves of programs: each method is a function of theirs, and its target is a point.
+
+A move is done at once, and takes a cycle.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ur_cartesian_driver.importing.imported_path import SAME_POINT, SAME_TURN
+from ur_cartesian_driver.importing.script.collected_events import (
+    CollectedEvents,
+    CollectedPoint,
+    Steps,
+)
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.sim.builtins.arguments import (
+    is_pose,
+    not_negative,
+    number,
+    one_of,
+    positive,
+    six,
+)
+from ur_cartesian_driver.sim.builtins.arguments import (
+    pose as pose_argument,
+)
+from ur_cartesian_driver.sim.motion.motion_generator import (
+    DEFAULT_JOINT_ACCELERATION as JOINT_A,
+)
+from ur_cartesian_driver.sim.motion.motion_generator import (
+    DEFAULT_JOINT_SPEED as JOINT_V,
+)
+from ur_cartesian_driver.sim.simulator_config import TURN_RATIO
+from ur_cartesian_driver.urscript import RuntimeException
+from ur_cartesian_driver.urscript.script_values import Value
+
+#: Defaults of the manual for the tool [m/s^2, m/s], and for fractions of what the arm can do.
+TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
+#: Larger numbers are millimetres or degrees [m], [rad].
+FAR, MAX_ANGLE = 3.0, 12.6
+#: Joints that turn less stand still [rad].
+SAME_ANGLE = 1e-6
+
+#: Acceleration and speed, as a program gives them.
+Rates = tuple[Value, Value]
+
+
+class MoveFunctions:
+    """Moves and stops."""
+
+    def __init__(self, events: CollectedEvents) -> None:
+        """Collect into these events."""
+        self._events, self._place, self._run = events, events.place, events.run
+
+    def movej(
+        self, q: Value, a: Value = JOINT_A, v: Value = JOINT_V, t: Value = 0, r: Value = 0
+    ) -> Steps:
+        """Collect a joint motion."""
+        yield from self._joints('movej', SegmentType.JOINT, q, (a, v), t, r)
+
+    def optimovej(
+        self, goal: Value, a: Value = FRACTION, v: Value = FRACTION, r: Value = 0
+    ) -> Steps:
+        """Collect a joint motion with limited jerk."""
+        yield from self._joints('optimovej', SegmentType.OPTIMIZED_JOINT, goal, (a, v), 0, r)
+
+    def movel(
+        self, pose: Value, a: Value = TOOL_A, v: Value = TOOL_V, t: Value = 0, r: Value = 0
+    ) -> Steps:
+        """Collect a line."""
+        yield from self._line('movel', SegmentType.LINEAR, pose, (a, v), t, r)
+
+    def movep(self, pose: Value, a: Value = TOOL_A, v: Value = TOOL_V, r: Value = 0) -> Steps:
+        """Collect a line of a process."""
+        yield from self._line('movep', SegmentType.PROCESS, pose, (a, v), 0, r)
+
+    def optimovel(
+        self, goal: Value, a: Value = FRACTION, v: Value = FRACTION, r: Value = 0
+    ) -> Steps:
+        """Collect a line with limited jerk."""
+        yield from self._line('optimovel', SegmentType.OPTIMIZED_LINEAR, goal, (a, v), 0, r)
+
+    def movec(
+        self,
+        pose_via: Value,
+        pose_to: Value,
+        a: Value = TOOL_A,
+        v: Value = TOOL_V,
+        r: Value = 0,
+        mode: Value = 0,
+    ) -> Steps:
+        """Collect an arc."""
+        self._events.take()
+        if not self._place.is_known:
+            raise RuntimeException(
+                'movec is the first move, and where its arc begins is not in the file; put a move '
+                'to its beginning before it'
+            )
+        target = self._pose('movec', pose_to)
+        self._events.add(
+            CollectedPoint(
+                kind=SegmentType.CIRCULAR,
+                pose=target,
+                via=self._pose('movec', pose_via),
+                arc_mode=ArcMode(one_of(mode, 'mode', (0, 1))),
+                acceleration=positive(a, 'a'),
+                speed=positive(v, 'v'),
+                blend=not_negative(r, 'r'),
+            )
+        )
+        self._place.go_to(target)
+        yield from self._events.moved()
+
+    def stopj(self, a: Value) -> Steps:
+        """Make the last point a stop."""
+        yield from self._stop(a)
+
+    def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
+        """Make the last point a stop."""
+        yield from self._stop(a)
+
+    def set_pos(self, q: Value) -> None:
+        """Put the arm to joint positions, as only a simulated robot does."""
+        self._place.turn_to(six(q, 'q'))
+
+    def _stop(self, a: Value) -> Steps:
+        positive(a, 'a')
+        self._events.take()
+        self._events.stop()
+        yield from self._events.moved()
+
+    def _joints(
+        self, name: str, kind: SegmentType, q: Value, rates: Rates, t: Value, r: Value
+    ) -> Steps:
+        self._events.take()
+        place, blend, time = self._place, not_negative(r, 'r'), not_negative(t, 't')
+        joints: Vector6 | None
+        if is_pose(q):
+            pose: Pose | None = self._pose(name, q)
+            assert pose is not None
+            joints = place.solution(pose, place.joints()) if place.knows_joints else None
+        else:
+            pose, joints = None, self._angles(name, six(q, 'q'))
+        length = None
+        # Joints that nobody has asked for take inverse kinematics of all poses since.
+        if (
+            joints is not None
+            and place.knows_joints
+            and (time > 0.0 or place.is_settled or self._is_here(place.forward(joints, place.tcp)))
+        ):
+            length = max(abs(a - b) for a, b in zip(joints, place.joints(), strict=True))
+        if length is not None and length < SAME_ANGLE and self._events.last is not None:
+            self._run.say('a point', 'it is where the one before is')
+        else:
+            a, v = self._rates(name, rates, length, time, blend, (JOINT_A, JOINT_V))
+            self._events.add(
+                CollectedPoint(
+                    kind=kind,
+                    pose=pose if joints is None else None,
+                    joints=joints,
+                    acceleration=a,
+                    speed=v,
+                    blend=blend,
+                )
+            )
+        if joints is not None:
+            place.turn_to(joints)
+        elif pose is not None:
+            place.go_to(pose)
+        yield from self._events.moved()
+
+    def _line(
+        self, name: str, kind: SegmentType, pose: Value, rates: Rates, t: Value, r: Value
+    ) -> Steps:
+        self._events.take()
+        target, blend, time = self._pose(name, pose), not_negative(r, 'r'), not_negative(t, 't')
+        if self._is_here(target) and self._events.last is not None:
+            self._run.say('a point', 'it is where the one before is')
+        else:
+            length, unit = None, 1.0
+            if self._place.is_known:
+                here = self._place.pose
+                length = max(here.distance_to(target), here.angle_to(target) / TURN_RATIO)
+                if kind is SegmentType.LINEAR and here.distance_to(target) < SAME_POINT:
+                    # The tool only turns: a goal counts in rad, and the robot 4 rad as a metre.
+                    unit = TURN_RATIO
+            a, v = self._rates(name, rates, length, time, blend, (TOOL_A, TOOL_V))
+            self._events.add(
+                CollectedPoint(
+                    kind=kind, pose=target, acceleration=unit * a, speed=unit * v, blend=blend
+                )
+            )
+        self._place.go_to(target)
+        yield from self._events.moved()
+
+    def _is_here(self, pose: Pose) -> bool:
+        """Tell whether a pose is where the tool is known to be."""
+        here = self._place.pose
+        return (
+            self._place.is_known
+            and here.distance_to(pose) < SAME_POINT
+            and here.angle_to(pose) < SAME_TURN
+        )
+
+    def _rates(
+        self,
+        name: str,
+        rates: Rates,
+        length: float | None,
+        time: float,
+        blend: float,
+        defaults: tuple[float, float],
+    ) -> tuple[float, float]:
+        """
+        Return acceleration and speed; with a time those by which the move takes it.
+
+        The robot stretches the trapezoid of `a` and `v` to the time, as recordings of a UR3 show.
+        """
+        if time == 0.0:
+            return positive(rates[0], 'a'), positive(rates[1], 'v')
+        given = number(rates[0], 'a'), number(rates[1], 'v')
+        a, v = (
+            value if value > 0.0 else default
+            for value, default in zip(given, defaults, strict=True)
+        )
+        if length is None:
+            self._run.say(
+                f't of {name}()', 'where the move begins is not in the file; a and v count'
+            )
+            return a, v
+        last = self._events.last
+        if blend > 0.0 or (last is not None and last.blend > 0.0):
+            self._run.say(f't of {name}()', 'with a blend the time is kept only roughly')
+        shortest = length / v + v / a if length * a > v * v else 2.0 * sqrt(length / a)
+        stretch = shortest / time
+        return a * stretch * stretch, v * stretch
+
+    def _pose(self, name: str, value: Value) -> Pose:
+        """Return a target; of joint positions the pose that they reach."""
+        if not is_pose(value):
+            tcp = self._place.tcp
+            self._run.say('joint positions', self._place.of_arm(tcp))
+            return self._place.forward(self._angles(name, six(value, 'pose')), tcp)
+        target = pose_argument(value, 'pose')
+        farthest = max(target.position, key=abs)
+        if abs(farthest) > FAR:
+            raise RuntimeException(
+                f'{name} leads {farthest:g} m away; lengths are in metres, 0.4 is 400 mm'
+            )
+        return target
+
+    @staticmethod
+    def _angles(name: str, q: Vector6) -> Vector6:
+        farthest = max(q, key=abs)
+        if abs(farthest) > MAX_ANGLE:
+            raise RuntimeException(
+                f'{name} leads a joint to {farthest:g} rad; angles are in radians, d2r() converts'
+            )
+        return q

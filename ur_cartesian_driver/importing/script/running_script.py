@@ -1,0 +1,61 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The program that runs: its line and thread, and what is said about it."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.importing.imported_path import ImportNotes
+from ur_cartesian_driver.importing.script.script_terms import ASSUMED
+from ur_cartesian_driver.urscript import ScriptInterpreter, ThreadHandle
+
+#: The main thread of a program.
+MAIN = 0
+
+
+class RunningScript:
+    """The program, as its functions see it."""
+
+    def __init__(self) -> None:
+        """Begin before the program is compiled."""
+        self.interpreter: ScriptInterpreter | None = None
+        #: The function that was called last of those whose value is another one on a robot.
+        self._assumed = ''
+        #: By reason: what is said for it, and the lines.
+        self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
+
+    @property
+    def line(self) -> int:
+        """The line of the running call; 0 = none."""
+        return 0 if self.interpreter is None else self.interpreter.location[0]
+
+    @property
+    def thread(self) -> int:
+        """The number of the running thread."""
+        number = None if self.interpreter is None else self.interpreter.current_thread
+        return number if isinstance(number, int) else MAIN
+
+    def lives(self, thread: int) -> bool:
+        """Tell whether a thread has not ended."""
+        return self.interpreter is not None and self.interpreter.alive(ThreadHandle(thread))
+
+    def say(self, what: str, why: str) -> None:
+        """Say something about the line that runs; what has the same reason is said together."""
+        names, lines = self._said.setdefault(why, ({}, set()))
+        names[what] = None
+        lines.add(self.line)
+
+    def leave_out(self, what: str, why: str) -> None:
+        """Say that a function has not the effect or the value that it has on a robot."""
+        if why in ASSUMED:
+            self._assumed = f'{what} of line {self.line} has no robot or machine to ask here'
+        self.say(what, why)
+
+    def suspicion(self, before: str) -> str:
+        """Return why a program may fail or not end, behind some text; empty if nobody knows."""
+        return f'{before}{self._assumed}' if self._assumed else ''
+
+    def tell(self, remarks: ImportNotes) -> None:
+        """Add all that was said to the remarks of the import."""
+        for why, (names, lines) in self._said.items():
+            for line in lines:
+                remarks.add(line, ', '.join(names), why)

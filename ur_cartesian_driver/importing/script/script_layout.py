@@ -1,0 +1,209 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The program in a file, whatever stands around it, and its loops that nothing here would end.
+
+Files hold one program, as a controller takes it; functions and statements, as PolyScope reads them
+into a program of its own; a program with a call of it behind; or only functions. A loop without an
+end gets a call of :data:`END_OF_ROUND`, a loop that waits for an input becomes a call of
+:data:`WAIT`: functions with names that no program can write.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+import re
+from typing import Any
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile
+from ur_cartesian_driver.importing.script.script_terms import TERMS
+from ur_cartesian_driver.urscript import CompileError, parse_line, ScriptProgram
+from ur_cartesian_driver.urscript.parsing.syntax_tree import (
+    AssignStatement,
+    BinaryExpression,
+    BreakStatement,
+    CallArgument,
+    CallExpression,
+    CallStatement,
+    children,
+    ConstantExpression,
+    ContinueStatement,
+    Expression,
+    FunctionDefinition,
+    HaltStatement,
+    LabelStatement,
+    PauseStatement,
+    ReturnStatement,
+    Statement,
+    SyntaxNode,
+    UnaryExpression,
+    WhileStatement,
+)
+from ur_cartesian_driver.urscript.script_values import truth
+
+END_OF_ROUND, WAIT, PAUSE = ' end of round', ' wait', ' pause'
+
+#: The first statement, if it is a secondary program.
+_SECONDARY = re.compile(r'(?:\s|#.*\n)*(sec)\s+\w+\s*\(')
+#: Nodes without statements in them.
+_SIMPLE = (Expression, CallStatement, AssignStatement, LabelStatement)
+#: Inputs that a program can wait for.
+_INPUTS = (
+    'get_standard_digital_in',
+    'get_configurable_digital_in',
+    'get_tool_digital_in',
+    'get_digital_in',
+)
+
+
+def parsed(text: str) -> ScriptProgram:
+    """
+    Return the program of a file.
+
+    :raises BrokenFile: there is none, or a word that fits no rule.
+    """
+    if secondary := _SECONDARY.match(text):
+        line = text.count('\n', 0, secondary.start(1)) + 1
+        raise BrokenFile(line, f'sec: {TERMS["sec"].reason}')
+    try:
+        found = parse_line(text)
+    except CompileError as error:
+        raise BrokenFile(max(1, error.line), f'this is no URScript: {error.reason}') from None
+    return replace(found, body=tuple(map(_without_waiting, _main(found))))
+
+
+def _main(program: ScriptProgram) -> tuple[Statement, ...]:
+    """Return the statements of the main program."""
+    functions = [
+        node
+        for node in program.body
+        if isinstance(node, FunctionDefinition) and node.kind == 'def'
+    ]
+    statements = [
+        node
+        for node in program.body
+        if not isinstance(node, FunctionDefinition | LabelStatement | AssignStatement)
+    ]
+    if not functions:
+        return program.body
+    if len(functions) == 1 and not functions[0].parameters:
+        # A controller takes the definition as the program, whose variables are global.
+        only = functions[0]
+        if not statements or (len(statements) == 1 and _calls(statements[0]) == [only.name]):
+            others = (node for node in program.body if node not in (only, *statements))
+            return (*others, *only.body)
+    if statements:
+        return program.body
+    return *program.body, _call(_only_root(functions))
+
+
+def _only_root(functions: list[FunctionDefinition]) -> FunctionDefinition:
+    """
+    Return the only function that no other one calls, if it has no parameters.
+
+    :raises BrokenFile: it has, or there is none or more than one.
+    """
+    called = {name for function in functions for node in function.body for name in _calls(node)}
+    roots = [function for function in functions if function.name not in called]
+    if len(roots) == 1 and not roots[0].parameters:
+        return roots[0]
+    named = ', '.join(
+        f'{function.name}({", ".join(parameter.name for parameter in function.parameters)})'
+        for function in functions[:5]
+    )
+    more = f' and {len(functions) - 5} more' if len(functions) > 5 else ''
+    example = (roots or functions)[0]
+    values = ', with values' if example.parameters else ''
+    raise BrokenFile(
+        functions[0].line,
+        f'the file only defines functions, {named}{more}, and calls none; add a call of '
+        f'{example.name} at its end{values}',
+    )
+
+
+def _calls(node: SyntaxNode) -> list[str]:
+    """Return the names of all functions that a statement calls."""
+    own = [node.function] if isinstance(node, CallExpression) else []
+    return own + [name for child in children(node) for name in _calls(child)]
+
+
+def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
+    """Return a call in the place of a node, of its own function if no other is named."""
+    place = {'line': node.line, 'column': node.column}
+    given = tuple(CallArgument(name=None, value=value, **place) for value in arguments)
+    return CallStatement(
+        call=CallExpression(function=name or node.name, arguments=given, **place), **place
+    )
+
+
+def _without_waiting(node: SyntaxNode) -> Any:
+    """Return a statement whose loops end, and that waits for nobody."""
+    if isinstance(node, PauseStatement):
+        return _call(node, PAUSE)
+    if isinstance(node, WhileStatement):
+        if (wait := _input_wait(node)) is not None:
+            return wait
+        if _is_endless(node):
+            node = replace(node, body=(*node.body, _call(node, END_OF_ROUND)))
+    elif isinstance(node, _SIMPLE):
+        return node
+    changed: dict[str, Any] = {}
+    for field in fields(node):
+        value = getattr(node, field.name)
+        if isinstance(value, tuple) and value and isinstance(value[0], SyntaxNode):
+            new = tuple(map(_without_waiting, value))
+            if any(a is not b for a, b in zip(new, value, strict=True)):
+                changed[field.name] = new
+    return replace(node, **changed) if changed else node
+
+
+def _is_endless(loop: WhileStatement) -> bool:
+    """Tell whether a loop has a constant condition, and nothing in it that ends it."""
+    condition = loop.condition
+    return (
+        isinstance(condition, ConstantExpression)
+        and truth(condition.value)
+        and not any(_may_end(statement) for statement in loop.body)
+    )
+
+
+def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
+    """Tell whether a statement can leave the loop around it, or begin its next round."""
+    if isinstance(node, FunctionDefinition):
+        return False
+    if isinstance(node, HaltStatement | ReturnStatement):
+        return True
+    if isinstance(node, BreakStatement | ContinueStatement):
+        return not in_loop
+    inner = in_loop or isinstance(node, WhileStatement)
+    return any(_may_end(child, inner) for child in children(node))
+
+
+def _input_wait(loop: WhileStatement) -> CallStatement | None:
+    """Return the call in place of a loop that only waits for a digital input."""
+    for statement in loop.body:
+        call = statement.call if isinstance(statement, CallStatement) else None
+        waits = isinstance(call, CallExpression) and call.function in ('sync', 'sleep')
+        if not waits and not isinstance(statement, LabelStatement):
+            return None
+    read, level = _input_level(loop.condition)
+    if read is None or read.function not in _INPUTS or len(read.arguments) != 1:
+        return None
+    name, awaited = (
+        ConstantExpression(value=value, line=loop.line, column=loop.column)
+        for value in (read.function, not level)
+    )
+    return _call(loop, WAIT, name, read.arguments[0].value, awaited)
+
+
+def _input_level(condition: Expression) -> tuple[CallExpression | None, bool]:
+    """Return the call that a condition asks, and with which of its values the condition holds."""
+    if isinstance(condition, UnaryExpression) and condition.operator == 'not':
+        read, level = _input_level(condition.operand)
+        return read, not level
+    if isinstance(condition, BinaryExpression) and condition.operator in ('==', '!='):
+        for side, other in ((condition.left, condition.right), (condition.right, condition.left)):
+            if isinstance(other, ConstantExpression) and type(other.value) is bool:
+                read, level = _input_level(side)
+                return read, level is (other.value is (condition.operator == '=='))
+    return (condition if isinstance(condition, CallExpression) else None), True

@@ -1,0 +1,99 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+URScript: the program runs in our interpreter, on an arm that is at each target at once.
+
+So variables, loops, functions and poses relative to others are done as the controller does them,
+and what a move leads to is collected. Nothing waits for the arm or for a person: a program reads
+the inputs of an arm without anything connected.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ur_cartesian_driver.importing.import_format import ImportFormat
+from ur_cartesian_driver.importing.import_options import ImportOptions
+from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
+from ur_cartesian_driver.importing.script.arm_place import ArmPlace
+from ur_cartesian_driver.importing.script.collected_events import CollectedEvents
+from ur_cartesian_driver.importing.script.program_functions import NoPeer, ProgramFunctions
+from ur_cartesian_driver.importing.script.running_script import RunningScript
+from ur_cartesian_driver.importing.script.script_layout import parsed
+from ur_cartesian_driver.importing.script.script_terms import TERMS
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
+from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.urscript import CompileError, ScriptInterpreter
+from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEEDED
+
+#: A program that takes longer does not end: cycles, points, and nodes of the syntax tree.
+MAX_CYCLES, MAX_POINTS, MAX_NODES = 100_000, 100_000, 10_000_000
+#: What a thread may compute between two moves. A row of statements counts as a whole, and that of
+#: a sliced part is long.
+MAX_NODES_AT_ONCE = 5_000_000
+
+
+def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) -> None:
+    """
+    Run a program and collect its moves.
+
+    :raises BrokenFile: it is no program, fails, or does not end.
+    """
+    # Ends of lines other than LF would change the numbers of lines.
+    program = parsed('\n'.join(file_lines(file_text(file))))
+    arm = options.arm
+    controller = Controller(
+        SimulatorConfig(model=arm.model.name, geometry=arm.geometry), controller_builtins, NoPeer()
+    )
+    run = RunningScript()
+    events = CollectedEvents(run, ArmPlace(controller, options))
+    try:
+        run.interpreter = interpreter = ScriptInterpreter(
+            program,
+            ProgramFunctions(events, controller).by_name(),
+            instruction_budget=MAX_NODES_AT_ONCE,
+            total_budget=MAX_NODES,
+        )
+    except CompileError as error:
+        reason = error.reason
+        if 'name_not_found' in error.text:
+            reason += '; what the installation or another file defines has to be in this one'
+        raise BrokenFile(max(1, error.line), reason) from None
+    line = 0
+    for _ in range(MAX_CYCLES):
+        interpreter.step()
+        # The clock, for programs that wait; nothing moves.
+        controller.cycles += 1
+        line = interpreter.main_location[0]
+        if interpreter.error is not None:
+            line, text = interpreter.error.line, interpreter.error.text.rstrip('.')
+            if interpreter.error.text == BUDGET_EXCEEDED:
+                break
+            suspicion = run.suspicion('; ') if 'nan' in text or 'none' in text else ''
+            raise BrokenFile(line, text + suspicion)
+        if not interpreter.running:
+            run.tell(into.remarks)
+            events.hand_over(into)
+            return
+        if len(events) > MAX_POINTS:
+            raise BrokenFile(
+                line,
+                f'there are more than {MAX_POINTS:,} points and outputs up to here, and a goal '
+                'has fewer; split the program, or take out a loop that does not end'
+                f'{run.suspicion(": ")}',
+            )
+    raise BrokenFile(
+        line,
+        f'the loop around this line does not end{run.suspicion(": ")}; take it out',
+    )
+
+
+FORMAT = ImportFormat(
+    name='urscript',
+    suffixes=('.script', '.urscript'),
+    terms=TERMS,
+    others='Every other function refuses the file, unless the file defines it.',
+    collect=collect_urscript,
+)
