@@ -12,7 +12,8 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
     the driver's node, connected to ``ur_sim`` and ready for goals; add it to an executor of your
     own, nothing spins it. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
 ``private_ros_graph``
-    isolates the nodes of a test run from all others; ``cartesian_driver`` uses it.
+    isolates the nodes of a test run from all others; ``cartesian_driver`` uses it. A test is
+    refused while rclpy runs in another domain: its goals could reach a robot.
 
 pytest imports this module in every project of the environment. So it costs next to nothing: heavy
 imports stand in the fixtures.
@@ -25,6 +26,7 @@ import contextlib
 import fcntl
 import os
 from pathlib import Path
+import sys
 import tempfile
 from typing import Any, TYPE_CHECKING
 
@@ -52,6 +54,14 @@ def pytest_configure(config: pytest.Config) -> None:
     )
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> None:
+    """Check the domain of tests with nodes of their own, once their fixtures are there."""
+    domain = getattr(item, 'funcargs', {}).get('private_ros_graph')
+    if domain is not None:
+        _check_domain(domain)
+
+
 @pytest.fixture
 def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
     """Yield a simulated robot that listens on free ports, in a thread of this process."""
@@ -67,7 +77,13 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
     go to a temporary folder. Discovery range and log folder are kept if they are set already.
     """
     with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as environment:
-        domain = next(d for d in DOMAINS if _lock_domain(d, stack))
+        domain = next((d for d in DOMAINS if _lock_domain(d, stack)), None)
+        if domain is None:
+            pytest.fail(
+                f'other test runs use all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]}; wait '
+                'for them to end',
+                pytrace=False,
+            )
         for name, value in {
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
             'ROS_LOG_DIR': str(tmp_path_factory.mktemp('ros_log')),
@@ -89,6 +105,22 @@ def _lock_domain(domain: int, stack: contextlib.ExitStack) -> bool:
     return True
 
 
+def _check_domain(domain: int) -> None:
+    """Fail a test whose nodes would be in another domain than the private one."""
+    if 'rclpy' not in sys.modules:
+        return
+    from rclpy.utilities import get_default_context
+
+    context = get_default_context()
+    if context.ok() and (other := context.get_domain_id()) != domain:
+        pytest.fail(
+            f'rclpy runs in ROS domain {other} and not in the private one, {domain}, so the nodes '
+            'of this test could reach robots; let the fixture that calls rclpy.init() request '
+            'private_ros_graph and name no domain, or call rclpy.shutdown() before',
+            pytrace=False,
+        )
+
+
 @pytest.fixture
 def cartesian_driver(
     request: pytest.FixtureRequest, private_ros_graph: int, ur_sim: SimulatedRobot
@@ -99,6 +131,7 @@ def cartesian_driver(
 
     from ur_cartesian_driver.ros import CartesianDriverNode
 
+    _check_domain(private_ros_graph)
     parameters: dict[str, Any] = {
         'robot_ip': ur_sim.config.host,
         'ur_type': ur_sim.config.model,
