@@ -11,6 +11,7 @@ from ur_cartesian_driver.importing import BrokenFile, import_file, ImportedGoal,
 
 #: Characters that mean something in one format or another, and some that mean nothing in any.
 _CHARACTERS = '0123456789.,;:-+eE \t\n"\'()[]{}#%=/*_<>&|!xyzGMNFSTO\0\x0c\x85\u2028\u00b0\u20ac'
+_WORD = re.compile(r'[A-Za-z_]\w*|[-+]?\d+\.?\d*')
 #: What a sentence names the place by.
 _PLACE = re.compile(r'^(line|row|packet|point|entity) \w+: ')
 #: Faults of a whole file, which no line is to blame for.
@@ -27,7 +28,7 @@ def broken(files: Sequence[str], random: Random) -> str:
         if not text:
             break
         at = random.randrange(len(text))
-        fault = random.randrange(7)
+        fault = random.randrange(9)
         if fault == 0:  # cut off
             text = text[:at]
         elif fault == 1:  # the middle is missing
@@ -43,6 +44,11 @@ def broken(files: Sequence[str], random: Random) -> str:
             lines = text.split('\n')
             del lines[random.randrange(len(lines))]
             text = '\n'.join(lines)
+        elif fault < 7:  # another word or number
+            here, there = (list(_WORD.finditer(each)) for each in (text, random.choice(files)))
+            if here and there:
+                begin, end = random.choice(here).span()
+                text = text[:begin] + random.choice(there)[0] + text[end:]
         else:  # a character
             text = text[:at] + random.choice(_CHARACTERS) + text[at + random.randint(0, 1) :]
     return text
