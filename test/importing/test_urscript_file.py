@@ -343,7 +343,8 @@ def test_an_output_of_a_thread_beside_the_moves_is_left_out(tmp_path):
 def test_the_main_thread_rests_and_switches_behind_one_that_moves(tmp_path):
     text = (
         f'thread go():\n  movel({A})\n  sleep(0.5)\n  movel({B})\nend\nh = run go()\n'
-        'sync() sleep(3)\nset_digital_out(1, True)\njoin h\nsleep(0.25)\nset_digital_out(2, True)\n'
+        'sync() sleep(3)\nset_digital_out(1, True)\njoin h\n'
+        'sleep(0.25)\nset_digital_out(2, True)\n'
     )
     found = imported(tmp_path, text)
     assert found.goal.segments.dwells.tolist() == [0.5, 0.25]
