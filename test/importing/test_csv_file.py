@@ -3,11 +3,18 @@
 """Tables as scanners, spreadsheets and offline programming write them."""
 
 from math import pi, sin
+from pathlib import Path
+import re
 
+from broken_files import broken, goal_or_sentence
 import numpy as np
 import pytest
+from random_cases import cases, random_of
+from random_tables import random_table
 
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions, ToolOrientation
+
+CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: As the export of a line scanner with normals: comments first, then units.
 SCANNER = """# scanner export, 2026-03-04
@@ -78,7 +85,7 @@ def test_a_spreadsheet_with_decimal_commas(tmp_path):
 
 def test_a_log_with_times(tmp_path):
     found = imported(tmp_path, LOG)
-    assert found.goal.waypoints.times.tolist() == [0.5, 1.5]
+    assert found.goal.waypoints.times.tolist() == [0.0, 1.0]
     assert poses(found)[1, 3:] == pytest.approx([0.0, 0.0, 0.6, 0.8])
     slower = imported(tmp_path, LOG, speed=0.05)
     assert slower.goal.segments.velocities.tolist() == [0.05, 0.05]
@@ -128,7 +135,7 @@ def test_points_on_one_place_are_said(tmp_path):
         ('x [m],y [m],z [m],X [mm]\n', 1, 'are the same'),
         ('x [m],y [m],z [m]\n0,0,0\n0,zero,0\n', 3, "'zero' is no number"),
         ('x [m],y [m],z [m]\n0,0,0\n\n0,0\n', 4, '2 columns'),
-        ('x [m],y [m],z [m]\n0,0,nan\n', 2, 'finite'),
+        ('x [m],y [m],z [m]\n0,0,nan\n', 2, "'nan' is no number"),
         ('x [m],y [m],z [m],qx,qy,qz,qw\n0,0,0,0,0,0,0\n', 2, 'length 0'),
         ('x [m],y [m],z [m],nx,ny,nz\n0,0,0,0,0,0\n', 2, 'normal is zero'),
         ('x [m],y [m],z [m]\n100,0,0\n', 2, 'check the unit'),
@@ -141,3 +148,126 @@ def test_a_broken_file_is_one_sentence_with_its_line(tmp_path, text, line, part)
         imported(tmp_path, text)
     assert caught.value.line in (line, 1 if '\0' in text else line)
     assert '\n' not in str(caught.value)
+
+
+@pytest.mark.skipif(not (CHECKOUT / 'doc').is_dir(), reason='only a checkout has this page')
+def test_the_table_of_the_page_is_read(tmp_path):
+    page = (CHECKOUT / 'doc' / 'importing.md').read_text(encoding='utf-8')
+    table = page.split('### Tables')[1].split('```\n')[1]
+    found = imported(tmp_path, table)
+    assert poses(found)[1] == pytest.approx([0.1105, 0.02, 0.0052, 0.0, 1.0, 0.0, 0.0])
+    assert found.goal.waypoints.times.tolist() == [0.0, 0.25]
+
+
+# ---- numpy as the judge -------------------------------------------------------------------------
+
+
+def matrices(quaternions):
+    """Return rotation matrices (n, 3, 3) of quaternions (n, 4), by the textbook's formula."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def turned(vector):
+    """Return exp([v]x) by Rodrigues' formula."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / max(angle, 1e-12)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def expected_rotations(table, values):
+    if table.orientation == 'quaternion':
+        return matrices(values / np.linalg.norm(values, axis=1)[:, None])
+    if table.orientation == 'rotation vector':
+        return np.array([turned(row) for row in values])
+    ex, ey, ez = np.eye(3)
+    return np.array([turned(c * ez) @ turned(b * ey) @ turned(a * ex) for a, b, c in values])
+
+
+@pytest.mark.random
+def test_random_tables_are_read_as_numpy_reads_them(tmp_path):
+    file = tmp_path / 'a.csv'
+    turns = timed = 0
+    for i in range(cases(3000)):
+        table = random_table(random_of('tables', i))
+        file.write_bytes(table.data())
+        found = import_file(file)
+        actual = poses(found)
+        assert actual[:, :3] == pytest.approx(table.read(table.names['position']), abs=1e-12)
+        if table.names['orientation']:
+            values = table.read(table.names['orientation'])
+            rotations = matrices(actual[:, 3:])
+            if table.orientation == 'normal':
+                against = -values / np.linalg.norm(values, axis=1)[:, None]
+                assert rotations[:, :, 2] == pytest.approx(against, abs=1e-9)
+            else:
+                assert rotations == pytest.approx(expected_rotations(table, values), abs=1e-9)
+            turns += len(actual)
+        if table.names['time']:
+            times = table.read(table.names['time'])[:, 0]
+            expected = times - times[0]
+            assert found.goal.waypoints.times == pytest.approx(expected, abs=1e-6)
+            timed += 1
+    assert turns > cases(3000) * 4
+    assert timed > cases(3000) // 4
+
+
+@pytest.mark.random
+def test_broken_tables_become_goals_as_numpy_reads_them_or_sentences(tmp_path):
+    file = tmp_path / 'a.csv'
+    goals = sentences = judged = 0
+    files = [SCANNER, SPREADSHEET.lstrip('\ufeff'), LOG]
+    for i in range(cases(10_000)):
+        random = random_of('broken tables', i)
+        table = None
+        if random.random() < 0.5:
+            table = random_table(random)
+        base = table.text if table else random.choice(files)
+        text = broken([*[base] * 9, *files], random)
+        found = goal_or_sentence(file, text)
+        if isinstance(found, str):
+            sentences += 1
+            continue
+        goals += 1
+        judged += agrees_with_numpy(found, text, base, table)
+    assert goals > cases(10_000) // 20
+    assert sentences > cases(10_000) // 2
+    assert judged > cases(10_000) // 40
+
+
+def agrees_with_numpy(found, text, base, table):
+    """Compare the points of a goal with numpy's reading of their lines, if the header is whole."""
+    if table is None:
+        head = {SCANNER: 3, LOG: 1}.get(base, 1)
+        delimiter, columns, factor = {
+            SCANNER: (',', (0, 1, 2), 1e-3),
+            LOG: (',', (1, 2, 3), 1.0),
+        }.get(base, (';', (0, 1, 2), 1e-3))
+        comma = delimiter == ';'
+    else:
+        head, delimiter, comma = table.head, table.delimiter, table.has_decimal_commas
+        columns, factors = zip(
+            *(table.columns[name] for name in table.names['position']), strict=True
+        )
+        factor = factors[0]
+    lines, whole = (re.split(r'\r\n|\r|\n', each) for each in (text, base))
+    if lines[:head] != whole[:head]:
+        return False
+    for line, pose in zip(found.lines.tolist(), poses(found), strict=True):
+        assert line > head
+        row = np.loadtxt(
+            [lines[line - 1]],
+            delimiter=delimiter,
+            usecols=columns,
+            converters=lambda cell: float(cell.replace(',', '.') if comma else cell),
+            quotechar='"',
+            comments=None,
+        )
+        assert pose[:3] == pytest.approx(row * factor, abs=1e-9)
+    return True

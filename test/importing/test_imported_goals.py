@@ -18,9 +18,9 @@ from ur_cartesian_driver.importing import (
     ImportOptions,
     ToolOrientation,
 )
-from ur_cartesian_driver.importing.csv_file import collect_csv
 from ur_cartesian_driver.importing.imported_goal import goal_of_path
 from ur_cartesian_driver.importing.imported_path import PathCollector
+from ur_cartesian_driver.importing.tables.csv_file import collect_csv
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import InputKind, InputWait, Posture, SegmentType

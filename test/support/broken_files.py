@@ -16,7 +16,8 @@ _WORD = re.compile(r'[A-Za-z_]\w*|[-+]?\d+\.?\d*')
 _PLACE = re.compile(r'^(line|row|packet|point|entity) \w+: ')
 #: Faults of a whole file, which no line is to blame for.
 _WHOLE_FILE = re.compile(
-    r'^(there is no point|the file is empty|this is a binary file|the file begins as|'
+    r'^(there is no point|the file is empty|the file is no recording|the file is damaged|'
+    r'this is a binary file|the file begins as|'
     r'the drawing does not say|it is nested too deeply)'
 )
 
@@ -60,14 +61,14 @@ def broken_texts(files: Sequence[str], count: int, random: Random) -> Iterator[s
 
 
 def goal_or_sentence(
-    file: Path, text: str, options: ImportOptions | None = None
+    file: Path, text: str | bytes, options: ImportOptions | None = None
 ) -> ImportedGoal | str:
     """
     Import a text by the suffix of a file; assert that a refusal is one sentence with its place.
 
     :returns: the goal, or the sentence.
     """
-    file.write_text(text, encoding='utf-8', newline='', errors='surrogatepass')
+    file.write_bytes(text if isinstance(text, bytes) else text.encode(errors='surrogatepass'))
     try:
         return import_file(file, options)
     except BrokenFile as error:

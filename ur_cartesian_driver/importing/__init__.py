@@ -16,7 +16,6 @@ from typing import Any
 
 from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.importing import (
-    csv_file,
     recording_file,
     ros_messages_file,
 )
@@ -33,6 +32,7 @@ from ur_cartesian_driver.importing.import_options import (
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
 from ur_cartesian_driver.importing.script import urscript_file
+from ur_cartesian_driver.importing.tables import csv_file
 
 __all__ = [
     'FORMATS',

@@ -16,6 +16,7 @@ from ur_cartesian_driver.importing.imported_path import (
     ImportedPath,
     ImportNote,
     ImportNotes,
+    MAX_DISTANCE,
     SAME_POINT,
     SAME_TURN,
 )
@@ -33,8 +34,6 @@ from ur_cartesian_driver.motion.pose_rows import (
     transform_rows,
 )
 
-#: Farther away is no robot arm: millimetres read as metres, say [m].
-MAX_DISTANCE = 20.0
 #: Straight down, x along y of the frame.
 _DOWN = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
 #: The share of a line that one blend takes at most.

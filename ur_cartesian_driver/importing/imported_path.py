@@ -36,6 +36,8 @@ _OPTIONAL = {
     'times': 1,
     'dwells': 1,
 }
+#: Farther away is no robot arm: millimetres read as metres, say [m].
+MAX_DISTANCE = 20.0
 UNKNOWN3: Vector3 = (nan, nan, nan)
 #: A point that is as near as this to the one before, and turned as little, is the same one.
 SAME_POINT, SAME_TURN = 5e-6, 1e-4
@@ -241,6 +243,18 @@ class PathCollector:
                 self._optional[name][row] = value
         if posture:
             self._postures[row] = posture
+
+    def add_lines(
+        self, lines: Sequence[int], positions: Floats, **optional: Floats | None
+    ) -> None:
+        """Add points of a table, the columns as in :class:`ImportedPath`, None = unknown."""
+        row = len(self._positions)
+        self._positions.extend(positions.tolist())
+        plain = (SegmentType.LINEAR, False, False, ArcMode.UNCONSTRAINED)
+        self._plain.extend((line, *plain) for line in lines)
+        for name, values in optional.items():
+            if values is not None:
+                self._optional[name].update(enumerate(values.tolist(), row))
 
     def switch(self, output: IOCommand) -> None:
         """Switch an output at the newest point, at the first one if there is none yet."""

@@ -1,0 +1,157 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers and times of cells, or the row with a cell that is neither."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, time, UTC
+import re
+
+import numpy as np
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes, MAX_DISTANCE
+from ur_cartesian_driver.importing.tables.column_names import POSITION, ROLES
+from ur_cartesian_driver.importing.tables.table_columns import Column
+from ur_cartesian_driver.motion.pose_rows import Floats
+
+#: Python's float() takes more: underscores, digits of other scripts, nan.
+_NUMBER = re.compile(r'\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*', re.IGNORECASE | re.ASCII)
+#: Nothing is as large: the ns since 1970 have 19 digits.
+_MAX_NUMBER = 1e30
+_NO_CHARACTER_OF_IT = re.compile(r'[^-+.0-9eE \t]')
+#: Of cells, one a line: one with thousands separators, and one with a comma that separates
+#: decimals for sure. In 1,234 nobody knows.
+_WITH_THOUSANDS = re.compile(r'[.,][^\n,.]*,|,[^\n,.]*\.')
+_CERTAIN_COMMA = re.compile(r'^(?!\s*[-+]?[1-9]\d{0,2},\d{3}\s*$).*,.*$', re.MULTILINE | re.ASCII)
+#: A time of day has a second colon; 01:30 could be minutes and seconds.
+_MOMENT = re.compile(r'\d:\d\d:\d')
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+#: From which number on a time without a unit counts ns, us or ms since 1970: in seconds these
+#: would be thousands of years.
+_UNIX_UNITS = ((1e17, 1e-9, 'ns'), (1e14, 1e-6, 'us'), (1e11, 1e-3, 'ms'))
+
+
+def cell_values(
+    texts: dict[Column, list[str]], lines: Sequence[int], remarks: ImportNotes
+) -> dict[str, Floats]:
+    """
+    Return the columns by their roles, in SI units.
+
+    :raises BrokenFile: names the first row with a cell that is no number.
+    """
+    values, faults = {}, []
+    for column, cells in _with_points(texts, lines).items():
+        read = _times if column.role == 't' else _numbers
+        try:
+            values[column.role] = column.factor * read(column, cells, lines, remarks)
+        except BrokenFile as fault:
+            faults.append(fault)
+    if faults:
+        raise min(faults, key=lambda fault: fault.line)
+    if 'sec' in values:
+        values['t'] = values['sec'] + values['nanosec']
+    return values
+
+
+def _numbers(column: Column, cells: Sequence[str], lines: Sequence[int], _: ImportNotes) -> Floats:
+    """
+    Return the numbers of a column.
+
+    :raises BrokenFile: a cell is no finite number.
+    """
+    try:
+        numbers = np.array(list(map(float, cells)))
+    except ValueError:
+        numbers = np.array([np.nan])
+    if (np.abs(numbers) < _MAX_NUMBER).all() and not _NO_CHARACTER_OF_IT.search(''.join(cells)):
+        return numbers
+    for line, cell in zip(lines, cells, strict=True):
+        if not cell.strip():
+            raise BrokenFile(line, f'the cell of {column.title!r} is empty')
+        if _NUMBER.fullmatch(cell) is None or not abs(float(cell)) < _MAX_NUMBER:
+            text = cell.strip(' \t')
+            raise BrokenFile(line, f'{text!r:.40} is no number ({column.title})')
+    return numbers
+
+
+def _times(
+    column: Column, cells: Sequence[str], lines: Sequence[int], remarks: ImportNotes
+) -> Floats:
+    """
+    Return the times of a column in its unit: numbers, or dates and times of day.
+
+    :raises BrokenFile: a cell is neither.
+    """
+    if _MOMENT.search(cells[0]):
+        return np.array([_seconds(cell, line) for line, cell in zip(lines, cells, strict=True)])
+    times = _numbers(column, cells, lines, remarks)
+    if not column.has_unit:
+        for bound, factor, unit in _UNIX_UNITS:
+            if abs(times[0]) > bound:
+                remarks.add(0, f'the times of {column.title!r}', f'read as {unit} since 1970')
+                return times * factor
+    return times
+
+
+def _seconds(cell: str, line: int) -> float:
+    """
+    Return the seconds of a date with a time, or of a time of day.
+
+    :raises BrokenFile: it is neither.
+    """
+    try:
+        moment = datetime.fromisoformat(cell.strip())
+    except ValueError:
+        try:
+            moment = datetime.combine(_EPOCH, time.fromisoformat(cell.strip()))
+        except ValueError:
+            raise BrokenFile(
+                line, f'{cell.strip()!r:.40} is no time such as 2026-03-04T10:00:00.125'
+            ) from None
+    zoned = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return (zoned - _EPOCH).total_seconds()
+
+
+def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[Column, list[str]]:
+    """
+    Return the cells with decimal points.
+
+    :raises BrokenFile: a comma in a number can mean two things.
+    """
+    numeric = [column for column, cells in texts.items() if not _MOMENT.search(cells[0])]
+    # All cells as one text, a line each: that is searched faster than cell by cell.
+    joined = '\n'.join('\n'.join(texts[column]) for column in numeric)
+    if ',' not in joined:
+        return texts
+
+    def cell_at(place: int) -> tuple[int, str]:
+        row = joined.count('\n', 0, place)
+        return lines[row % len(lines)], joined.split('\n', row + 1)[row].strip()
+
+    line, cell = cell_at(joined.index(','))
+    if (match := _WITH_THOUSANDS.search(joined)) is not None:
+        line, cell = cell_at(match.start())
+        raise BrokenFile(line, f'{cell!r:.40} has thousands separators; leave them out')
+    if '.' in joined:
+        other_line, other = cell_at(joined.index('.'))
+        raise BrokenFile(
+            other_line,
+            f'{other!r:.40} has a decimal point, but {cell!r:.40} at line {line} a decimal '
+            'comma; write points everywhere',
+        )
+    if _CERTAIN_COMMA.search(joined) is None and all(
+        # As thousands the points would be too far away.
+        abs(float(cell.replace(',', ''))) * column.factor < MAX_DISTANCE
+        for column in numeric
+        if column.role in ROLES[POSITION]
+        for cell in texts[column]
+        if ',' in cell
+    ):
+        raise BrokenFile(
+            line,
+            f'{cell!r} can be {cell.replace(",", "")} or {cell.replace(",", ".")}; write it '
+            'without thousands separators and with a decimal point',
+        )
+    count, cells = len(lines), joined.replace(',', '.').split('\n')
+    return texts | {column: cells[i * count : (i + 1) * count] for i, column in enumerate(numeric)}

@@ -1,0 +1,208 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Names of columns, as programs write them, and their meaning.
+
+A term is a group of columns that make one thing together, such as ``qx, qy, qz, qw``. Case,
+blanks, ``_``, ``.``, ``/`` and ``-`` make no difference: ``Pos X`` and ``pos_x`` are one name. Of
+a path of names, as in ROS, the last two count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import re
+
+from ur_cartesian_driver.importing.import_format import honoured, left_out, refused, term_table
+from ur_cartesian_driver.importing.tables.column_units import is_unit, Quantity
+
+POSITION = 'position'
+POSE = 'pose of a robot, in m and rad'
+ROS_POSE = 'pose of `rostopic echo -p`, in m'
+OWN_POSE = 'pose of our [exports](recordings.md#for-other-programs)'
+QUATERNION = 'orientation: quaternion'
+ROTATION_VECTOR = 'orientation: rotation vector'
+ANGLES = 'orientation: turns about the fixed axes x, then y, then z'
+OTHER_ORIENTATION = 'orientation: others'
+NORMAL = 'normal of the surface'
+TIME = 'time'
+SECONDS = 'time in two columns'
+SPEED = 'speed'
+BLEND = 'radius of the blend'
+OTHER = 'others'
+
+_XYZ, _RXYZ, _QXYZW = ('x', 'y', 'z'), ('rx', 'ry', 'rz'), ('qx', 'qy', 'qz', 'qw')
+#: What the columns of a group stand for.
+ROLES: Mapping[str, tuple[str, ...]] = {
+    POSITION: _XYZ,
+    POSE: (*_XYZ, *_RXYZ),
+    ROS_POSE: (*_XYZ, *_QXYZW),
+    OWN_POSE: (*_XYZ, *_QXYZW),
+    QUATERNION: _QXYZW,
+    ROTATION_VECTOR: _RXYZ,
+    ANGLES: ('roll', 'pitch', 'yaw'),
+    NORMAL: ('nx', 'ny', 'nz'),
+    TIME: ('t',),
+    SECONDS: ('sec', 'nanosec'),
+    SPEED: ('speed',),
+    BLEND: ('blend',),
+}
+#: What one table has once, by the first role of a group.
+KINDS = {
+    'x': 'position',
+    'qx': 'orientation',
+    'rx': 'orientation',
+    'roll': 'orientation',
+    'nx': 'normal',
+    't': 'time',
+    'sec': 'time',
+    'speed': 'speed',
+    'blend': 'blend',
+}
+QUANTITIES: Mapping[str, Quantity] = {
+    **dict.fromkeys((*_XYZ, 'blend'), Quantity.LENGTH),
+    **dict.fromkeys((*_RXYZ, *ROLES[ANGLES]), Quantity.ANGLE),
+    **dict.fromkeys((*_QXYZW, *ROLES[NORMAL]), Quantity.PURE),
+    **dict.fromkeys(('t', 'sec', 'nanosec'), Quantity.TIME),
+    'speed': Quantity.SPEED,
+}
+#: Units that the program fixes, where the header has none.
+FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
+    POSE: {**dict.fromkeys(_XYZ, 'm'), **dict.fromkeys(_RXYZ, 'rad')},
+    ROS_POSE: dict.fromkeys(_XYZ, 'm'),
+    OWN_POSE: dict.fromkeys(_XYZ, 'm'),
+    SECONDS: {'sec': 's', 'nanosec': 'ns'},
+}
+
+
+_WORDS = 'a path has no such quantity'
+#: Braces stand for each of their letters. Of groups that give the same, the first one counts.
+TERMS = term_table(
+    honoured(
+        POSITION,
+        *('{xyz}', 'pos_{xyz}', 'position_{xyz}', 'p{xyz}', 'pose_{xyz}', 'point_{xyz}'),
+        *('translation_{xyz}', 'tcp_{xyz}', 'tcp_pose_{xyz}', 'tcp_pos_{xyz}', 'ee_pos_{xyz}'),
+        *('t{xyz}', 'p_RS_R_{xyz}'),  # trajectories of TUM, poses of EuRoC
+    ),
+    honoured(
+        POSE,
+        *('actual_TCP_pose_{012345}', 'target_TCP_pose_{012345}'),
+        *('TCP_pose_{012345}', 'TCP_{012345}'),
+    ),
+    honoured(
+        ROS_POSE,
+        'field.pose.position.{xyz}, field.pose.orientation.{xyzw}',
+        'field.pose.pose.position.{xyz}, field.pose.pose.orientation.{xyzw}',
+    ),
+    honoured(OWN_POSE, 'actual_pose_{xyz}, actual_pose_q{xyzw}'),
+    honoured(
+        QUATERNION,
+        *('q{xyzw}', 'quat_{xyzw}', 'quaternion_{xyzw}', 'orientation_{xyzw}', 'ori_{xyzw}'),
+        *('o{xyzw}', 'rot_{xyzw}', 'rotation_{xyzw}', 'tcp_q{xyzw}', 'ee_quat_{xyzw}'),
+        'q_RS_{xyzw}',
+    ),
+    honoured(
+        ROTATION_VECTOR,
+        *('r{xyz}', 'rotvec_{xyz}', 'rvec_{xyz}', 'rv_{xyz}', 'tcp_r{xyz}', 'tcp_pose_r{xyz}'),
+    ),
+    honoured(ANGLES, 'roll, pitch, yaw'),
+    refused(
+        OTHER_ORIENTATION,
+        'the file does not say about which axes, in which order',
+        *('a, b, c', 'w, p, r', 'phi, theta, psi', 'alpha, beta, gamma', 'roll, pitch, heading'),
+        *('rot_{xyz}', 'rotation_{xyz}', 'euler_{xyz}', 'angle_{xyz}'),
+    ),
+    refused(
+        OTHER_ORIENTATION,
+        'the file does not say which of them is w, or whether they are joints',
+        *('q{0123}', 'q{1234}'),
+    ),
+    refused(OTHER_ORIENTATION, 'the file does not say whether they are a normal', 'i, j, k'),
+    honoured(NORMAL, 'n{xyz}', 'normal_{xyz}', 'normals_{xyz}'),
+    honoured(
+        TIME,
+        *('t', 'time_from_start', 'header.stamp', 'stamp', 'timestamp', 'time', 'elapsed_time'),
+        *('datetime', 'unix_time'),
+    ),
+    honoured(SECONDS, 'stamp.sec, stamp.nanosec', 'secs, nsecs', 'sec, nanosec'),
+    honoured(SPEED, 'speed', 'velocity', 'v', 'feed', 'feed_rate'),
+    left_out(SPEED, 'name one speed along the path', *('v{xyz}', 'vel_{xyz}', 'velocity_{xyz}')),
+    left_out(SPEED, 'give the option acceleration', 'acceleration'),
+    honoured(BLEND, 'blend', 'blend_radius'),
+    left_out(BLEND, 'name it blend if the arm is to pass the point', 'radius'),
+    left_out(OTHER, 'joints follow from the pose', 'actual_q_{012345}'),
+    left_out(OTHER, _WORDS, '{rgb}', 'intensity', 'index', 'frame', 'seq', 'speed_scaling'),
+)
+#: Why columns are left out that no table has.
+OTHERS_REASON = _WORDS
+
+#: Words of names that stand for an orientation.
+_ORIENTATION_WORDS = frozenset(
+    'quat quaternion orientation orient rot rotation euler rpy roll pitch yaw heading'.split()
+)
+_BRACKETS = re.compile(r'(.*?)\s*[\[({<]([^\[\](){}<>]*)[\])}>]')
+_UNIT_BEHIND = re.compile(r'[\s_/,:]+(?:in\s+)?')
+
+
+def letters(name: str) -> str:
+    """Return what counts of a name."""
+    name = name.strip().lower().lstrip('%#/_ ')
+    return re.sub(r'[\s_./]+|(?<=\w)-(?=\w)', '', name)
+
+
+def _columns(term: str) -> Iterator[str]:
+    """Yield the letters of the columns of a term."""
+    for name in term.split(', '):
+        before, _, rest = name.partition('{')
+        axes, _, behind = rest.partition('}')
+        yield from (letters(before + axis + behind) for axis in axes or [''])
+
+
+#: The letters of the columns of each term.
+COLUMNS: Mapping[str, tuple[str, ...]] = {name: tuple(_columns(name)) for name in TERMS}
+_KNOWN = frozenset(column for columns in COLUMNS.values() for column in columns)
+_ORIENTATIONS = frozenset(
+    column
+    for name, term in TERMS.items()
+    if term.topic in (QUATERNION, ROTATION_VECTOR, ANGLES, NORMAL)
+    for column in COLUMNS[name]
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Title:
+    """A title of a column, taken apart."""
+
+    #: The letters of a name of the table; empty = no name of it.
+    name: str
+    unit: str
+    #: As the file has it.
+    text: str
+
+
+def read_title(text: str) -> Title:
+    """Return name and unit of ``x [mm]``, ``x (mm)``, ``x_mm``, ``x/mm`` or ``x in mm``."""
+    text = text.strip()
+    if (match := _BRACKETS.fullmatch(text)) is not None:
+        return Title(_known(match[1]), match[2].strip(), text)
+    if name := _known(text):
+        return Title(name, '', text)
+    for gap in reversed(list(_UNIT_BEHIND.finditer(text))):
+        if is_unit(text[gap.end() :]) and (name := _known(text[: gap.start()])):
+            return Title(name, text[gap.end() :], text)
+    return Title('', '', text)
+
+
+def _known(name: str) -> str:
+    """Return the letters of a name of the table, of a path of names its end, or nothing."""
+    ends = (name, '.'.join(re.split(r'[./]', name)[-2:]))
+    return next((found for end in ends if (found := letters(end)) in _KNOWN), '')
+
+
+def is_orientation(title: Title) -> bool:
+    """Tell whether a title stands for an orientation or a normal, by a known name or its words."""
+    words = re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])', title.text)
+    return title.name in _ORIENTATIONS or not _ORIENTATION_WORDS.isdisjoint(
+        word.lower() for word in words
+    )

@@ -1,0 +1,68 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Units of columns, as programs write them into headers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from math import radians
+import unicodedata
+
+from ur_cartesian_driver.importing.import_options import LENGTH_UNITS
+
+
+class Quantity(Enum):
+    """A kind of number; its value is an example of a unit."""
+
+    LENGTH = 'mm'
+    ANGLE = 'deg'
+    TIME = 's'
+    SPEED = 'mm/s'
+    #: Without a unit.
+    PURE = '-'
+
+
+_NAMES = {
+    'um': 'μm micron microns micrometer micrometers micrometre micrometres',
+    'mm': 'millimeter millimeters millimetre millimetres',
+    'cm': 'centimeter centimeters centimetre centimetres',
+    'm': 'meter meters metre metres',
+    'in': '" inch inches',
+    'ft': 'foot feet',
+    'deg': '° degree degrees',
+    'rad': 'radian radians',
+    's': 'sec secs second seconds',
+    'ms': 'msec millisecond milliseconds',
+    'us': 'μs usec microsecond microseconds',
+    'ns': 'nsec nanosecond nanoseconds',
+    'min': 'minute minutes',
+    '-': '1',
+}
+_SYNONYMS = {synonym: name for name, synonyms in _NAMES.items() for synonym in synonyms.split()}
+_TIMES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
+#: The factor to SI of each unit.
+UNITS: Mapping[Quantity, Mapping[str, float]] = {
+    Quantity.LENGTH: LENGTH_UNITS,
+    Quantity.ANGLE: {'rad': 1.0, 'deg': radians(1.0)},
+    Quantity.TIME: _TIMES,
+    Quantity.SPEED: {
+        f'{length}/{time}': factor / _TIMES[time]
+        for length, factor in LENGTH_UNITS.items()
+        for time in ('s', 'min')
+    },
+    Quantity.PURE: {'-': 1.0},
+}
+
+
+def plain_unit(text: str) -> str:
+    """Return a unit as :data:`UNITS` names it, or the text in lower case if it is none of them."""
+    # NFKC: the micro sign becomes the Greek letter, superscripts become digits.
+    text = unicodedata.normalize('NFKC', text).strip().lower()
+    parts = text.replace('_per_', '/').replace(' per ', '/').replace('_', '/').split('/')
+    return '/'.join(_SYNONYMS.get(part.strip(), part.strip()) for part in parts)
+
+
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a unit of some quantity."""
+    return any(plain_unit(text) in units for units in UNITS.values())

@@ -1,0 +1,236 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The columns of a table that a path is made of, with their units; all others are said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+from ur_cartesian_driver.importing.import_format import Treatment
+from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrientation
+from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
+from ur_cartesian_driver.importing.tables.column_names import (
+    COLUMNS,
+    FIXED_UNITS,
+    is_orientation,
+    KINDS,
+    OTHERS_REASON,
+    QUANTITIES,
+    read_title,
+    ROLES,
+    ROTATION_VECTOR,
+    TERMS,
+    Title,
+)
+from ur_cartesian_driver.importing.tables.column_units import plain_unit, Quantity, UNITS
+
+_POSITION, _ORIENTATION, _NORMAL = 'position', 'orientation', 'normal'
+#: Kinds that an option replaces, with the reason.
+_REPLACED: Mapping[ToolOrientation, Mapping[str, str]] = {
+    ToolOrientation.FILE: {},
+    ToolOrientation.NORMALS: {_ORIENTATION: 'the tool is to point against the normals'},
+    ToolOrientation.DOWN: dict.fromkeys((_ORIENTATION, _NORMAL), 'the tool is to point down'),
+}
+_REMEDY = (
+    'name them qx, qy, qz, qw, or rx, ry, rz [rad], or roll, pitch, yaw [deg], or give the option '
+    'orientation'
+)
+#: Where a column has no unit and the program fixes none: a length and a speed have to say it.
+_DEFAULT_UNITS = {Quantity.TIME: 's', Quantity.PURE: '-'}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of numbers."""
+
+    index: int
+    #: As in :data:`~ur_cartesian_driver.importing.tables.column_names.ROLES`.
+    role: str
+    #: To SI.
+    factor: float
+    title: str
+    #: Whether the header, or its program, says the unit.
+    has_unit: bool
+
+
+def is_header(titles: Sequence[str]) -> bool:
+    """Tell whether titles name a position."""
+    names = {read_title(title).name for title in titles}
+    return any(_POSITION in _KINDS[term] and names.issuperset(COLUMNS[term]) for term in _KINDS)
+
+
+def find_columns(
+    texts: Sequence[str],
+    units: Sequence[str],
+    line: int,
+    options: ImportOptions,
+    remarks: ImportNotes,
+) -> list[Column]:
+    """
+    Return the columns of which the path is made, and say which are left out.
+
+    :param texts: of the header.
+    :param units: of a second header line; empty = there is none.
+    :param line: of the header.
+    :raises BrokenFile: a column is missing, stands twice, or cannot be read for sure.
+    """
+    titles = [read_title(text) for text in texts]
+    names = [title.name for title in titles]
+    taken: list[Column] = []
+    reasons = dict(_REPLACED[options.orientation])
+    if options.speed is not None:
+        reasons['speed'] = 'a speed is given'
+    for term, kinds in _KINDS.items():
+        columns = COLUMNS[term]
+        if kinds[0] in reasons or not set(columns) <= set(names):
+            continue
+        for column in columns:
+            if names.count(column) > 1:
+                same = [title for title in titles if title.name == column]
+                raise BrokenFile(line, f'{_listed(same)} are the same')
+        group = [titles[names.index(column)] for column in columns]
+        reasons |= {kind: f'the {kind} comes from {_names(group)}' for kind in kinds}
+        topic = TERMS[term].topic
+        for title, role in zip(group, ROLES[topic], strict=True):
+            index = titles.index(title)
+            unit = title.unit or (units[index].strip(' []()') if units else '')
+            fixed = FIXED_UNITS.get(topic, {}).get(role, '')
+            taken.append(_column(title.text, index, role, unit or fixed, line, options))
+    if _POSITION not in reasons:
+        _refuse_header(titles, line)
+    if unitless := [titles[c.index] for c in taken if _is_turn(c) and not c.has_unit]:
+        remarks.add(line, _listed(unitless), 'no unit: read as a rotation vector [rad]')
+    indices = {column.index for column in taken}
+    _say_others(
+        [title for i, title in enumerate(titles) if i not in indices], reasons, line, remarks
+    )
+    unnamed = [str(i + 1) for i, title in enumerate(titles) if not title.text]
+    if unnamed:
+        remarks.add(line, f'column {", ".join(unnamed)} without a name', OTHERS_REASON)
+    return taken
+
+
+#: What the groups of columns give, by the names of their terms.
+_KINDS = {
+    name: [KINDS[role] for role in ROLES[term.topic] if role in KINDS]
+    for name, term in TERMS.items()
+    if term.treatment is Treatment.HONOURED
+}
+
+
+def _is_turn(column: Column) -> bool:
+    return column.role in ROLES[ROTATION_VECTOR]
+
+
+def _listed(titles: Sequence[Title]) -> str:
+    return f'column{"s" * (len(titles) > 1)} {_names(titles)}'
+
+
+def _names(titles: Sequence[Title]) -> str:
+    """Return titles with commas, runs of numbers shortened: RTDE has more than a hundred."""
+    runs: list[list[str]] = []
+    for title in titles:
+        stem = title.text.rstrip('0123456789')
+        number = title.text[len(stem) :]
+        if number and runs and runs[-1][-1] == f'{stem}{int(number) - 1}':
+            runs[-1].append(title.text)
+        else:
+            runs.append([title.text])
+    return ', '.join(
+        f'{run[0]!r} to {run[-1]!r}' if len(run) > 2 else ', '.join(map(repr, run)) for run in runs
+    )
+
+
+def _refuse_header(titles: Sequence[Title], line: int) -> NoReturn:
+    """Refuse a header without a position."""
+    missing = _missing({title.name for title in titles}, _POSITION)
+    header = ', '.join(title.text for title in titles)
+    raise BrokenFile(line, f'the column {missing!r} is missing; the header is {header!r:.120}')
+
+
+def _missing(names: set[str], kind: str) -> str:
+    """Return the first missing column of the group that has most of its columns."""
+    groups = [COLUMNS[term] for term, kinds in _KINDS.items() if kinds[0] == kind]
+    best = max(groups, key=lambda columns: len(names.intersection(columns)))
+    return next(column for column in best if column not in names)
+
+
+def _say_others(
+    rest: list[Title], reasons: Mapping[str, str], line: int, remarks: ImportNotes
+) -> None:
+    """
+    Say which columns are left out.
+
+    :raises BrokenFile: they could be the orientation, and there is no other.
+    """
+    oriented = reasons.get(_ORIENTATION) or reasons.get(_NORMAL)
+    for name, columns in COLUMNS.items():
+        group = [title for title in rest if title.name in columns]
+        if not group or not {title.name for title in group}.issuperset(columns):
+            continue
+        term = TERMS[name]
+        reason = reasons[_KINDS[name][0]] if name in _KINDS else term.reason
+        if term.treatment is Treatment.REFUSED:
+            if not oriented:
+                raise BrokenFile(
+                    line, f'{_listed(group)} could be an orientation, but {reason}; {_REMEDY}'
+                )
+            reason = oriented
+        remarks.add(line, _listed(group), reason)
+        rest = [title for title in rest if title not in group]
+    if suspects := [title for title in rest if is_orientation(title)]:
+        if not oriented:
+            _refuse_orientation(suspects, line)
+        remarks.add(line, _listed(suspects), oriented)
+    if others := [title for title in rest if title.text and title not in suspects]:
+        remarks.add(line, _listed(others), OTHERS_REASON)
+
+
+def _refuse_orientation(titles: Sequence[Title], line: int) -> NoReturn:
+    """Refuse a part of an orientation or a normal, or a name of one that is not known."""
+    names = {title.name for title in titles}
+    kind = next((k for k in (_ORIENTATION, _NORMAL) if _parts(k) & names), '')
+    why = f'the column {_missing(names, kind)!r} is missing' if kind else 'the name is not known'
+    raise BrokenFile(line, f'no orientation can be made of {_listed(titles)}: {why}; {_REMEDY}')
+
+
+def _parts(kind: str) -> set[str]:
+    """Return all columns that groups of a kind have."""
+    return {
+        column for term, kinds in _KINDS.items() if kinds == [kind] for column in COLUMNS[term]
+    }
+
+
+def _column(
+    text: str, index: int, role: str, unit: str, line: int, options: ImportOptions
+) -> Column:
+    """
+    Return a column with its factor.
+
+    :raises BrokenFile: the unit is missing, or is none of its quantity.
+    """
+    quantity = QUANTITIES[role]
+    units, given = UNITS[quantity], plain_unit(unit)
+    if given == '-' and quantity is not Quantity.PURE:
+        given = ''
+    default = _DEFAULT_UNITS.get(quantity, '')
+    if quantity is Quantity.LENGTH:
+        default = options.unit
+    elif role in ROLES[ROTATION_VECTOR]:
+        default = 'rad'
+        if given == 'deg':
+            raise BrokenFile(
+                line,
+                f'{text!r} can be a part of a rotation vector or an angle; write [rad] for a '
+                'rotation vector, or name the turns about x, y and z roll, pitch and yaw',
+            )
+    if not (given or default):
+        option = ', or give the option unit' if quantity is Quantity.LENGTH else ''
+        raise BrokenFile(
+            line, f'the column {text!r} has no unit; write {text} [{quantity.value}]{option}'
+        )
+    if (given or default) not in units:
+        raise BrokenFile(line, f'the unit {unit!r} of {text!r} is none of {", ".join(units)}')
+    return Column(index, role, units[given or default], text, bool(given))

@@ -1,0 +1,217 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Header and rows of a table, in the dialects that programs write.
+
+Columns are separated by semicolons, tabs, commas or blanks; the rows need not be separated as the
+header is, because numpy.savetxt writes the header as it was given. The header is the first line
+that names a position. Where the rows begin without one, it is the comment before them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import csv
+from dataclasses import dataclass, field
+import itertools
+import re
+import string
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
+from ur_cartesian_driver.importing.tables.column_units import is_unit
+
+#: None = blanks, however many.
+_DELIMITERS = (';', '\t', ',', None)
+_COMMENT = re.compile(r'\s*(?:#|%|//)[#%/\s]*')
+_FIRST_LINE_OF_EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
+#: A title of a header that is separated by blanks: its unit belongs to it.
+_TITLE = re.compile(r'"[^"]*"|[^\s"]+(?:\s+[\[(][^\])]*[\])])?')
+#: The header comes within so many lines.
+_MAX_PREAMBLE = 200
+_SAMPLES = {
+    3: 'x [mm],y [mm],z [mm]',
+    6: 'x [mm],y [mm],z [mm],rx [rad],ry [rad],rz [rad]',
+    7: 'x [mm],y [mm],z [mm],qx,qy,qz,qw',
+    8: 'time [s],x [mm],y [mm],z [mm],qx,qy,qz,qw',
+}
+
+
+@dataclass(slots=True)
+class Table:
+    """A table of text."""
+
+    #: Of the header; 0 = there is none.
+    line: int
+    titles: list[str]
+    lines: list[str]
+    #: None = blanks.
+    delimiter: str | None
+    #: Index of the line where the rows begin.
+    first: int
+    #: Of a second header line; empty = there is none.
+    units: list[str] = field(default_factory=list)
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """
+        Yield the numbers of the lines, and their cells.
+
+        :raises BrokenFile: a row has another number of cells than the header.
+        """
+        width, delimiter = len(self.titles), self.delimiter
+        # A spreadsheet ends with rows of empty cells.
+        blank = string.whitespace + (delimiter or '')
+        for number, line in enumerate(self.lines[self.first :], self.first + 1):
+            start = line.lstrip()
+            if not start.strip(blank) or (start[0] in '#%/' and _COMMENT.match(start)):
+                continue
+            cells = _cells(line, delimiter) if '"' in line else line.split(delimiter)
+            if not cells:
+                raise BrokenFile(number, 'its quotation marks do not enclose whole cells')
+            if len(cells) != width:
+                if len(cells) != width + 1 or cells[-1].strip():
+                    raise BrokenFile(number, self._wrong_width(line, len(cells)))
+                del cells[-1]  # a delimiter ends the row
+            yield number, cells
+
+    def _wrong_width(self, line: str, width: int) -> str:
+        """Return the sentence about a row of another width."""
+        why = f'it has {width} column{"s" * (width != 1)}, but the header has {len(self.titles)}'
+        if self.delimiter == ',' and width > len(self.titles) and '.' not in line:
+            why += '; numbers with decimal commas need semicolons or tabs between them'
+        return why
+
+
+def read_table(
+    lines: list[str], is_header: Callable[[list[str]], bool], unit: str, remarks: ImportNotes
+) -> Table:
+    """
+    Find header and dialect.
+
+    :param is_header: whether titles name a position.
+    :param unit: the unit of a table of three columns without a header; empty = it is refused.
+    :raises BrokenFile: there is no header.
+    """
+    delimiters: tuple[str | None, ...] = _DELIMITERS
+    header, before = None, []
+    for i, line in enumerate(lines[:_MAX_PREAMBLE]):
+        if first := _FIRST_LINE_OF_EXCEL.fullmatch(line):
+            delimiters = (first[1],)
+        elif line.strip():
+            comment = _COMMENT.match(line)
+            text = line[comment.end() :] if comment else line
+            if titles := next(filter(is_header, _titles(text, delimiters)), None):
+                header = (i + 1, titles)
+            if not comment:
+                if header or _is_numeric(line):
+                    break
+                before.append(i + 1)
+    if header is None:
+        return _without_header(lines, delimiters, unit, remarks)
+    for number in before:
+        remarks.add(number, 'text before the header', 'it is no part of the table')
+    return _with_rows(lines, *header, delimiters)
+
+
+def _with_rows(
+    lines: list[str], line: int, titles: list[str], delimiters: tuple[str | None, ...]
+) -> Table:
+    """Return the table with the delimiter that its first row has."""
+    header = lines[line - 1]
+    order = sorted(delimiters, key=lambda d: d is not None and d not in header)
+    table = Table(line, titles if titles[-1] else titles[:-1], lines, order[0], line)
+    rows = (
+        (number, text)
+        for number, text in enumerate(lines[line:], line + 1)
+        if text.strip() and not _COMMENT.match(text)
+    )
+    for number, text in itertools.islice(rows, 2):
+        split = {d: [cell.strip() for cell in _cells(text, d)] for d in order}
+        fitting = [d for d in order if _fits(split[d], len(table.titles))]
+        # Where none fits, the sentence about its width is for the one that the row has.
+        table.delimiter = next(iter(fitting), next((d for d in order if d and d in text), None))
+        if table.units or not (fitting and _are_units(split[table.delimiter])):
+            break
+        table.units, table.first = split[table.delimiter], number
+    return table
+
+
+def _fits(cells: list[str], width: int) -> bool:
+    """Tell whether a row has so many cells, or one more that is empty."""
+    return bool(cells) and len(cells) - (not cells[-1]) <= width <= len(cells)
+
+
+def _without_header(
+    lines: list[str], delimiters: tuple[str | None, ...], unit: str, remarks: ImportNotes
+) -> Table:
+    """
+    Return a table of x, y and z whose unit is known, or its first line as the header.
+
+    :raises BrokenFile: it is empty, or a table of numbers that could be anything.
+    """
+    number, line = next(
+        (
+            (i, line)
+            for i, line in enumerate(lines, 1)
+            if line.strip() and not (_COMMENT.match(line) or _FIRST_LINE_OF_EXCEL.fullmatch(line))
+        ),
+        (0, ''),
+    )
+    if not number:
+        raise BrokenFile(0, 'the file is empty; its first line has to name the columns')
+    delimiter = next((d for d in delimiters if d is not None and d in line), None)
+    cells = [cell.strip() for cell in _cells(line, delimiter)]
+    if cells and not cells[-1]:
+        del cells[-1]
+    if not _is_numeric(line):
+        return Table(number, cells, lines, delimiter, number)
+    if len(cells) == 3 and unit:
+        remarks.add(0, 'no header', f'the columns are x, y and z [{unit}]')
+        return Table(0, ['x', 'y', 'z'], lines, delimiter, number - 1)
+    sample = _SAMPLES.get(len(cells), _SAMPLES[3])
+    raise BrokenFile(number, f'no line before it names the columns; write one, such as {sample!r}')
+
+
+def _titles(text: str, delimiters: tuple[str | None, ...]) -> Iterator[list[str]]:
+    """Yield the titles that a line can have."""
+    for delimiter in delimiters:
+        if delimiter is None:
+            # Names with blanks inside stand farther apart.
+            yield re.split(r'\s{2,}|\t', text.strip())
+            yield [title.strip('"') for title in _TITLE.findall(text)]
+        elif delimiter in text:
+            yield [title.strip() for title in _cells(text, delimiter)]
+
+
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of a line; none where its quotation marks do not enclose cells."""
+    if '"' not in line:
+        return line.split(delimiter)
+    if delimiter is None:
+        # With this delimiter the reader takes many blanks for one.
+        line, delimiter = line.expandtabs(1).strip(), ' '
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
+    except csv.Error:
+        return []
+
+
+def _is_numeric(line: str) -> bool:
+    """Tell whether more cells of a line are numbers than not."""
+    cells = re.findall(r'[^;,\s"]+', line)
+    return 2 * sum(map(_is_number, cells)) > len(cells)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Tell whether a row is a second line of the header, with the units."""
+    units = [cell.strip(' []()') for cell in cells]
+    return any(is_unit(unit) and unit != '1' for unit in units) and all(
+        not unit or is_unit(unit) for unit in units
+    )
