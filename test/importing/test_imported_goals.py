@@ -187,6 +187,104 @@ def test_a_broken_packet_is_named(tmp_path, column, row, value, why):
     assert caught.value.line == row + 1
 
 
+#: Two lines of 100 mm; the tool rests for 2 s at the corner, where two rows say the same.
+TIMED = """t [s],x [mm],y [mm],z [mm]
+60.5,0,0,0
+61.5,100,0,0
+63.5,100,0,0
+64.5,100,100,0
+"""
+
+
+def said(found):
+    return [remark.text() for remark in found.remarks]
+
+
+def test_times_begin_at_the_first_point(tmp_path):
+    (tmp_path / 'a.csv').write_text(TIMED)
+    found = import_file(tmp_path / 'a.csv')
+    assert found.goal.waypoints.times.tolist() == [0.0, 1.0, 4.0]
+    assert found.goal.segments.dwells.tolist() == [0.0, 2.0, 0.0]
+    assert (
+        'the first point is at time 0: the arm has to be there; else give approach_time'
+        in said(found)
+    )
+
+
+def test_an_approach_gets_its_time(tmp_path, robot):
+    (tmp_path / 'a.csv').write_text(TIMED)
+    options = ImportOptions(approach_time=5.0, blend=0.005, origin=PART)
+    found = import_file(tmp_path / 'a.csv', options)
+    assert found.goal.waypoints.times.tolist() == [5.0, 6.0, 9.0]
+    assert found.goal.segments.blend_radii.tolist() == [0.005, 0.0, 0.0]
+    assert not any('time 0' in text for text in said(found))
+    assert planned(found.goal, robot).duration == pytest.approx(9.0, abs=0.01)
+
+
+def test_the_command_takes_an_approach_time(tmp_path, capsys):
+    (tmp_path / 'a.csv').write_text(TIMED)
+    goal = tmp_path / 'goal.yaml'
+    command = ['import', str(tmp_path / 'a.csv'), '-o', str(goal), '--approach-time', '5']
+    assert main(command) == 0
+    times = goal_from_fields(read_goal_file(goal)).waypoints.times
+    assert times.tolist() == [5.0, 6.0, 9.0]
+
+
+def test_a_rest_before_the_first_motion_is_left_out(tmp_path):
+    rows = TIMED.replace('61.5,', '61.5,0,0,0\n62.5,').replace('63.5', '64.5')
+    (tmp_path / 'a.csv').write_text(rows.replace('64.5,100,100', '65.5,100,100'))
+    found = import_file(tmp_path / 'a.csv')
+    assert found.goal.waypoints.times.tolist() == [0.0, 1.0, 4.0]
+    assert 'a rest of 1 s at the first point: it is left out' in said(found)
+
+
+@pytest.mark.parametrize(
+    ('second', 'line'), [('60.5', 3), ('60.4', 3), ('61.5', None), ('63.6', 4)]
+)
+def test_times_that_do_not_rise_are_said_with_their_line(tmp_path, second, line):
+    (tmp_path / 'a.csv').write_text(
+        TIMED.replace('61.5,', f'{second},').replace('63.5,100', '63.5,99')
+    )
+    found = import_file(tmp_path / 'a.csv')
+    expected = f'the times of the points: they do not rise at line {line}'
+    assert (expected in said(found)) == (line is not None)
+    assert found.goal.waypoints.times.any() == (line is None)
+
+
+def test_a_gap_in_the_times_is_said(tmp_path):
+    rows = [f'{0.1 * i + 30 * (i > 20):.1f},{i},0,0' for i in range(40)]
+    (tmp_path / 'a.csv').write_text('t,x [mm],y [mm],z [mm]\n' + '\n'.join(rows))
+    found = import_file(tmp_path / 'a.csv')
+    assert 'line 23: a gap of 30.1 s: the motion there takes as long' in said(found)
+
+
+@pytest.mark.parametrize('speed', [None, 0.05])
+def test_of_times_and_speeds_one_counts_and_the_other_is_said(tmp_path, speed):
+    text = TIMED.replace(' [s]', '').replace('\n', ',20\n').replace('z [mm],20', 'z [mm],v [mm/s]')
+    (tmp_path / 'a.csv').write_text(text)
+    found = import_file(tmp_path / 'a.csv', ImportOptions(speed=speed))
+    if speed is None:
+        assert found.goal.waypoints.times.any()
+        assert not found.goal.segments.velocities.any()
+        assert 'the speeds of the points: their times are kept' in said(found)
+    else:
+        assert found.goal.segments.velocities.tolist() == [0.05] * 3
+        assert "line 1: column 'v [mm/s]': a speed is given" in said(found)
+        assert 'the times of the points: a speed is given' in said(found)
+
+
+def test_a_recording_of_rtde_begins_at_time_0(tmp_path):
+    """The manufacturer's recorder counts from the start of the controller."""
+    found = import_file(FOREIGN / 'ur_rtde.csv')
+    rows = np.genfromtxt(FOREIGN / 'ur_rtde.csv', delimiter=',', names=True)
+    times = found.goal.waypoints.times
+    assert rows['timestamp'][0] == 62.56
+    assert times[0] == 0.0
+    # The rest before the motion is left out; from there on the clock runs as that of the robot.
+    clock = rows['timestamp'][found.lines - 2]
+    assert np.diff(times[1:]) == pytest.approx(np.diff(clock[1:]), abs=1e-9)
+
+
 def test_an_unknown_format_is_refused(tmp_path):
     with pytest.raises(BrokenFile, match='give one of csv'):
         import_file(tmp_path / 'a.step')

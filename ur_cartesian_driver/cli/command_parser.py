@@ -389,6 +389,12 @@ def _add_import(command: CommandParser) -> None:
     command.add_argument(
         '--acceleration', type=argument_types.factor, help='[m/s^2]; by default as the speed'
     )
+    command.add_argument(
+        '--approach-time',
+        type=argument_types.seconds,
+        metavar='SECONDS',
+        help='for the way to the first point, where the file has times',
+    )
     for name, default, text in (
         ('blend', 0.0, 'at inner points, like 1mm'),
         (

@@ -61,6 +61,7 @@ def options_of(arguments: argparse.Namespace) -> ImportOptions:
         speed=arguments.speed,
         travel_speed=arguments.travel_speed,
         acceleration=arguments.acceleration,
+        approach_time=arguments.approach_time,
         blend=arguments.blend,
         simplify=arguments.simplify,
         tolerance=max(arguments.tolerance, 1e-6),

@@ -129,6 +129,8 @@ class ImportOptions:
     travel_speed: float | None = None
     #: Of all motions [m/s^2]; None = that of the file, else the driver's parameter.
     acceleration: float | None = None
+    #: For the way to the first point [s], where the file has times; None = that of the file.
+    approach_time: float | None = None
     #: At inner points [m]; smaller where the lines are short.
     blend: float = 0.0
     #: Largest distance of the simplified path [m]; 0 = all points are kept.

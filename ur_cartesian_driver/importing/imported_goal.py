@@ -20,6 +20,7 @@ from ur_cartesian_driver.importing.imported_path import (
     SAME_POINT,
     SAME_TURN,
 )
+from ur_cartesian_driver.importing.path_times import with_times
 from ur_cartesian_driver.importing.simplification import simplify
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows, WaypointRows
@@ -64,8 +65,8 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
     """
     path = _scaled(path, options.scale)
     path = replace(path, quaternions=_orientations(path, options, remarks))
-    path = _without_repeated(path, remarks)
-    path = _with_times(path, options, remarks)
+    path, rests = _without_repeated(path, remarks)
+    path = with_times(path, rests, options, remarks)
     path = _without_flat_arcs(path, remarks)
     if options.simplify:
         before = len(path)
@@ -86,13 +87,18 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         poses, vias = transform_rows(options.origin, poses), transform_rows(options.origin, vias)
     speeds, accelerations = _speeds(path, options), _accelerations(path, options)
     times = np.nan_to_num(path.times)
+    if times.any():
+        for what, values in (('speeds', speeds), ('accelerations', accelerations)):
+            if values.any():
+                remarks.add(0, f'the {what} of the points', 'their times are kept')
+                values[:] = 0.0
     segments = replace(
         SegmentRows.plain(len(path)),
         types=path.types,
         blend_radii=_blends(path, options, speeds, remarks),
         dwells=np.nan_to_num(path.dwells),
-        velocities=np.zeros(len(path)) if times.any() else speeds,
-        accelerations=np.zeros(len(path)) if times.any() else accelerations,
+        velocities=speeds,
+        accelerations=accelerations,
         vias=vias,
         has_via=has_via,
         arc_modes=path.arc_modes,
@@ -200,8 +206,12 @@ def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
     return normalized_rows(rows[best, :, np.arange(len(best))])
 
 
-def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
-    """Leave out lines that lead nowhere: the robot has no motion for them."""
+def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> tuple[ImportedPath, Floats]:
+    """
+    Leave out lines that lead nowhere: the robot has no motion for them.
+
+    :returns: the path, and how long the tool rests at its points (n,) [s].
+    """
     still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
         angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
     )
@@ -212,17 +222,20 @@ def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
         posture = path.postures.get(row + 1)
         still[row] = posture is None or posture == path.postures.get(row)
     still &= ~path.rests[1:]
+    rests = np.zeros(len(path))
     if not still.any():
-        return path
+        return path, rests
     # Of slow drifts every now and then one point has to stay.
     rows, last = [0], 0
     for row in range(1, len(path)):
         if still[row - 1] and _is_same(path, row, last):
             remarks.add(int(path.lines[row]), 'a point', 'it is where the one before is')
+            rests[last] = path.times[row] - path.times[last]
         else:
             rows.append(row)
             last = row
-    return path.take(np.array(rows, dtype=np.int64))
+    kept = np.array(rows, dtype=np.int64)
+    return path.take(kept), rests[kept]
 
 
 def _is_same(path: ImportedPath, row: int, other: int) -> bool:
@@ -231,30 +244,6 @@ def _is_same(path: ImportedPath, row: int, other: int) -> bool:
         distance_rows(path.positions[pair[0]], path.positions[pair[1]])[0] < SAME_POINT
         and angle_rows(path.quaternions[pair[0]], path.quaternions[pair[1]])[0] < SAME_TURN
     )
-
-
-def _with_times(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
-    """Keep times that rise, unless there are speeds."""
-    if np.isnan(path.times).all():
-        return path
-    why = ''
-    if options.speed is not None:
-        why = 'a speed is given'
-    elif options.simplify:
-        why = 'simplify merges points, whose times would no longer fit'
-    else:
-        # The first point is where the arm stands, or where it has to go first: it needs a time.
-        times = path.times - min(0.0, float(path.times[0]))
-        rises = np.diff(times) > 0.0
-        if not (len(path) > 1 and np.isfinite(times).all() and rises.all()):
-            row = 0 if rises.all() else int(np.argmin(rises)) + 1
-            why = f'they do not rise at line {path.lines[row]}'
-            if not path.lines[row]:
-                why = f'they do not rise at point {row}'
-        else:
-            return replace(path, times=times)
-    remarks.add(0, 'the times of the points', why)
-    return replace(path, times=np.full(len(path), np.nan))
 
 
 def _without_flat_arcs(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
