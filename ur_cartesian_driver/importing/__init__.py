@@ -15,10 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ur_cartesian_driver.goal_files.garbage import uncollected
-from ur_cartesian_driver.importing import (
-    recording_file,
-    ros_messages_file,
-)
+from ur_cartesian_driver.importing import recording_file
 from ur_cartesian_driver.importing.dxf import dxf_file
 from ur_cartesian_driver.importing.gcode import gcode_file
 from ur_cartesian_driver.importing.import_format import ImportFormat, Term, Treatment
@@ -31,6 +28,7 @@ from ur_cartesian_driver.importing.import_options import (
 )
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
+from ur_cartesian_driver.importing.messages import ros_messages_file
 from ur_cartesian_driver.importing.script import urscript_file
 from ur_cartesian_driver.importing.tables import csv_file
 
@@ -93,11 +91,11 @@ def import_file(
 
 def import_message(message: Any, options: ImportOptions | None = None) -> ImportedGoal:
     """
-    Read a nav_msgs/Path, a geometry_msgs/PoseArray or a trajectory_msgs/JointTrajectory.
+    Read a nav_msgs/Path, a trajectory_msgs/JointTrajectory, or another message with a path.
 
     The lines of remarks are the numbers of the points from 1.
 
-    :raises BrokenFile: it is none of these, or a value is none of its field.
+    :raises BrokenFile: it has no path, or a value is none of its field.
     """
     into, options = PathCollector(), options or ImportOptions()
     ros_messages_file.collect_message(message, options, into)

@@ -1,0 +1,181 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
+
+That is YAML, a document for each message, of which nobody sees more than mappings, lists, numbers
+and texts. Here each of these knows its line. PyYAML only splits the text: the words of its errors,
+and the limits of its nesting, differ between versions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import re
+from typing import Any
+
+import yaml
+
+from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
+
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+#: A message nests five deep.
+_MAX_DEPTH = 50
+_END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
+_BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
+#: Printed between two messages, and not ended by a line of its own.
+_LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
+#: Line ends of YAML 1.1, which are none for anybody else: they would shift the numbers of lines.
+_NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')
+_NO_TEXT = re.compile('[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
+
+
+class MessagePart:
+    """A mapping with its fields as attributes, and its line."""
+
+    def __init__(self, line: int) -> None:
+        """Begin without fields."""
+        self.line = line
+        self.fields: dict[str, Any] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        """
+        Return a field.
+
+        :raises BrokenFile: it is missing.
+        """
+        if name.startswith('_'):
+            raise AttributeError(name)
+        try:
+            return self.fields[name]
+        except KeyError:
+            raise BrokenFile(self.line, f'the field {name} is missing') from None
+
+
+class MessageList(list[Any]):
+    """A list with its line."""
+
+    def __init__(self, line: int) -> None:
+        """Begin empty."""
+        super().__init__()
+        self.line = line
+
+
+class MessageNumber(float):
+    """A number with its line."""
+
+    line: int
+
+
+class MessageText(str):
+    """A text with its line."""
+
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class EchoedMessage:
+    """The text of a message."""
+
+    #: The first one, from 1.
+    line: int
+    text: str
+    #: Whether a line of three hyphens says that it is whole.
+    is_whole: bool
+
+    def read(self) -> MessagePart:
+        """
+        Return the fields.
+
+        :raises BrokenFile: they cannot be read.
+        """
+        if strange := _NO_TEXT.search(self.text):
+            line = self.line + self.text.count('\n', 0, strange.start())
+            raise BrokenFile(line, f'the character {strange[0]!r} is none of a message')
+        try:
+            events = iter(yaml.parse(self.text, Loader=_Loader))
+            values = [
+                _value(next(events), events, self.line, 0)
+                for event in events
+                if isinstance(event, yaml.DocumentStartEvent)
+            ]
+        except yaml.YAMLError as error:
+            mark = getattr(error, 'problem_mark', None)
+            raise self._no_message(mark.line if mark else 0) from None
+        if len(values) != 1 or not isinstance(values[0], MessagePart):
+            raise BrokenFile(self.line, 'this is no message: it has no fields')
+        return values[0]
+
+    def _no_message(self, row: int) -> BrokenFile:
+        """Return the refusal of a text that is no YAML, by the row where that shows."""
+        lines = self.text.split('\n')
+        row = min(row, len(lines) - 1)
+        if '\t' in lines[row][: len(lines[row]) - len(lines[row].lstrip())]:
+            return BrokenFile(self.line + row, 'it begins with a tab; write blanks')
+        end = '' if self.is_whole or any(map(str.strip, lines[row + 1 :])) else ', or is cut off'
+        return BrokenFile(self.line + row, f'this is no message as ros2 topic echo prints it{end}')
+
+
+def echoed_messages(text: str, remarks: ImportNotes) -> list[EchoedMessage]:
+    """Return the messages of a text, which are not yet read."""
+    text = text.replace('\r\n', '\n').replace('\r', '\n').translate(_NO_LINE_ENDS)
+    for lost in _LOST.finditer(text):
+        line = text.count('\n', 0, lost.start()) + 1
+        remarks.add(line, 'a message', 'ros2 topic echo has lost it')
+    text = _LOST.sub('\n\n---', text)
+    messages, begin, line = [], 0, 1
+    ends = [(end.start(), end.end()) for end in _END_OF_MESSAGE.finditer(text)]
+    for stop, following in [*ends, (len(text), len(text))]:
+        message = text[begin:stop]
+        if message.strip():
+            content = _BLANK_LINES.sub('', message, count=1)
+            blank = message.count('\n') - content.count('\n')
+            messages.append(EchoedMessage(line + blank, content, following > stop))
+        line += text.count('\n', begin, following)
+        begin = following
+    return messages
+
+
+def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
+    """
+    Return the value that begins with an event of PyYAML.
+
+    :param first: the line that PyYAML counts from.
+    :raises BrokenFile: messages have none of this kind.
+    """
+    line = first + event.start_mark.line
+    if isinstance(event, yaml.ScalarEvent):
+        return _scalar(event, line)
+    if depth > _MAX_DEPTH:
+        raise BrokenFile(line, 'it is nested too deeply')
+    if isinstance(event, yaml.SequenceStartEvent):
+        items = MessageList(line)
+        for item in events:
+            if isinstance(item, yaml.SequenceEndEvent):
+                break
+            items.append(_value(item, events, first, depth + 1))
+        return items
+    if not isinstance(event, yaml.MappingStartEvent):
+        raise BrokenFile(line, 'a reference (*) is no part of a message')
+    part = MessagePart(line)
+    for key in events:
+        if isinstance(key, yaml.MappingEndEvent):
+            break
+        name = getattr(key, 'value', '')
+        if not name or name in part.fields:
+            what = f'the field {name!r:.40} stands twice' if name else 'a field has no name'
+            raise BrokenFile(first + key.start_mark.line, what)
+        part.fields[name] = _value(next(events), events, first, depth + 1)
+    return part
+
+
+def _scalar(event: Any, line: int) -> MessageNumber | MessageText:
+    """Return a number or a text; 1e-05 of ROS 1 is a number, which YAML 1.1 takes for a text."""
+    scalar: MessageNumber | MessageText
+    try:
+        scalar = MessageText(event.value) if event.style else MessageNumber(event.value)
+    except ValueError:
+        scalar = MessageText(event.value)
+    scalar.line = line
+    return scalar
