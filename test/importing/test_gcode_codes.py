@@ -129,6 +129,7 @@ def test_s_drives_its_output(tmp_path):
 @pytest.mark.parametrize('topic', dict.fromkeys(row.topic for row in CODES.values()))
 def test_a_row_is_left_out_and_said(tmp_path, topic):
     names = [name for name in rows(Treatment.LEFT_OUT) if CODES[name].topic == topic]
+    names = [name for name in names if name != 'M622']  # changes the lines behind it
     # All in one program, each in a line of its own.
     found = imported(tmp_path, BEFORE + '\n'.join(map(line_of, names)) + AFTER)
     assert positions(found) == pytest.approx(np.array([HERE, THERE]))

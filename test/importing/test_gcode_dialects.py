@@ -196,9 +196,10 @@ SAID = {
     ),
     'cura_ender3.gcode': ('line 16: a move: the position in X and Y is not known since line 15',),
     'orcaslicer_p1s.gcode': (
-        'lines 15-16: M1002: a message, or the name of a file',
+        'lines 15-16, 40: M1002: a message, or the name of a file',
         'line 34: M970.3: a command of a printer',
-        'lines 46-47: M486: a message, or the name of a file',
+        'lines 42-43, 46: a line under a condition: whether its condition holds is not known',
+        'lines 55-56: M486: a message, or the name of a file',
         'line 26: a move: the position in X and Y is not known since line 24',
     ),
     'slic3r_klipper.gcode': (

@@ -153,7 +153,7 @@ def test_a_slicer(tmp_path):
         ('G21\nG1 X1.2.3 Y0\n', 2, 'two points'),
         ('G21\nhello world\n', 2, 'no G-code'),
         ('G21\nG1 X#100\n', 2, 'has #'),
-        ('G21\n\nX1 Y2\n', 3, 'without G0'),
+        ('G21 G80\n\nX1 Y2\n', 3, 'without G0'),
         ('G0 X0 Y0\nG2 X1 Y0 I3 J0\n', 2, 'centre'),
         ('G0 X0 Y0\nG2 X9 Y0 R1\n', 2, 'twice its radius'),
         ('G0 X0 Y0\nG2 X1 Y0\n', 2, 'needs I and J, or R'),

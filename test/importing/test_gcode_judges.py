@@ -79,7 +79,7 @@ class Judged:
     def check(self):
         first = self.motions[0]
         # The first motion leads from the beginning, if that is known.
-        begin = np.linalg.norm(self.positions[0] - first[4]) > 1e3 * NEAR or first[3] == 'A'
+        begin = self.path.lines[0] == self.path.lines[1]
         here = self.positions[0] if begin else np.array(first[4])
         for motion in self.motions[not begin :]:
             here = (self.arc if motion[3] == 'A' else self.line)(here, motion)

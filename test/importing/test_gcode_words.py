@@ -109,7 +109,7 @@ def test_a_number_is_read_as_the_grammar_says(tmp_path, line, x):
         ('G1 G92 X0', 'G92 and a motion cannot share X'),
         ('G4 G1 X5', 'G4 and a motion cannot share X'),
         ('G2 X2 I0.5 G64 P2', 'G64 and a motion cannot share P'),
-        ('G80 X5', 'coordinates without G0, G1, G2 or G3'),
+        ('G80 X5', 'coordinates without G0, G1, G2 or G3 since G80'),
         ('G53', 'G53 needs coordinates'),
         ('G20 F10', 'F beside G20 is of one unit or the other'),
         ('G1 X2 M104 S200', 'S could belong to M104 or not'),
@@ -187,6 +187,24 @@ def test_a_percent_sign_begins_a_program_once(tmp_path):
     assert len(positions(found)) == 2
     # Without one at the beginning, one is the end.
     assert len(positions(imported(tmp_path, f'{HERE}%\nG1 X2\n'))) == 1
+
+
+def test_lines_under_a_condition_of_a_printer_are_left_out(tmp_path):
+    text = HERE + 'M1002 judge_flag x\nM622 J1\n  G1 X5 {what}\n  G29\nM623\nX2\nG1 X3 Y1 Z1\n'
+    found = imported(tmp_path, text)
+    assert positions(found) == pytest.approx(np.array([[1, 1, 1], [3, 1, 1]]))
+    said = remarks(found)
+    assert 'lines 5-6: a line under a condition: whether its condition holds is not known' in said
+    assert 'line 8: a move: the position in Y and Z is not known since line 4' in said
+    assert refusal(tmp_path, HERE + 'M622 J1\nG1 X5\n') == (
+        'line 3: M622 begins a condition, and no M623 ends it.'
+    )
+
+
+def test_coordinates_before_any_motion_code_are_a_travel(tmp_path):
+    found = imported(tmp_path, 'G21 G90\nG43 H1 X1 Y2 Z3\nX5\n')
+    assert positions(found) == pytest.approx(np.array([[1, 2, 3], [5, 2, 3]]))
+    assert 'line 2: no G0 to G3 before: a line, as after power-up' in remarks(found)
 
 
 def test_messages_are_said_beside_words(tmp_path):

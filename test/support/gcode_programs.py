@@ -86,6 +86,8 @@ EXAMPLES = {
     '$J': '$J=G91 X5',
     'M98 P"': 'M98 P"/macros/a.g"',
     'W': 'W5',
+    'G80 W': 'G80 X5 Y6 W30 H40',
+    'G80 H': 'G80 H40 X5 Y6',
 }
 
 

@@ -83,6 +83,7 @@ _THREAD = 'a thread needs a spindle that is measured'
 _NO_WAIT = 'the path does not wait'
 _FLOW = 'let the CAM write the program out'
 _TEXT = 'a message, or the name of a file'
+OTHER_FILE = 'other files are not read'
 
 _MOTION = (
     _honoured('motion', '', 'G0', 'G1', 'G2', 'G3', group='motion', stage=Stage.MOTION),
@@ -195,6 +196,7 @@ _TOOLS = (
         *('G10 L0', 'G10 L1', 'G10 L10', 'G10 L11'),
         words=_AXES + 'LPRIJQ',
     ),
+    _left_out('tools', _NO_EXTRUDER, 'G10', 'G11', words=_AXES + 'PRS'),
 )
 _PROGRAM = (
     _honoured('program', '', 'M2', 'M30', words='P', stage=Stage.END, group='end'),
@@ -214,21 +216,27 @@ _PROGRAM = (
     _refused('program', _FLOW, '#', '[', '=', 'o-word', 'G65', 'G66', 'M96', 'M97'),
     _refused('program', _FLOW, 'IF', 'WHILE', 'GOTO'),
     _refused('program', 'it restores modes', *_numbers('M', (70, 73))),
-    _refused('program', 'other files are not read', 'M198', 'M98 P"'),
+    _refused('program', OTHER_FILE, 'M198'),
 )
 _PRINTERS = (
     _left_out(
         'printers',
         _HOME,
-        *('G27', 'G29', 'G32', 'G34', 'G39', 'G380', 'G425', 'M125'),
+        *('G27', 'G29', 'G32', 'G34', 'G39', 'G80 H', 'G80 W', 'G150', 'G380', 'G382', 'G383'),
+        *('G425', 'M125'),
         words='XYZABCDEFHIJKLNOPQRSTUVW',
         bare='XYZABCDEFHIJKLNOPQRSTUVW',
         stage=Stage.OFFSET,
         moves_away=True,
     ),
-    _left_out('printers', _PRINTER, 'G29.1', 'G29.2', 'G29.4', words='XYZFPS'),
-    _left_out('printers', _NO_EXTRUDER, 'G10', 'G11', words=_AXES + 'PRS'),
-    _left_out('printers', _PRINTER, 'M73 L', 'M73 P', 'M73 Q', 'M73 R', 'M73.2', alone=True),
+    _left_out('printers', _PRINTER, 'G29.1', 'G29.2', 'G29.4', 'G392', words='XYZFPS'),
+    _left_out('printers', OTHER_FILE, 'M98 P"', stage=Stage.OFFSET, moves_away=True),
+    _left_out(
+        'printers', 'whether its condition holds is not known', 'M622', alone=True, moves_away=True
+    ),
+    _left_out(
+        'printers', _PRINTER, 'M73 L', 'M73 P', 'M73 Q', 'M73 R', 'M73.2', 'M622.1', alone=True
+    ),
     _left_out(
         'printers',
         _PRINTER,
@@ -237,9 +245,9 @@ _PRINTERS = (
         *_numbers('M', (190, 193), (200, 211), (217, 222), (226, 233), 240, 245, 246, 250),
         *_numbers('M', (255, 263), (280, 282), 290, (300, 310), 350, 351, 355, (360, 381)),
         *_numbers('M', (400, 430), (450, 453), (493, 495), (500, 505), (510, 512), 524),
-        *_numbers('M', (530, 540), (554, 586), (588, 599), (600, 630), (650, 675)),
+        *_numbers('M', (530, 540), (554, 586), (588, 599), (600, 621), (623, 641), (650, 675)),
         *_numbers('M', (701, 710), (750, 758), 808, 809, 820, 851, 852, (860, 876)),
-        *_numbers('M', (900, 921), 951, (960, 999), (1003, 1007), 7219, 9833),
+        *_numbers('M', (900, 921), 951, (960, 999), (1003, 1012), 7219, 9833),
         alone=True,
         stage=Stage.OUTPUT,
     ),
@@ -267,9 +275,9 @@ _CHANGED_BY_WORDS = frozenset(name.split()[0] for name in CODES if name[0] in 'G
 def code_named(name: str) -> Code | None:
     """Return the row of a code, of the family of a printer's code, or of a name; None = none."""
     row = CODES.get(name)
-    if row is None and name[0] == 'M' and '.' in name:
+    if row is None and '.' in name:
         family = CODES.get(name.partition('.')[0])
-        return family if family and family.alone else None
+        return family if family and family.topic == 'printers' else None
     # X_5 is a broken word, and no name.
     is_name = '_' in name and sum(map(str.isalpha, name)) > 2
     return CODES['names with _'] if row is None and is_name else row

@@ -29,6 +29,7 @@ _OF_MOTION = frozenset('XYZIJKRP')
 _AXIS_WORDS = frozenset('XYZABCE')
 #: They go to a place of the machine along the axes that they name, and all if none.
 _WITH_AXES = ('G28', 'G30', 'G53')
+_CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The numbers of work offsets in G10.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
@@ -49,6 +50,8 @@ class GcodeMachine:
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
         self._feed_per_turn = self._surface_speed = self._is_lathe = False
+        #: The line of M622 whose M623 has not come.
+        self._condition = 0
         #: The lines of G0 while S is above 0.
         self._powered_travels: list[int] = []
 
@@ -60,13 +63,16 @@ class GcodeMachine:
         """
         for number, line in self._sequence:
             self._line = number
-            block = read_line(number, line)
-            if block is not None:
+            if self._condition:
+                self._pass_by(line)
+            elif (block := read_line(number, line)) is not None:
                 self._execute(block)
         self._finish()
 
     def _finish(self) -> None:
         """Say what only the whole program tells."""
+        if self._condition:
+            raise BrokenFile(self._condition, 'M622 begins a condition, and no M623 ends it')
         self._outputs.finish()
         for line in self._powered_travels if not self._path.coordinates.is_named('Z') else ():
             self._into.remarks.add(
@@ -75,6 +81,13 @@ class GcodeMachine:
         if self._is_lathe and self._path.share_of_x is None:
             self._into.remarks.add(0, 'X of a lathe', 'a radius, because there is no G7')
         self._path.coordinates.finish(self._into)
+
+    def _pass_by(self, line: str) -> None:
+        """Leave a line out that a printer only executes under a condition."""
+        if _CONDITION_END.match(line):
+            self._condition = 0
+        elif line.strip() and line.lstrip()[0] != ';':
+            self._omit('a line under a condition', CODES['M622'].reason)
 
     def _omit(self, what: str, why: str) -> None:
         self._into.remarks.add(self._line, what, why)
@@ -255,7 +268,7 @@ class GcodeMachine:
             self._omit(code, CODES['G96'].reason)
 
     def _set_motion(self, code: str, _: _Words) -> None:
-        self._path.motion = '' if code == 'G80' else code
+        self._path.motion = code
 
     def _set_frame(self, code: str, own: _Words) -> None:
         frame = f'{code} P{own["P"]:g}' if 'P' in own else code
@@ -310,6 +323,10 @@ class GcodeMachine:
         if not self._sequence.back(self._line, own):
             self._omit(f'{code} in the main program', 'it is executed once')
 
+    def _begin_condition(self, code: str, _: _Words) -> None:
+        self._condition = self._line
+        self._omit(code, CODES['M622'].reason)
+
     def _percent(self, *_: object) -> None:
         if self._has_begun or self._seen_percent:
             self._sequence.end()
@@ -342,6 +359,7 @@ _DO: Mapping[str, _Action] = {
         ('M2 M30', GcodeMachine._end),
         ('M98', GcodeMachine._call),
         ('M99', GcodeMachine._return),
+        ('M622', GcodeMachine._begin_condition),
         ('%', GcodeMachine._percent),
         ('O', GcodeMachine._number),
     )

@@ -24,7 +24,7 @@ class Toolpath:
         """Begin in the modes of RS274/NGC, at an unknown place."""
         self._options, self._into = options, into
         self.coordinates = Coordinates()
-        #: G0 to G3; empty = none has been given, or G80 has ended it.
+        #: G0 to G3, or G80, which ends them; empty = none has been given.
         self.motion = ''
         #: G17 to G19; empty = none has been given, so it is G17.
         self.plane = ''
@@ -60,8 +60,11 @@ class Toolpath:
         :param words: its coordinates, and those of an arc.
         :raises BrokenFile: it cannot be meant.
         """
+        if self.motion == 'G80':
+            raise BrokenFile(line, 'coordinates without G0, G1, G2 or G3 since G80')
         if not self.motion:
-            raise BrokenFile(line, 'coordinates without G0, G1, G2 or G3 before')
+            self.motion = 'G0'
+            self._into.remarks.add(line, 'no G0 to G3 before', 'a line, as after power-up')
         where = self.coordinates
         start, known_before = where.place[:], where.states[:]
         go = where.go_by if self.relative else where.go_to

@@ -13,7 +13,7 @@ from functools import lru_cache
 import re
 from typing import NamedTuple
 
-from ur_cartesian_driver.importing.gcode.codes import code_named, CODES
+from ur_cartesian_driver.importing.gcode.codes import code_named, CODES, OTHER_FILE
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _COMMENT = re.compile(r'\([^()]*\)|;.*')
@@ -34,7 +34,6 @@ _EXPONENT = re.compile(r'[A-FH-LN-Z][ \t]*[-+]?[0-9.]+E[-+]?[0-9]+(?![0-9.])', r
 _M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
 _QUOTED = re.compile(r'"[^"]*"')
 _NAME = re.compile(r'\s*([A-Za-z_]{2}\w*)')
-_OTHER_FILE = 'M98 P"'
 _PROGRAM_NUMBER = re.compile(r'[O:]([0-9]{1,8})')
 
 
@@ -144,8 +143,10 @@ def _odd_block(number: int, line: str, text: str) -> Block:
             raise BrokenFile(
                 number, f'{_shown(line)} has {sign}, which is not read: {CODES[sign].reason}'
             )
+    if text.startswith('M98P"'):
+        return Block(['M98 P"'], {})
     if text.startswith('M98'):
-        raise BrokenFile(number, f'{_shown(line)} is not read: {CODES[_OTHER_FILE].reason}')
+        raise BrokenFile(number, f'{_shown(line)} is not read: {OTHER_FILE}')
     rest = text[_WORDS_BEFORE.match(text).end() :]  # type: ignore[union-attr]  # matches ''
     if rest[0] == '.':
         raise BrokenFile(number, f'{_shown(line)} has a number with two points')

@@ -37,6 +37,15 @@ G92 E0
 M83
 G21
 G29.2 S1
+M1002 judge_flag g29_before_print_flag
+M622 J1
+  M1002 gcode_claim_action : 1
+  G29 A1 O X118 Y118 I20 J20 R
+M623
+M622 J0
+  G28
+M623
+G150.3
 ; MACHINE_START_GCODE_END
 M106 S0
 ; CHANGE_LAYER
