@@ -89,6 +89,8 @@ def test_the_tool_is_lifted_after_a_gap(tmp_path):
         ('G28.1\nX5', True),
         ('G28 A0\nX5', True),
         ('M125\nX5', False),
+        ('$H\nX5', False),
+        ('$32=1\nX5', True),
         ('G29.1 Z0.1\nX5', True),
     ],
 )

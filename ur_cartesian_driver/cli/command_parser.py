@@ -418,8 +418,9 @@ def _add_import(command: CommandParser) -> None:
         action='append',
         default=[],
         metavar='CODE=KIND:PIN:VALUE',
-        help='output of an M-code, like M3=standard:2:1, or of S with the number that means 1, '
-        'like S=analog:0:10000; may be given several times',
+        help='output of an M-code, like M3=standard:2:1, of one with its values, like '
+        '"M280 S40=standard:0:1", or of S with the number that means 1, like S=analog:0:10000; '
+        'may be given several times',
     )
     add_model(command)  # for joint positions
     _add_tcp(command, ', for joint positions [m, rad]')
