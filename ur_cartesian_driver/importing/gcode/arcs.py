@@ -5,13 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import acos, atan2, ceil, cos, hypot, pi, sin
+from typing import NamedTuple
 
 from ur_cartesian_driver.motion.vectors import Vector3
 
-#: The axes of an arc in each plane, and the one that it may rise along: right-handed.
-PLANES = {'G17': (0, 1, 2), 'G18': (2, 0, 1), 'G19': (1, 2, 0)}
 #: The radii at both ends of an arc may differ by so much [m], or by this share, but never by more
 #: than the last [m]: LinuxCNC and GRBL.
 _RADIUS_TOLERANCE, _RADIUS_SHARE, _MAX_RADIUS_TOLERANCE = 5e-6, 1e-3, 5e-4
@@ -22,24 +20,26 @@ _MIN_RISE = 1e-6
 _MAX_LINES = 100_000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArcWords:
-    """The words of an arc [m]."""
+class Plane(NamedTuple):
+    """The plane of arcs: two axes, and the one that they may rise along, right-handed."""
 
-    plane: tuple[int, int, int]
-    #: G2 = -1, G3 = 1.
-    direction: int
-    #: Of the centre in the plane, or None with a radius.
-    centre: tuple[float, float] | None
-    radius: float
-    turns: int
+    name: str
+    axes: tuple[int, int, int]
+    #: The letters of the centre along these axes.
+    letters: tuple[str, str, str]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Arc:
+PLANES = {
+    'G17': Plane('G17', (0, 1, 2), ('I', 'J', 'K')),
+    'G18': Plane('G18', (2, 0, 1), ('K', 'I', 'J')),
+    'G19': Plane('G19', (1, 2, 0), ('J', 'K', 'I')),
+}
+
+
+class Arc(NamedTuple):
     """A part of a circle or a helix [m, rad]."""
 
-    plane: tuple[int, int, int]
+    axes: tuple[int, int, int]
     centre: tuple[float, float]
     start: Sequence[float]
     end: Sequence[float]
@@ -51,7 +51,7 @@ class Arc:
     @property
     def rises(self) -> bool:
         """Tell whether it leaves its plane."""
-        axis = self.plane[2]
+        axis = self.axes[2]
         return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
 
     def place(self, share: float) -> Vector3:
@@ -59,7 +59,7 @@ class Arc:
         if share == 1.0:
             x, y, z = self.end
             return (x, y, z)
-        a, b, c = self.plane
+        a, b, c = self.axes
         angle = self.begin + share * self.sweep
         radius = self.radii[0] + share * (self.radii[1] - self.radii[0])
         point = [0.0, 0.0, 0.0]
@@ -88,15 +88,26 @@ class Arc:
             yield self.place((i + 0.5) / count), self.place((i + 1) / count)
 
 
-def arc_between(start: Sequence[float], end: Sequence[float], words: ArcWords) -> Arc:
+def arc_between(
+    plane: Plane,
+    start: Sequence[float],
+    end: Sequence[float],
+    centre: tuple[float, float] | float,
+    direction: int,
+    turns: int,
+) -> Arc:
     """
-    Return the arc.
+    Return the arc from one place to another.
 
+    :param centre: in the plane; or a radius, negative for more than a half circle.
+    :param direction: clockwise -1 (G2), counterclockwise 1 (G3).
     :raises ValueError: there is none; a sentence without a full stop.
     """
-    a, b, _ = words.plane
+    a, b, _ = plane.axes
     ax, ay, bx, by = start[a], start[b], end[a], end[b]
-    cx, cy = words.centre or _centre_of_radius(ax, ay, bx, by, words)
+    if isinstance(centre, float):
+        centre = _centre_of_radius(ax, ay, bx, by, centre, direction)
+    cx, cy = centre
     radius, other = hypot(ax - cx, ay - cy), hypot(bx - cx, by - cy)
     tolerance = min(max(_RADIUS_TOLERANCE, _RADIUS_SHARE * radius), _MAX_RADIUS_TOLERANCE)
     if abs(radius - other) > tolerance or not radius > 0.0:
@@ -104,25 +115,18 @@ def arc_between(start: Sequence[float], end: Sequence[float], words: ArcWords) -
             f'the arc begins {1e3 * radius:.6g} mm and ends {1e3 * other:.6g} mm from its centre'
         )
     begin = atan2(ay - cy, ax - cx)
-    sweep = words.direction * (atan2(by - cy, bx - cx) - begin) % (2.0 * pi)
+    sweep = direction * (atan2(by - cy, bx - cx) - begin) % (2.0 * pi)
     if sweep < _FULL_CIRCLE:
         sweep += 2.0 * pi
-    return Arc(
-        plane=words.plane,
-        centre=(cx, cy),
-        start=tuple(start),
-        end=tuple(end),
-        begin=begin,
-        sweep=words.direction * (sweep + 2.0 * pi * (words.turns - 1)),
-        radii=(radius, other),
-    )
+    sweep = direction * (sweep + 2.0 * pi * (turns - 1))
+    return Arc(plane.axes, centre, start, end, begin, sweep, (radius, other))
 
 
 def _centre_of_radius(
-    ax: float, ay: float, bx: float, by: float, words: ArcWords
+    ax: float, ay: float, bx: float, by: float, radius: float, direction: int
 ) -> tuple[float, float]:
-    """Return the centre of an arc by its radius, negative for more than a half circle."""
-    dx, dy, radius = bx - ax, by - ay, words.radius
+    """Return the centre of an arc by its radius."""
+    dx, dy = bx - ax, by - ay
     chord = hypot(dx, dy)
     if chord < _MIN_RISE:
         raise ValueError('an arc with R ends where it begins; give I and J for a circle')
@@ -132,5 +136,5 @@ def _centre_of_radius(
             f'{1e3 * abs(radius):.6g} mm'
         )
     height = max(0.0, radius * radius - 0.25 * chord * chord) ** 0.5
-    height *= words.direction if radius > 0.0 else -words.direction
+    height *= direction if radius > 0.0 else -direction
     return (ax + bx) / 2.0 - height * dy / chord, (ay + by) / 2.0 + height * dx / chord

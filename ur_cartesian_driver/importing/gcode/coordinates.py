@@ -164,7 +164,7 @@ class Coordinates:
 
     def start_is_known(self, states_before: Sequence[int]) -> bool:
         """Tell whether the motion just made began at a known place, or counts from its start."""
-        return all(
+        return self.states == states_before or all(
             before == after or (before == _BEGIN and from_zero)
             for before, after, from_zero in zip(
                 states_before, self.states, self._counts_from_zero, strict=True

@@ -6,14 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ur_cartesian_driver.importing.gcode.arcs import arc_between, ArcWords, PLANES
+from ur_cartesian_driver.importing.gcode.arcs import arc_between, Plane, PLANES
 from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.vectors import Vector3
 
-_CENTRE = 'IJK'
 _MAX_TURNS = 1000
 
 
@@ -120,8 +119,15 @@ class Toolpath:
             )
             self._add(line, end)
             return
+        plane, turns = PLANES[self.plane or 'G17'], words.get('P', 1.0)
+        direction = -1 if self.motion == 'G2' else 1
         try:
-            arc = arc_between(start, end, self._arc_words(line, start, words))
+            if turns % 1.0 or not 1.0 <= turns <= _MAX_TURNS:
+                raise ValueError(
+                    f'P{turns:g} of an arc is no whole number of turns up to {_MAX_TURNS}'
+                )
+            centre = self._centre(line, plane, start, words)
+            arc = arc_between(plane, start, end, centre, direction, int(turns))
             lines = arc.lines(self._options.tolerance) if arc.rises else []
         except ValueError as error:
             raise BrokenFile(line, str(error)) from None
@@ -135,43 +141,28 @@ class Toolpath:
         for via, place in arc.arcs():
             self._add(line, place, SegmentType.CIRCULAR, via)
 
-    def _arc_words(
-        self, line: int, start: Sequence[float], words: Mapping[str, float]
-    ) -> ArcWords:
+    def _centre(
+        self, line: int, plane: Plane, start: Sequence[float], words: Mapping[str, float]
+    ) -> tuple[float, float] | float:
         """
-        Return what the words of an arc say.
+        Return the centre that the words of an arc give, or its radius.
 
-        :raises ValueError: too little, or a contradiction.
+        :raises ValueError: they say too little, or contradict each other.
         """
         if not self.plane and 'Z' in words and 'Y' not in words and 'J' not in words:
             raise ValueError('an arc along X and Z needs G17 or G18 before, which say its plane')
-        plane = PLANES[self.plane or 'G17']
-        names = tuple(_CENTRE[axis] for axis in plane)
-        unit, turns = self.length(line), words.get('P', 1.0)
-        given = [name for name in names[:2] if name in words]
-        if turns % 1.0 or not 1.0 <= turns <= _MAX_TURNS:
-            raise ValueError(f'P{turns:g} of an arc is no number of turns from 1 to {_MAX_TURNS}')
-        if words.get(names[2]):
-            raise ValueError(f'an arc in {self.plane or "G17"} has no {names[2]}')
+        first, second, third = plane.letters
+        u, v = words.get(first), words.get(second)
+        if words.get(third):
+            raise ValueError(f'an arc in {plane.name} has no {third}')
+        unit = self.length(line)
         if 'R' in words:
-            if given:
-                raise ValueError(f'an arc has {given[0]} or R, and not both')
-            centre = None
-        elif len(given) < (1 if self.relative_centre else 2):
-            raise ValueError(f'the arc needs {names[0]} and {names[1]}, or R')
-        else:
-            u, v = (words.get(name, 0.0) * unit for name in names[:2])
-            a, b = plane[:2]
-            place = self.coordinates.absolute
-            centre = (
-                (start[a] + u, start[b] + v)
-                if self.relative_centre
-                else (place(a, u), place(b, v))
-            )
-        return ArcWords(
-            plane=plane,
-            direction=-1 if self.motion == 'G2' else 1,
-            centre=centre,
-            radius=words.get('R', 0.0) * unit,
-            turns=int(turns),
-        )
+            if u is not None or v is not None:
+                raise ValueError(f'an arc has {first} and {second}, or R, and not both')
+            return words['R'] * unit
+        if (u is None and v is None) or ((u is None or v is None) and not self.relative_centre):
+            raise ValueError(f'the arc needs {first} and {second}, or R')
+        x, y, (a, b, _) = (u or 0.0) * unit, (v or 0.0) * unit, plane.axes
+        if self.relative_centre:
+            return start[a] + x, start[b] + y
+        return self.coordinates.absolute(a, x), self.coordinates.absolute(b, y)
