@@ -2,15 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """G-code in the dialects of several programs; arcs are compared with their geometry."""
 
+from gcode_programs import imported, positions, remarks
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.importing import (
-    BrokenFile,
-    import_file,
-    ImportOptions,
-    parse_code_output,
-)
+from ur_cartesian_driver.importing import BrokenFile, parse_code_output
 from ur_cartesian_driver.motion.goal import OutputKind, SegmentType
 
 #: As the LinuxCNC post-processor of FreeCAD's Path workbench writes it.
@@ -75,25 +71,10 @@ G1 X60.000 Y60.000 E0.33
 """
 
 
-def imported(tmp_path, text, **options):
-    file = tmp_path / 'part.nc'
-    file.write_text(text)
-    return import_file(file, ImportOptions(**options))
-
-
-def positions(found):
-    return np.array(found.goal.waypoints.poses)[:, :3]
-
-
-def remarks(found):
-    return [remark.text() for remark in found.remarks]
-
-
 def test_freecad(tmp_path):
-    outputs = dict(map(parse_code_output, ('M3=standard:2:1', 'M05=standard:2:0')))
-    found = imported(tmp_path, FREECAD, outputs=outputs)
+    found = imported(tmp_path, FREECAD, 'M3=standard:2:1', 'M05=standard:2:0')
     assert found.lines.tolist() == [9, 10, 11, 12, 13, 14, 15]
-    assert 1e3 * positions(found)[[0, 3, 5]] == pytest.approx(
+    assert positions(found)[[0, 3, 5]] == pytest.approx(
         np.array([[10.0, 0.0, 5.0], [0.0, 10.0, -1.0], [-20.0, 20.0, -1.0]])
     )
     types = found.goal.segments.types.tolist()
@@ -113,17 +94,10 @@ def test_freecad(tmp_path):
 
 
 def test_fusion(tmp_path):
-    found = imported(tmp_path, FUSION, outputs=dict([parse_code_output('S=analog:0:10000')]))
-    inches = positions(found) / 0.0254
-    assert inches.tolist()[2:5] == [
-        pytest.approx([1.0, 0.0, -0.05]),
-        pytest.approx([2.0, 0.0, -0.05]),
-        pytest.approx([2.0, 1.0, -0.05]),
-    ] or inches.tolist()[1:4] == [
-        pytest.approx([1.0, 0.0, -0.05]),
-        pytest.approx([2.0, 0.0, -0.05]),
-        pytest.approx([2.0, 1.0, -0.05]),
-    ]
+    found = imported(tmp_path, FUSION, 'S=analog:0:10000')
+    assert positions(found)[:4] / 25.4 == pytest.approx(
+        np.array([[1.0, 0.0, 0.2], [1.0, 0.0, -0.05], [2.0, 0.0, -0.05], [2.0, 1.0, -0.05]])
+    )
     arc = found.goal.segments.types.tolist().index(SegmentType.CIRCULAR)
     via = np.array(found.goal.segments.vias)[arc, :3] / 0.0254
     # Clockwise from (2, 1) to (3, 2) with the radius 1: about (3, 1).
@@ -136,7 +110,7 @@ def test_fusion(tmp_path):
 
 def test_a_slicer(tmp_path):
     found = imported(tmp_path, SLICER)
-    assert 1e3 * positions(found) == pytest.approx(
+    assert positions(found) == pytest.approx(
         np.array([[50.0, 50.0, 0.2], [60.0, 50.0, 0.2], [60.0, 60.0, 0.2]])
     )
     assert found.goal.segments.velocities.tolist() == pytest.approx([0.18, 0.02, 0.02])
