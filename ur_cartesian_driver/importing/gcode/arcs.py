@@ -20,7 +20,7 @@ _MIN_RISE = 1e-6
 _MAX_LINES = 100_000
 
 
-class Plane(NamedTuple):
+class ArcPlane(NamedTuple):
     """The plane of arcs: two axes, and the one that they may rise along, right-handed."""
 
     name: str
@@ -30,9 +30,9 @@ class Plane(NamedTuple):
 
 
 PLANES = {
-    'G17': Plane('G17', (0, 1, 2), ('I', 'J', 'K')),
-    'G18': Plane('G18', (2, 0, 1), ('K', 'I', 'J')),
-    'G19': Plane('G19', (1, 2, 0), ('J', 'K', 'I')),
+    'G17': ArcPlane('G17', (0, 1, 2), ('I', 'J', 'K')),
+    'G18': ArcPlane('G18', (2, 0, 1), ('K', 'I', 'J')),
+    'G19': ArcPlane('G19', (1, 2, 0), ('J', 'K', 'I')),
 }
 
 
@@ -89,7 +89,7 @@ class Arc(NamedTuple):
 
 
 def arc_between(
-    plane: Plane,
+    plane: ArcPlane,
     start: Sequence[float],
     end: Sequence[float],
     centre: tuple[float, float] | float,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ur_cartesian_driver.importing.gcode.arcs import arc_between, Plane, PLANES
+from ur_cartesian_driver.importing.gcode.arcs import arc_between, ArcPlane, PLANES
 from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
@@ -142,7 +142,7 @@ class Toolpath:
             self._add(line, place, SegmentType.CIRCULAR, via)
 
     def _centre(
-        self, line: int, plane: Plane, start: Sequence[float], words: Mapping[str, float]
+        self, line: int, plane: ArcPlane, start: Sequence[float], words: Mapping[str, float]
     ) -> tuple[float, float] | float:
         """
         Return the centre that the words of an arc give, or its radius.
