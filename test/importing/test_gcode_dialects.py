@@ -226,8 +226,10 @@ SAID = {
     'mastercam_contour.nc': (
         'line 8: word A: there is no such axis; the option orientation turns the tool',
     ),
-    'plasma.tap': ('line 10: G4: the path does not wait',),
-    'plotter_m280.gcode': ('lines 8, 13, 16: G4: the path does not wait',),
+    'plasma.tap': ('line 10: G4: its P is seconds on some controls, milliseconds on others',),
+    'plotter_m280.gcode': (
+        'lines 8, 13, 16: G4: its P is seconds on some controls, milliseconds on others',
+    ),
     'waterjet.nc': ('line 5: M0: the path does not wait',),
 }
 REFUSED = {

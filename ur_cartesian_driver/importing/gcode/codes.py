@@ -88,7 +88,9 @@ OTHER_FILE = 'other files are not read'
 _MOTION = (
     _honoured('motion', '', 'G0', 'G1', 'G2', 'G3', group='motion', stage=Stage.MOTION),
     _honoured('motion', '', 'G80', 'X', 'Y', 'Z', 'I', 'J', 'K', 'R', 'P', 'F'),
-    _left_out('motion', _NO_WAIT, 'G4', words='PSXUF'),
+    _left_out(
+        'motion', 'its P is seconds on some controls, milliseconds on others', 'G4', words='PSXUF'
+    ),
     _left_out(
         'motion',
         'the blend says where the tool stops',
