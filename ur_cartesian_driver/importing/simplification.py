@@ -72,6 +72,32 @@ def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> Impo
     return replace(kept, types=types, vias=places)
 
 
+def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], object]) -> int:
+    """
+    Return an end of a piece that holds: twice as far each time, then in between.
+
+    :param first: the nearest end to try; where it does not hold, the end is the next row.
+    :param holds: asked with start and end.
+    """
+    if not holds(start, first):
+        return start + 1
+    good, step = first, max(1, first - start)
+    bad = stop + 1
+    while good < stop:
+        trial = min(good + step, stop)
+        if not holds(start, trial):
+            bad = trial
+            break
+        good, step = trial, 2 * step
+    while bad - good > 1:
+        trial = (good + bad) // 2
+        if holds(start, trial):
+            good = trial
+        else:
+            bad = trial
+    return good
+
+
 def _ends_of_runs(path: ImportedPath) -> list[int]:
     """Return the rows that have to stay, beside the first: between them are equal lines."""
     stays = path.rests
@@ -101,35 +127,13 @@ class _Simplifier:
         """Return the piece that replaces the most rows."""
         end = start + 1
         if end < stop and self.may_be_line[start]:
-            end = self._gallop(start, start + 2, stop, self._is_line)
+            end = farthest_row(start, start + 2, stop, self._is_line)
         via: Floats | None = None
         first = max(end + 1, start + _MIN_LINES)
         if first <= stop and self._arc(start, first) is not None:
-            end = self._gallop(start, first, stop, lambda a, b: self._arc(a, b) is not None)
+            end = farthest_row(start, first, stop, lambda a, b: self._arc(a, b) is not None)
             via = self._arc(start, end)
         return _Piece(end, via)
-
-    def _gallop(
-        self, start: int, first: int, stop: int, holds: Callable[[int, int], object]
-    ) -> int:
-        """Return an end that holds: twice as far each time, then in between."""
-        if not holds(start, first):
-            return start + 1
-        good, step = first, max(1, first - start)
-        bad = stop + 1
-        while good < stop:
-            trial = min(good + step, stop)
-            if not holds(start, trial):
-                bad = trial
-                break
-            good, step = trial, 2 * step
-        while bad - good > 1:
-            trial = (good + bad) // 2
-            if holds(start, trial):
-                good = trial
-            else:
-                bad = trial
-        return good
 
     def _first_test(self) -> NDArray[np.bool_]:
         """Return for each row whether the point after it may be left out: a quick look at all."""

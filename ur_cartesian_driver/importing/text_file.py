@@ -30,18 +30,34 @@ def file_text(path: Path) -> str:
     :raises BrokenFile: it is binary.
     :raises OSError: it cannot be opened.
     """
-    data = path.read_bytes()
+    return decoded(path.read_bytes())
+
+
+def decoded(data: bytes, code_page: str = 'cp1252') -> str:
+    """
+    Return the text of a file as :func:`file_text` does.
+
+    :param code_page: the codec of what is no UTF-8; an unknown one counts as Windows-1252.
+    :raises BrokenFile: it is binary.
+    """
     encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError:
         if encoding != 'utf-8':
             raise BrokenFile(0, f'the file begins as {encoding}, and is not') from None
-        # Old programs write the code page of their Windows; Latin-1 has its five missing bytes.
-        text = data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
+        text = _by_code_page(data, code_page)
     if '\0' in text:
         raise BrokenFile(0, 'this is a binary file, and no text')
     return text
+
+
+def _by_code_page(data: bytes, code_page: str) -> str:
+    try:
+        return data.decode(code_page)
+    except (LookupError, UnicodeDecodeError):
+        # Old programs write the code page of their Windows; Latin-1 has its five missing bytes.
+        return data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
 
 
 def file_lines(text: str) -> list[str]:
