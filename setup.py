@@ -48,13 +48,13 @@ EXTRAS = {
     'collision': ['airo-models>=0.0.12,<0.1', 'example-robot-data>=4,<7', 'pin>=3,<5'],
     # Recordings as MCAP.
     'export': ['mcap>=1.6,<2', 'mcap-ros2-support>=0.6,<1'],
-    # Drawings as goals (DXF).
-    'import': ['ezdxf>=1.3,<2'],
     # The picture of the path that the demo draws.
     'plot': ['matplotlib>=3.8,<4'],
     # The page of a motion.
     'show': ['trimesh>=4,<6', 'viser>=1.1,<1.2'],
     'test': [
+        # The judge of the importer of DXF.
+        'ezdxf>=1.3,<2',
         'hypothesis>=6.100,<7',
         'pytest>=8.2,<10',
         'pytest-timeout>=2.3,<3',

@@ -64,7 +64,7 @@ def _ranges(names: list[str]) -> Iterator[str]:
 
 def _next(name: str) -> str:
     """Return the name with the next number; empty = it has no whole number."""
-    match = re.fullmatch(r'([A-Z])(\d+)', name)
+    match = re.fullmatch(r'([A-Z]|\$INSUNITS )(\d+)', name)
     return f'{match[1]}{int(match[2]) + 1}' if match else ''
 
 

@@ -60,4 +60,4 @@ install() { "$venv/bin/uv" pip install --quiet --python "$python" "${lock[@]}" "
 # One description of what the build needs: the same list serves `pip install .`.
 "$python" scripts/build_requirements.py |
   install --requirement requirements-dev.txt --requirement -
-PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,export,import,plot,show,test]'
+PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,export,plot,show,test]'

@@ -67,8 +67,6 @@ def planned(goal, robot):
 
 @pytest.mark.parametrize('name', FILES)
 def test_a_file_of_each_format_is_planned(tmp_path, robot, name):
-    if name == 'a.dxf':
-        pytest.importorskip('ezdxf')
     (tmp_path / name).write_text(FILES[name])
     found = import_file(tmp_path / name, options_for(name))
     assert len(planned(found.goal, robot).segments) == len(found.goal.waypoints)
@@ -341,8 +339,6 @@ def corners(points):
     ],
 )
 def test_files_of_other_programs(name, count, box):
-    if name.endswith('.dxf'):
-        pytest.importorskip('ezdxf')
     simplify = 1e-4 if name.endswith('.csv') else 0.0
     options = ImportOptions(unit='mm', orientation=ToolOrientation.DOWN, simplify=simplify)
     found = import_file(FOREIGN / name, options)

@@ -1,0 +1,185 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Chords of curves: rational Bézier curves as lines that are nowhere farther away than a tolerance.
+
+The bound is proven, not sampled. A curve lies in the convex hull of its control points, so it is
+no farther from its chord than they are. If they go on along the chord, so does the curve, which
+meets a plane no more often than its control polygon; then every place of the chord has one of the
+curve beside it, and the bound holds in both directions. (G. Farin, Curves and Surfaces for CAGD:
+both properties hold for positive weights.) The curve is halved until each piece is within a small
+share of the tolerance.
+
+Then greedily each chord takes as many pieces as the rest of the tolerance allows. The distance of
+a polyline from a line is largest at its points, and its feet cover the whole line. Where the curve
+turns back by more than the tolerance, a chord ends.
+
+Curves are arrays (m, n + 1, 4): m of degree n with control points w x, w y, w z, w.
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.importing.simplification import farthest_row
+from ur_cartesian_driver.motion.pose_rows import Floats
+
+#: The share of the tolerance for the pieces; smaller ones take more time and save few chords.
+_FINE = 1.0 / 8.0
+#: Pieces of a chord that are tried at once; few take more.
+_WINDOW = 10
+_MAX_PIECES = 200_000
+#: Of lengths along a chord [m].
+_ROUNDING = 1e-12
+
+
+def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
+    """
+    Return the Bézier curves of a B-spline, one for each span of its knots that has a length.
+
+    :param controls: (n, 4) weighted control points.
+    :raises ValueError: degree, knots and points do not belong together.
+    """
+    if degree < 1:
+        raise ValueError(f'its degree is {degree}')
+    if len(controls) <= degree or len(knots) != len(controls) + degree + 1:
+        raise ValueError(
+            f'degree {degree} and {len(controls)} control points need '
+            f'{len(controls) + degree + 1} knots, and at least {degree + 1} points; '
+            f'it has {len(knots)} knots'
+        )
+    if (np.diff(knots) < 0.0).any():
+        raise ValueError('its knots do not rise')
+    if not (controls[:, 3] > 0.0).all():
+        raise ValueError('a weight is not positive')
+    spans = np.flatnonzero(np.diff(knots[degree : len(controls) + 1]) > 0.0) + degree
+    if not len(spans):
+        raise ValueError('its knots are all the same')
+    rows = spans[:, None] + np.arange(-degree, 1)
+    curves = np.empty((len(spans), degree + 1, 4))
+    for k in range(degree + 1):
+        # The blossom of the span at k times its end and else its begin is its control point k.
+        points = controls[rows]
+        for r in range(1, degree + 1):
+            at = knots[spans + 1 if r <= k else spans]
+            low, high = knots[rows[:, r:]], knots[rows[:, r:] + degree + 1 - r]
+            share = ((at[:, None] - low) / (high - low))[..., None]
+            points = (1.0 - share) * points[:, :-1] + share * points[:, 1:]
+        curves[:, k] = points[:, 0]
+    gaps = np.linalg.norm(_places(curves[1:, 0]) - _places(curves[:-1, -1]), axis=1)
+    if len(gaps) and gaps.max() > 1e-9 * (1.0 + np.abs(_places(controls)).max()):
+        raise ValueError('its knots break it into parts')
+    return curves
+
+
+def ellipse_curves(a: Floats, b: Floats, centre: Floats, begin: float, sweep: float) -> Floats:
+    """Return the Bézier curves of centre + a cos t + b sin t, t from begin on."""
+    count = max(1, ceil(abs(sweep) / (0.5 * pi)))
+    step = sweep / count
+    weight = cos(0.5 * step)
+    curves = np.empty((count, 3, 4))
+    for i in range(count):
+        for k, (t, w) in enumerate(((0.0, 1.0), (0.5, weight), (1.0, 1.0))):
+            angle = begin + (i + t) * step
+            # The middle control point is where the tangents meet: the place of the arc over w.
+            curves[i, k, :3] = w * centre + cos(angle) * a + sin(angle) * b
+            curves[i, k, 3] = w
+    return curves
+
+
+def chords(curves: Floats, tolerance: float) -> Floats:
+    """
+    Return the ends (k, 3) of chords of curves that follow each other.
+
+    :param tolerance: no place of the curves is farther from the chords, and none of those farther
+        from the curves [m].
+    :raises ValueError: it would be too many.
+    """
+    fine = _FINE * tolerance
+    while True:
+        is_bent = ~(_chord_errors(curves) <= fine)
+        if not is_bent.any():
+            break
+        if len(curves) + int(is_bent.sum()) > _MAX_PIECES:
+            raise ValueError('it would take too many lines; check the unit, or the tolerance')
+        curves = _halved(curves, is_bent)
+    points = _places(np.vstack((curves[:, 0], curves[-1:, -1])))
+    return points[_merged(points, tolerance - fine)]
+
+
+def _places(weighted: Floats) -> Floats:
+    places: Floats = weighted[..., :3] / weighted[..., 3:]
+    return places
+
+
+def _chord_errors(curves: Floats) -> Floats:
+    """Return a bound (m,) of the distance of each curve from its chord, and of that from it."""
+    windows = _places(curves)
+    windows = windows - windows[:, :1]
+    off, along = _beside(windows)
+    size = np.linalg.norm(windows, axis=2).max(axis=1)
+    goes_on = (np.diff(along, axis=1) >= -_ROUNDING).all(axis=1)
+    bound: Floats = np.where(goes_on, np.minimum(off.max(axis=1), size), size)
+    return bound
+
+
+def _beside(windows: Floats) -> tuple[Floats, Floats]:
+    """
+    Return how points (m, k, 3) lie beside the line from the first, which is 0, to the last.
+
+    :returns: distances from the line, and places along it (m, k).
+    """
+    chord = windows[:, -1:]
+    length = np.sqrt(np.einsum('mij,mij->mi', chord, chord))
+    chord = chord / np.where(length > 0.0, length, 1.0)[..., None]
+    along = np.matmul(windows, chord.swapaxes(1, 2))[..., 0]
+    off = windows - np.clip(along, 0.0, length)[..., None] * chord
+    return np.sqrt(np.einsum('mij,mij->mi', off, off)), along
+
+
+def _halved(curves: Floats, which: NDArray[np.bool_]) -> Floats:
+    """Return the curves in their order, some as two halves (de Casteljau)."""
+    halves = curves[which]
+    left, right = np.empty_like(halves), np.empty_like(halves)
+    for k in range(curves.shape[1]):
+        left[:, k], right[:, -1 - k] = halves[:, 0], halves[:, -1]
+        halves = 0.5 * (halves[:, :-1] + halves[:, 1:])
+    found = np.repeat(curves, 1 + which, axis=0)
+    first = np.flatnonzero(which) + np.arange(which.sum())
+    found[first], found[first + 1] = left, right
+    return found
+
+
+def _merged(points: Floats, tolerance: float) -> list[int]:
+    """Return the rows of points that stay, so that the others are near the lines between."""
+    last = len(points) - 1
+    reach = np.minimum(np.arange(1, len(points) + 1), last)
+    rows = np.arange(len(points))
+    for count in range(2, _WINDOW + 1):  # of all rows at once
+        rows = rows[rows + count <= last]
+        rows = rows[_are_straight(points[rows[:, None] + np.arange(count + 1)], tolerance)]
+        reach[rows] = rows + count
+    found = [0]
+    while found[-1] < last:
+        start, end = found[-1], int(reach[found[-1]])
+        if start + _WINDOW == end < last:
+            farther = farthest_row(
+                start,
+                end + 1,
+                last,
+                lambda a, b: bool(_are_straight(points[None, a : b + 1], tolerance)[0]),
+            )
+            end = max(end, farther)
+        found.append(end)
+    return found
+
+
+def _are_straight(windows: Floats, tolerance: float) -> NDArray[np.bool_]:
+    """Tell of points (m, k, 3) in rows whether all are near the line from first to last."""
+    off, along = _beside(windows - windows[:, :1])
+    back = (np.maximum.accumulate(along, axis=1) - along).max(axis=1)
+    straight: NDArray[np.bool_] = (off.max(axis=1) <= tolerance) & (back <= tolerance)
+    return straight

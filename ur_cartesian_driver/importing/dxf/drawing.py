@@ -1,0 +1,290 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A drawing: its header, layers, blocks and entities, and what of them is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import radians
+from pathlib import Path
+
+from ur_cartesian_driver.importing.dxf.affine import (
+    Affine,
+    object_axes,
+    scaled,
+    shifted,
+    turned,
+)
+from ur_cartesian_driver.importing.dxf.dxf_records import read_records, Record
+from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut, TERMS
+from ur_cartesian_driver.motion.vectors import add, scale, ZERO3
+
+_COMMENT, _NAME, _VARIABLE = 999, 2, 9
+_FROZEN, _EXTERNAL = 1, (4, 8)
+_MODEL, _SHEETS = 'MODEL', ('*PAPER_SPACE', '$PAPER_SPACE')
+_MODEL_SPACES = ('*MODEL_SPACE', '$MODEL_SPACE')
+_SECTIONS = (
+    *('HEADER', 'CLASSES', 'TABLES', 'BLOCKS', 'ENTITIES', 'OBJECTS', 'THUMBNAILIMAGE'),
+    'ACDSDATA',
+)
+#: What ends up among entities only where a file was cut.
+_NO_ENTITIES = ('TABLE', 'ENDTAB', 'LAYER', 'BLOCK', 'ENDBLK', 'BLOCK_RECORD', 'DICTIONARY')
+#: Entities of blocks, and blocks in blocks; more are taken for a mistake.
+_MAX_PLACED, _MAX_DEPTH = 100_000, 64
+#: Products with coordinates of a file have no overflow below.
+_MAX_SCALE = 1e60
+
+
+@dataclass(slots=True)
+class DrawingBlock:
+    """A block, and its entities."""
+
+    record: Record
+    entities: list[Record] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Drawing:
+    """Records by their names, in upper case: CAD programs do not tell them apart."""
+
+    header: dict[str, Record] = field(default_factory=dict)
+    layers: dict[str, Record] = field(default_factory=dict)
+    blocks: dict[str, DrawingBlock] = field(default_factory=dict)
+    entities: list[Record] = field(default_factory=list)
+    #: Handles of entities that are clipped.
+    clipped: set[str] = field(default_factory=set)
+
+
+def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
+    """
+    Read a drawing.
+
+    :raises BrokenFile: it is cut off, or no DXF.
+    :raises OSError: the file cannot be opened.
+    """
+    found = Drawing()
+    section = ''
+    into: list[Record] | None = None
+    sections: set[str] = set()
+    objects: dict[str, Record] = {}
+    for record in read_records(file):
+        kind = record.kind
+        if kind == 'SECTION':
+            if section:
+                raise record.fault(f'the section {section} has not ended yet')
+            section = _section(record, sections, left_out)
+            into = found.entities if section == 'ENTITIES' else None
+            if section == 'HEADER':
+                found.header = dict(_variables(record))
+        elif kind == 'ENDSEC':
+            section = ''
+        elif section in ('ENTITIES', 'BLOCKS'):
+            if kind == 'BLOCK' and section == 'BLOCKS':
+                into = _new_block(record, found.blocks).entities
+            elif kind == 'ENDBLK' and section == 'BLOCKS':
+                into = None
+            else:
+                _add_entity(record, into)
+        elif kind == 'LAYER' and section == 'TABLES':
+            if found.layers.setdefault(record.text(2).upper(), record) is not record:
+                left_out.add(record, 'the first layer of this name counts')
+        elif section == 'OBJECTS':
+            objects[record.handle] = record
+        elif not section and any(code != _COMMENT for code, _ in record.tags):
+            left_out.add(record, 'it is in no section')
+    found.clipped = _clipped(objects)
+    return found
+
+
+def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
+    """Return the name of a section that begins."""
+    # Header variables follow in the same record, with codes of their own.
+    name = next((value for code, value in record.tags if code == _NAME), '').upper()
+    if name in before:
+        raise record.fault(f'there is a section {name} before')
+    if name not in _SECTIONS:
+        left_out.add(record, 'it is no section that is known here', f'section {name}')
+    before.add(name)
+    return name
+
+
+def _variables(header: Record) -> Iterator[tuple[str, Record]]:
+    """Yield the variables of a header: a code 9 with the name, and codes with values."""
+    variable = header
+    for index, (code, value) in enumerate(header.tags):
+        if code == _VARIABLE:
+            variable = Record(value.upper(), header.line + 2 * index + 2, [])
+            yield variable.kind, variable
+        elif variable is not header:
+            variable.tags.append((code, value))
+
+
+def _add_entity(record: Record, into: list[Record] | None) -> None:
+    """Add an entity; vertices to their polyline."""
+    if into is None:
+        raise record.fault('it stands between blocks, in none; the file is broken')
+    if record.kind in _NO_ENTITIES:
+        raise record.fault('it cannot be among entities; the file is broken')
+    if record.kind == 'VERTEX' and into and into[-1].kind == 'POLYLINE':
+        into[-1].vertices.append(record)
+    elif record.kind != 'SEQEND':
+        into.append(record)
+
+
+def _new_block(record: Record, blocks: dict[str, DrawingBlock]) -> DrawingBlock:
+    block = DrawingBlock(record)
+    name = record.text(2)
+    if blocks.setdefault(name.upper(), block) is not block and name:
+        raise record.fault(f'a block {name!r:.40} came before')
+    return block
+
+
+def _clipped(objects: dict[str, Record]) -> set[str]:
+    """Return the entities with a clip that is on: the owners of the owners of filters."""
+    found = set()
+    for record in objects.values():
+        if record.kind == 'SPATIAL_FILTER' and record.integer(71, 1):
+            owner = record.handle
+            for _ in objects:
+                if owner not in objects:
+                    break
+                owner = next((text for text, _ in objects[owner].values.get(330, ())), '')
+            found.add(owner)
+    return found
+
+
+class Seen:
+    """Walks through the model space, and says what nobody sees."""
+
+    def __init__(self, drawing: Drawing, left_out: LeftOut) -> None:
+        """Begin before the first entity."""
+        self._drawing = drawing
+        self._left_out = left_out
+        self._placed = 0
+        self._shown: set[str] = set()
+
+    def entities(self, place: Affine) -> Iterator[tuple[Record, Affine]]:
+        """
+        Yield what is seen in the order of the file, with the map of its coordinates.
+
+        :param place: where the coordinates of the drawing are.
+        :raises BrokenFile: a block cannot be placed.
+        """
+        sheets = [b for name, b in self._drawing.blocks.items() if name.startswith(_SHEETS)]
+        for record in (record for sheet in sheets for record in sheet.entities):
+            self._leave_on_sheet(record)
+        for record in self._model_space():
+            layout = record.text(410, _MODEL)
+            if record.integer(67) or layout.upper() != _MODEL:
+                self._leave_on_sheet(record)
+            else:
+                yield from self._seen(record, place, '', ())
+
+    def _model_space(self) -> Iterator[Record]:
+        for name in _MODEL_SPACES:  # empty, unless a program is strange
+            if name in self._drawing.blocks:
+                yield from self._drawing.blocks[name].entities
+        yield from self._drawing.entities
+
+    def _leave_on_sheet(self, record: Record) -> None:
+        if record.kind != 'VIEWPORT':  # a window of the sheet itself
+            self._left_out.add_term(record, '67')
+
+    def _seen(
+        self, record: Record, place: Affine, layer: str, inside: tuple[str, ...]
+    ) -> Iterator[tuple[Record, Affine]]:
+        """
+        Yield an entity, or those of its block.
+
+        :param layer: that of the INSERT, where entities of layer 0 are.
+        :param inside: names of the blocks that the entity is in.
+        """
+        own = record.text(8, '0').upper()
+        if not inside or own != '0':
+            layer = own
+        if hidden := self._hidden(record, layer):
+            entry = self._drawing.layers.get(layer)
+            name = entry.text(2) if entry else layer
+            self._left_out.add_term(record, hidden, f'{record.kind} on layer {name}')
+        elif record.kind == 'INSERT':
+            yield from self._of_block(record, place, layer, inside)
+        else:
+            self._show(layer)
+            yield record, place
+
+    def _hidden(self, record: Record, layer: str) -> str:
+        """Return the term that hides an entity; an INSERT hides its block if it is frozen."""
+        if record.integer(60):
+            return '60'
+        entry = self._drawing.layers.get(layer)
+        if entry and entry.integer(70) & _FROZEN:
+            return 'LAYER 70=1'
+        if record.kind == 'INSERT':
+            return ''
+        if layer == 'DEFPOINTS':
+            return 'LAYER Defpoints'
+        return 'LAYER 62<0' if entry and entry.integer(62, 7) < 0 else ''
+
+    def _show(self, layer: str) -> None:
+        """Say once what a layer has that the tool does not heed."""
+        entry = self._drawing.layers.get(layer)
+        if entry is None or layer in self._shown:
+            return
+        self._shown.add(layer)
+        self._left_out.add_look(entry)
+        if not entry.integer(290, 1):
+            self._left_out.add_term(entry, 'LAYER 290=0', f'layer {entry.text(2)}')
+
+    def _of_block(
+        self, record: Record, place: Affine, layer: str, inside: tuple[str, ...]
+    ) -> Iterator[tuple[Record, Affine]]:
+        name = record.text(2).upper()
+        block = self._drawing.blocks.get(name)
+        if why := self._unplaced(record, block):
+            self._left_out.add_term(record, why)
+            return
+        assert block is not None
+        if name in inside:
+            raise record.fault(TERMS['INSERT in its own BLOCK'].reason)
+        if len(inside) >= _MAX_DEPTH:
+            raise record.fault(f'it is in more than {_MAX_DEPTH} blocks')
+        self._left_out.add_codes(record)
+        for at in _places(record, block, place):
+            for entity in block.entities:
+                self._placed += 1
+                if self._placed > _MAX_PLACED:
+                    raise record.fault(f'the blocks have more than {_MAX_PLACED:,} entities')
+                yield from self._seen(entity, at, layer, (*inside, name))
+
+    def _unplaced(self, record: Record, block: DrawingBlock | None) -> str:
+        """Return the term for which a block is left out."""
+        if block is None:
+            return 'INSERT without BLOCK'
+        for bit in _EXTERNAL:
+            if block.record.integer(70) & bit and not block.entities:
+                return f'BLOCK 70={bit}'
+        return 'SPATIAL_FILTER' if record.handle in self._drawing.clipped else ''
+
+
+def _places(record: Record, block: DrawingBlock, place: Affine) -> Iterator[Affine]:
+    """Yield where the coordinates of a block are, for each place of an array."""
+    axes = place.after(object_axes(record.extrusion()))
+    x, y, z = (record.number(code, 1.0) for code in (41, 42, 43))
+    if x == 0.0 or y == 0.0:
+        raise record.fault('a scale is 0 (group codes 41 and 42)')
+    turn = turned(radians(record.number(50, 0.0)))
+    z = z or 1.0  # plane programs write 0
+    shape = turn.after(scaled(x, y, z)).after(shifted(scale(block.record.point(10, ZERO3), -1.0)))
+    across, up = record.number(44, 0.0), record.number(45, 0.0)
+    columns = record.integer(70, 1) if across else 1
+    rows = record.integer(71, 1) if up else 1
+    if max(1, columns) * max(1, rows) > _MAX_PLACED:
+        raise record.fault(f'it has {columns} x {rows} places, more than {_MAX_PLACED:,}')
+    for row in range(max(1, rows)):
+        for column in range(max(1, columns)):
+            step = turn.direction((column * across, row * up, 0.0))
+            found = axes.after(shifted(add(record.point(10), step))).after(shape)
+            if not found.is_within(_MAX_SCALE):
+                raise record.fault('its scale is too large')
+            yield found

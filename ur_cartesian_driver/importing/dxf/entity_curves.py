@@ -1,0 +1,284 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Entities of a drawing as stretches: points in a row with lines, arcs and chords between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import atan, cos, isclose, pi, radians, sin, tau
+
+import numpy as np
+
+from ur_cartesian_driver.importing.dxf.affine import Affine, object_axes
+from ur_cartesian_driver.importing.dxf.curve_chords import chords, ellipse_curves, spline_curves
+from ur_cartesian_driver.importing.dxf.dxf_records import Record, Z_AXIS
+from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut
+from ur_cartesian_driver.importing.imported_path import BrokenFile
+from ur_cartesian_driver.motion.vectors import add, cross, dot, norm, scale, subtract, Vector3
+
+#: One arc of the robot turns by no more; longer ones are halved.
+_LONGEST_ARC = 0.95 * pi
+#: Angles of a whole turn are often rounded [turns].
+_WHOLE_TURN = 1e-6
+#: Arcs of a smaller bulge are lines: they are lower than a billionth of their chord.
+_FLAT = 1e-9
+_CLOSED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 8, 16, 64, 16
+#: Ends that are as near as this are joined [m].
+JOINED = 1e-5
+
+
+class _NoPathError(Exception):
+    """An entity has no path, for the reason of a term."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """The motion to each point but the first is a line, or an arc through its via [m]."""
+
+    record: Record
+    points: list[Vector3]
+    vias: list[Vector3 | None]
+
+    def reversed(self) -> Stretch:
+        """Return it in the other direction."""
+        return Stretch(self.record, self.points[::-1], [None, *self.vias[:0:-1]])
+
+
+@dataclass(frozen=True, slots=True)
+class _Pen:
+    """Draws a stretch in coordinates of its entity."""
+
+    place: Affine
+    tolerance: float
+    points: list[Vector3] = field(default_factory=list)
+    vias: list[Vector3 | None] = field(default_factory=list)
+
+    def line_to(self, point: Vector3) -> None:
+        """Go straight, or begin."""
+        self.points.append(self.place.point(point))
+        self.vias.append(None)
+
+    def along_ellipse(
+        self, centre: Vector3, a: Vector3, b: Vector3, begin: float, sweep: float
+    ) -> None:
+        """Follow centre + a cos t + b sin t from where the pen is, at the angle begin."""
+        centre, a, b = self.place.point(centre), self.place.direction(a), self.place.direction(b)
+        if abs(dot(a, b)) > 1e-9 * dot(a, a) or not isclose(norm(a), norm(b), rel_tol=1e-9):
+            c, d, e = (np.array(v) for v in (centre, a, b))
+            self._follow(chords(ellipse_curves(d, e, c, begin, sweep), self.tolerance).tolist())
+            return
+        count = 1
+        while abs(sweep) > count * _LONGEST_ARC:
+            count *= 2
+        step = 0.5 * sweep / count
+        at = [
+            add(centre, add(scale(a, cos(t)), scale(b, sin(t))))
+            for t in (begin + k * step for k in range(1, 2 * count + 1))
+        ]
+        self.points.extend(at[1::2])
+        self.vias.extend(at[::2])
+
+    def along_spline(self, degree: int, knots: Sequence[float], controls: object) -> None:
+        """Follow a B-spline of weighted control points from its begin."""
+        curves = spline_curves(degree, np.array(knots), np.array(controls))
+        places = chords(self.place.weighted_points(curves), self.tolerance).tolist()
+        self.points.append(tuple(places[0]))
+        self.vias.append(None)
+        self._follow(places)
+
+    def _follow(self, places: Sequence[Sequence[float]]) -> None:
+        self.points.extend((x, y, z) for x, y, z in places[1:])
+        self.vias.extend([None] * (len(places) - 1))
+
+    def gap(self) -> float:
+        """Return the distance of the ends [m]."""
+        return norm(subtract(self.points[0], self.points[-1]))
+
+    def arrive(self, point: Vector3) -> None:
+        """Put the end of a curve exactly where the file says."""
+        self.points[-1] = self.place.point(point)
+
+
+def stretch_of(
+    record: Record, place: Affine, tolerance: float, left_out: LeftOut
+) -> Stretch | None:
+    """
+    Return the stretch of an entity; None = it is left out, and said.
+
+    :param place: where the coordinates of the drawing are [m].
+    :param tolerance: of chords [m].
+    :raises BrokenFile: a value is missing or cannot be meant.
+    """
+    draw = _DRAWN.get(record.kind)
+    if draw is None:
+        left_out.add_entity(record)
+        return None
+    try:
+        pen = _Pen(_coordinates(record, place), tolerance)
+        draw(record, pen, left_out)
+    except BrokenFile:
+        raise
+    except _NoPathError as error:
+        left_out.add_term(record, str(error))
+        return None
+    except ValueError as error:
+        raise record.fault(str(error)) from None
+    left_out.add_codes(record)
+    if len(pen.points) < 2:
+        left_out.add(record, 'it has fewer than two points')
+        return None
+    return Stretch(record, pen.points, pen.vias)
+
+
+def _coordinates(record: Record, place: Affine) -> Affine:
+    """Return where the coordinates of an entity are: a plane one has its own axes."""
+    is_plane = record.kind in ('ARC', 'CIRCLE', 'LWPOLYLINE', 'POLYLINE')
+    if not is_plane or (record.kind == 'POLYLINE' and record.integer(70) & _IN_SPACE):
+        return place
+    extrusion = record.extrusion()
+    return place if extrusion == Z_AXIS else place.after(object_axes(extrusion))
+
+
+def _line(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    pen.line_to(record.point(10))
+    pen.line_to(record.point(11))
+
+
+def _round(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    """Draw a circle or an arc."""
+    centre, radius = record.point(10), record.number(40)
+    if not radius > 0.0:
+        raise ValueError(f'its radius is {radius:g}')
+    begin, sweep = 0.0, tau
+    if record.kind == 'ARC':
+        begin = radians(record.number(50))
+        sweep = _sweep(begin, radians(record.number(51)))
+    a, b = (radius, 0.0, 0.0), (0.0, radius, 0.0)
+    _closed_ellipse(pen, centre, a, b, begin, sweep)
+
+
+def _ellipse(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    centre, a, ratio = record.point(10), record.point(11), record.number(40)
+    if not (ratio > 0.0 and norm(a) > 0.0):
+        raise ValueError('it has an axis without a length')
+    normal = object_axes(record.extrusion()).z
+    begin = record.number(41, 0.0)
+    b = scale(cross(normal, a), ratio)
+    _closed_ellipse(pen, centre, a, b, begin, _sweep(begin, record.number(42, tau)))
+
+
+def _closed_ellipse(
+    pen: _Pen, centre: Vector3, a: Vector3, b: Vector3, begin: float, sweep: float
+) -> None:
+    start = add(centre, add(scale(a, cos(begin)), scale(b, sin(begin))))
+    pen.line_to(start)
+    pen.along_ellipse(centre, a, b, begin, sweep)
+    if sweep == tau:
+        pen.arrive(start)
+
+
+def _sweep(begin: float, end: float) -> float:
+    """Return the angle from begin to end, counter-clockwise; equal ones are a whole turn."""
+    turns = (end - begin) / tau
+    if abs(turns - round(turns)) < _WHOLE_TURN and (round(turns) or turns == 0.0):
+        return tau
+    return (end - begin) % tau
+
+
+def _lwpolyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    corners: list[list[float | None]] = []
+    elevation = record.number(38, 0.0)
+    for code, value, line in record.numbered(10, 20, 42):
+        if code == 10:
+            corners.append([value, None, 0.0])
+        elif not corners:
+            raise record.fault(f'group code {code} stands before the first 10', line)
+        elif code == 20 and corners[-1][1] is not None:
+            raise record.fault('group code 20 stands twice for a vertex', line)
+        else:
+            corners[-1][1 if code == 20 else 2] = value
+    found = []
+    for x, y, bulge in corners:
+        if x is None or y is None or bulge is None:
+            raise ValueError('a vertex has no y (group code 20)')
+        found.append((x, y, bulge))
+    count = record.integer(90, len(found))
+    if count != len(found):
+        raise ValueError(f'it has {len(found)} vertices in place of {count} (group code 90)')
+    _plane_polyline(pen, found, elevation, bool(record.integer(70) & _CLOSED))
+
+
+def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    flags = record.integer(70)
+    for bit in (_MESH, _FACES):
+        if flags & bit:
+            raise _NoPathError(f'POLYLINE 70={bit}')
+    # The frame of a spline-fit polyline is not seen.
+    vertices = [v for v in record.vertices if not v.integer(70) & _FRAME]
+    for vertex in vertices:
+        left_out.add_codes(vertex)
+    if flags & _IN_SPACE:
+        points = [vertex.point(10) for vertex in vertices]
+        for point in [*points, points[0]] if flags & _CLOSED and points else points:
+            pen.line_to(point)
+        return
+    given = [record.number(code) for code in (30, 38) if code in record.values]
+    height = next(iter(given or [vertex.point(10)[2] for vertex in vertices]), 0.0)
+    for vertex in vertices:
+        if vertex.point(10)[2] != height and 30 in vertex.values:
+            left_out.add_term(vertex, 'VERTEX 30')
+    corners = [(*vertex.point(10)[:2], vertex.number(42, 0.0)) for vertex in vertices]
+    _plane_polyline(pen, corners, height, bool(flags & _CLOSED))
+
+
+def _plane_polyline(
+    pen: _Pen, corners: Sequence[tuple[float, float, float]], height: float, closed: bool
+) -> None:
+    """Draw corners x, y with the bulge of what follows: tan(angle / 4)."""
+    if not corners:
+        return
+    pen.line_to((*corners[0][:2], height))
+    for (ax, ay, bulge), (bx, by, _) in pairwise([*corners, *corners[: int(closed)]]):
+        if abs(bulge) < _FLAT or (ax, ay) == (bx, by):
+            pen.line_to((bx, by, height))
+            continue
+        # The centre lies to the left of the chord where an arc turns left by less than a half.
+        aside = (1.0 - bulge * bulge) / (4.0 * bulge)
+        cx = 0.5 * (ax + bx) - aside * (by - ay)
+        cy = 0.5 * (ay + by) + aside * (bx - ax)
+        a, b = (ax - cx, ay - cy, 0.0), (cy - ay, ax - cx, 0.0)
+        pen.along_ellipse((cx, cy, height), a, b, 0.0, 4.0 * atan(bulge))
+        pen.arrive((bx, by, height))
+
+
+def _spline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
+    places = record.points(10)
+    if not places and record.points(11):
+        raise _NoPathError('SPLINE 11 without 10')
+    knots, weights = record.numbers(40), record.numbers(41)
+    for code, what, found in ((72, 'knots', knots), (73, 'control points', places)):
+        if (count := record.integer(code, len(found))) != len(found):
+            raise ValueError(f'it has {len(found)} {what} in place of {count} (group code {code})')
+    if weights and len(weights) != len(places):
+        raise ValueError(f'it has {len(weights)} weights for {len(places)} control points')
+    controls = [
+        (w * x, w * y, w * z, w)
+        for (x, y, z), w in zip(places, weights or [1.0] * len(places), strict=True)
+    ]
+    pen.along_spline(record.integer(71), knots, controls)
+    if record.integer(70) & _CLOSED and pen.gap() > JOINED:
+        left_out.add_term(record, 'SPLINE 70=1 with a gap')
+
+
+_DRAWN: Mapping[str, Callable[[Record, _Pen, LeftOut], None]] = {
+    'LINE': _line,
+    'ARC': _round,
+    'CIRCLE': _round,
+    'ELLIPSE': _ellipse,
+    'LWPOLYLINE': _lwpolyline,
+    'POLYLINE': _polyline,
+    'SPLINE': _spline,
+    'HELIX': _spline,
+}
