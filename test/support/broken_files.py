@@ -22,8 +22,12 @@ _WHOLE_FILE = re.compile(
 )
 
 
-def broken(files: Sequence[str], random: Random) -> str:
-    """Return one of the files with one to four faults."""
+def broken(files: Sequence[str], random: Random, together: int = 1) -> str:
+    """
+    Return one of the files with one to four faults.
+
+    :param together: so many lines are moved and left out together.
+    """
     text = random.choice(files)
     for _ in range(random.randint(1, 4)):
         if not text:
@@ -37,13 +41,11 @@ def broken(files: Sequence[str], random: Random) -> str:
         elif fault == 2:  # the tail of another
             other = random.choice(files)
             text = text[:at] + other[random.randrange(len(other)) :]
-        elif fault == 3:  # a line at another place
+        elif fault in (3, 4):  # a line at another place, or missing
             lines = text.split('\n')
-            lines.insert(random.randrange(len(lines)), random.choice(lines))
-            text = '\n'.join(lines)
-        elif fault == 4:  # a line is missing
-            lines = text.split('\n')
-            del lines[random.randrange(len(lines))]
+            at, to = (together * random.randrange(len(lines) // together + 1) for _ in '12')
+            moved = lines[at : at + together] if fault == 3 else []
+            lines[to : to + (0 if moved else together)] = moved
             text = '\n'.join(lines)
         elif fault < 7:  # another word or number
             here, there = (list(_WORD.finditer(each)) for each in (text, random.choice(files)))
@@ -55,9 +57,11 @@ def broken(files: Sequence[str], random: Random) -> str:
     return text
 
 
-def broken_texts(files: Sequence[str], count: int, random: Random) -> Iterator[str]:
+def broken_texts(
+    files: Sequence[str], count: int, random: Random, together: int = 1
+) -> Iterator[str]:
     """Return so many broken files."""
-    return (broken(files, random) for _ in range(count))
+    return (broken(files, random, together) for _ in range(count))
 
 
 def goal_or_sentence(

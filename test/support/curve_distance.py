@@ -1,0 +1,79 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far curves are from each other, and the curves that a path follows."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree  # type: ignore[import-untyped]
+
+#: Angles between points on arcs [degrees], and distances between those on lines [m].
+STEP, SPACING = 1.0, 2e-3
+
+
+def path_curves(positions, vias, travels) -> list[np.ndarray]:
+    """
+    Return points (n, 3) on each contour of a path.
+
+    :param vias: (n, 3) points on the arcs that end at positions; NaN = it is a line.
+    :param travels: (n,) whether a contour begins.
+    """
+    found: list[list[np.ndarray]] = []
+    for row, point in enumerate(positions):
+        if travels[row] or not found:
+            found.append([point[None]])
+        elif np.isnan(vias[row, 0]):
+            found[-1].append(point[None])
+        else:
+            found[-1].append(arc_points(positions[row - 1], vias[row], point))
+    return [np.vstack(parts) for parts in found]
+
+
+def arc_points(a, via, b):
+    """Return points on the arc through three points, without the first."""
+    u, v = via - a, b - a
+    normal = np.cross(u, v)
+    centre = a + np.cross((u @ u) * v - (v @ v) * u, normal) / (2.0 * normal @ normal)
+    ex = a - centre
+    ey = np.cross(normal / np.linalg.norm(normal), ex)
+    angle = np.arctan2((b - centre) @ ey, (b - centre) @ ex) % (2.0 * np.pi)
+    t = np.linspace(0.0, angle, 2 + int(np.degrees(angle) / STEP))[1:]
+    return centre + np.cos(t)[:, None] * ex + np.sin(t)[:, None] * ey
+
+
+def distances(points: np.ndarray, curves: Sequence[np.ndarray], enough: float = 0.0) -> np.ndarray:
+    """Return distances (n,) of points from polylines; those below `enough` are upper bounds."""
+    polylines = [_dense(curve) for curve in curves]
+    starts = np.vstack([p[:-1] for p in polylines])
+    spans = np.vstack([np.diff(p, axis=0) for p in polylines])
+    tree = cKDTree(starts + 0.5 * spans)
+    longest = np.linalg.norm(spans, axis=1).max()
+    found = np.full(len(points), np.inf)
+    rest, k = np.arange(len(points)), 4
+    while len(rest):
+        k = min(4 * k, len(starts))
+        apart, near = tree.query(points[rest], k=[*range(1, k + 1)])
+        a, d = starts[near], spans[near]
+        square = np.einsum('nkj,nkj->nk', d, d)
+        along = np.einsum('nkj,nkj->nk', points[rest, None] - a, d)
+        foot = a + np.clip(along / np.where(square > 0, square, 1), 0, 1)[..., None] * d
+        found[rest] = np.linalg.norm(points[rest, None] - foot, axis=2).min(axis=1)
+        # All others have their middles farther away than the last one.
+        is_known = (found[rest] <= enough) | (found[rest] <= apart[:, -1] - 0.5 * longest)
+        rest = rest[~is_known] if k < len(starts) else rest[:0]
+    return found
+
+
+def samples(curves: Iterable[np.ndarray]) -> np.ndarray:
+    """Return points on polylines, no farther apart than the spacing."""
+    return np.vstack([_dense(curve) for curve in curves])
+
+
+def _dense(curve):
+    lengths = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    counts = 1 + (lengths / SPACING).astype(int)
+    parts = [
+        curve[i] + np.arange(n)[:, None] / n * (curve[i + 1] - curve[i])
+        for i, n in enumerate(counts)
+    ]
+    return np.vstack([*parts, curve[-1:]])
