@@ -14,6 +14,8 @@ export ROS_DOMAIN_ID
 # What another environment, activated or sourced, may have left behind.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
+# Tests start hundreds of processes; each would compile all modules anew, numpy's too.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help setup lock hooks demo demo-two test random lint format docs bench release-check clean
 
