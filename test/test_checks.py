@@ -93,25 +93,32 @@ def jobs():
 
 
 def test_the_public_ci_runs_what_has_to_pass_here(jobs):
-    for name, command in (('ci', '.ci/run'), ('newest', '.ci/run newest')):
+    for name, command in (('ci', '.ci/run ${{ matrix.job }}'), ('newest', '.ci/run newest')):
         assert [step.get('run') or step['uses'].split('@')[0] for step in jobs[name]['steps']] == [
             'actions/checkout',
             'actions/setup-python',
             command,
         ]
-    assert (CHECKOUT / '.ci' / 'run').stat().st_mode & 0o100
+    run = CHECKOUT / '.ci' / 'run'
+    assert run.stat().st_mode & 0o100
+    documented = re.findall(r'^#   (\w+)  +\w', run.read_text(), re.MULTILINE)
+    # Lint is part of the tests.
+    assert sorted([*jobs['ci']['strategy']['matrix']['job'], 'lint', 'newest']) == sorted(
+        documented
+    )
 
 
 def test_only_the_newest_versions_of_everything_may_fail(jobs):
     assert [name for name, job in jobs.items() if job.get('continue-on-error')] == ['newest']
 
 
-def test_an_unknown_job_is_refused_with_those_that_there_are():
+def test_an_unknown_job_is_refused_in_a_sentence():
     run = [str(CHECKOUT / '.ci' / 'run'), 'newst']
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == (
-        ".ci/run: there is no job 'newst'; name newest, or none for everything.\n"
+        ".ci/run: there is no job 'newst': see the first lines of .ci/run, "
+        'or name none for everything.\n'
     )
 
 
