@@ -63,7 +63,7 @@ def test_margins_and_planes_are_those_of_goals():
 
 
 @pytest.mark.parametrize(('choice', 'expected'), [('auto', None), ('refuse', 0.02)])
-def test_the_arm_keeps_away_from_itself_where_capsules_refuse_goals(choice, expected):
+def test_the_arm_keeps_away_from_itself_where_cylinders_refuse_goals(choice, expected):
     found = limits(self_collision=choice, min_clearance=0.02).workspace
     assert found.min_clearance == expected
     assert bool(found) is (expected is not None)

@@ -79,9 +79,9 @@ def test_parameter_and_model_decide_whether_to_refuse(model, choice, installed, 
         assert found.text.endswith(f'(measured between meshes of the {model})')
         assert clear.description.endswith(f'(meshes of the {model})')
     else:
-        assert found.text.endswith('(measured between capsules, which are thicker than the arm)')
-        assert found.remedy.endswith('; self_collision decides whether capsules refuse')
-        assert clear.description.endswith('(capsules)')
+        assert found.text.endswith('(measured between cylinders that contain the arm)')
+        assert found.remedy.endswith('; self_collision decides whether cylinders refuse')
+        assert clear.description.endswith('(cylinders)')
 
 
 def test_what_is_missing_for_the_verdict_is_said(no_meshes):
@@ -90,15 +90,15 @@ def test_what_is_missing_for_the_verdict_is_said(no_meshes):
 
     assert remark('ur7e', 'auto') == (
         'The package airo-models with the meshes of the arm is not installed, the extra '
-        '`collision` brings it: capsules, which are thicker than the arm, refuse self-collisions '
+        '`collision` brings it: cylinders that contain the arm refuse self-collisions '
         '(self_collision is auto).'
     )
     assert 'warn of self-collisions (self_collision is warn)' in remark('ur5', 'warn')
-    assert remark('ur10e', 'refuse').startswith('There are no meshes of the ur10e: capsules')
+    assert remark('ur10e', 'refuse').startswith('There are no meshes of the ur10e: cylinders')
     assert remark('ur10e', 'auto') == remark('ur10e', 'warn') == remark('ur5', 'off') == ''
 
 
-def test_capsules_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
+def test_cylinders_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
     need_meshes('ur5e')
 
     def broken(*_):
@@ -106,7 +106,7 @@ def test_capsules_stand_for_a_pinocchio_that_cannot_be_imported(monkeypatch):
 
     monkeypatch.setattr('ur_cartesian_driver.kinematics.collision_meshes.pinocchio_model', broken)
     clear = check(way(HOME, FOLDED))
-    assert clear.violation.text.endswith('capsules, which are thicker than the arm)')
+    assert clear.violation.text.endswith('cylinders that contain the arm)')
 
 
 def test_nothing_is_said_where_nothing_is_missing():
@@ -122,11 +122,11 @@ def test_the_first_row_too_near_is_named_and_the_smallest_distance():
     assert clear.warning.row == np.flatnonzero(distances.min(axis=1) < 0.005)[0] > 4096
     assert clear.margin == distances.min()
     a, b = bodies.pairs[distances.min(axis=0).argmin()]
-    assert clear.description == f'{a} and {b} (capsules)'
+    assert clear.description == f'{a} and {b} (cylinders)'
 
 
-def test_meshes_let_pass_what_only_capsules_refuse():
-    """Of all configurations that capsules refuse meshes refuse those that are really too near."""
+def test_meshes_let_pass_what_only_cylinders_refuse():
+    """Of the configurations that cylinders refuse, meshes refuse those that are too near."""
     need_meshes('ur5')
     arm = Arm(MODELS['ur5'])
     bodies, meshes = CollisionBodies(arm), CollisionMeshes(arm)
@@ -256,14 +256,14 @@ def test_of_two_watches_the_earlier_row_counts():
 MODES = [('ur5e', {'self_collision': 'refuse'}), ('ur5', {})]
 
 
-@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['cylinders', 'meshes'])
 def test_what_starts_too_near_may_leave(model, options):
     if model == 'ur5':
         need_meshes('ur5')
     assert check(way(FOLDED, HOME), start=FOLDED, model=model, **options).violation is None
 
 
-@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['cylinders', 'meshes'])
 def test_what_starts_too_near_may_not_go_nearer(model, options):
     if model == 'ur5':
         need_meshes('ur5')
@@ -273,7 +273,7 @@ def test_what_starts_too_near_may_not_go_nearer(model, options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['cylinders', 'meshes'])
 def test_what_has_left_may_not_come_back(model, options):
     if model == 'ur5':
         need_meshes('ur5')
@@ -335,10 +335,10 @@ def test_a_refusal_names_segment_and_fraction():
 def test_a_warning_goes_into_the_report_with_the_smallest_distance():
     warned = clearance_remarks(check(way(HOME, FOLDED), model='ur10e'), SEGMENT, FRACTION)
     assert warned[0].startswith('point 3: ')
-    assert 'upper arm and wrist 1 come within' in warned[0]
-    assert warned[1] == 'clearance: none between upper arm and wrist 1 (capsules)'
+    assert 'shoulder and forearm come within' in warned[0]
+    assert warned[1] == 'clearance: none between shoulder and forearm (cylinders)'
     assert clearance_remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
-        'clearance: at least 0.061 m between forearm and wrist 3 (capsules)'
+        'clearance: at least 0.050 m between forearm and wrist 3 (cylinders)'
     ]
     assert clearance_remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
 
@@ -375,17 +375,17 @@ def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
     )
 
 
-def test_where_only_capsules_tell_the_report_warns(make_cell):
+def test_where_only_cylinders_tell_the_report_warns(make_cell):
     cell = make_cell(model='ur10e')
     made = plan(folding(cell), cell.state, cell.arm, FREE)
     assert [
         remark
         for remark in made.remarks
         if re.match(
-            r'point 1: at 9\d\.\d % of its segment upper arm and wrist 1 come within', remark
+            r'point 1: at \d\d\.\d % of its segment shoulder and forearm come within', remark
         )
     ]
-    assert 'clearance: none between upper arm and wrist 1 (capsules)' in made.remarks
+    assert 'clearance: none between shoulder and forearm (cylinders)' in made.remarks
     refusing = replace(FREE, self_collision='refuse')
     with pytest.raises(CollisionPredicted, match=r'trajectory\.points\[1\]'):
         plan(folding(cell), cell.state, cell.arm, refusing)

@@ -1,24 +1,58 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the collision shapes of an arm are, for comparison with its kinematics."""
+"""Where the collision shapes of an arm are, for comparison with its kinematics and its meshes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 
 Floats = NDArray[np.float64]
 
 
-def capsules(bodies: CollisionBodies, q: Floats) -> Floats:
-    """The ends (n, k, 2, 3) [m] of the capsules that contain the cylinders."""
-    start, vector = bodies._capsules(bodies._ends(bodies.arm.frames_rows(q)))
-    ends: Floats = np.stack([start, start + vector]).transpose(3, 2, 0, 1)
-    return ends
+def body_surfaces(bodies: CollisionBodies, q: Floats, n: int = 24) -> list[Floats]:
+    """Points (m, 3) on the rims of each body, at joints (6,) [rad]: it is their convex hull."""
+    start, vector, axis = (each[:, :, 0] for each in bodies._skeletons(bodies._lines(q[None])))
+    angle = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)[:, None]
+    surfaces = []
+    for p, v, u, half, radius in zip(
+        start.T, vector.T, axis.T, bodies._insets[:, 0], bodies.radii, strict=True
+    ):
+        across = np.cross(u, [1.0, 0.3, 0.2])
+        across /= np.linalg.norm(across)
+        rim = radius * (np.cos(angle) * across + np.sin(angle) * np.cross(u, across))
+        surfaces.append(
+            np.concatenate([p + t * v + side * half * u + rim for t in (0, 1) for side in (-1, 1)])
+        )
+    return surfaces
+
+
+def beyond_bodies(bodies: CollisionBodies, q: Floats, link: Link, points: Floats) -> Floats:
+    """
+    How far points (n, 3) [m] in base are outside of each body of a link, at joints (6,) [rad].
+
+    Exact where they are inside, an upper bound where they are not.
+    """
+    start, vector, axis = (each[:, :, 0] for each in bodies._skeletons(bodies._lines(q[None])))
+    outside = []
+    for k in np.flatnonzero(np.array(bodies.links) == link):
+        p, v, u = start[:, k], vector[:, k], axis[:, k]
+        # Of a cylinder that moves across its axis the nearest place, else the middle of the axis.
+        nearest = np.clip((points - p) @ v / max(float(v @ v), 1e-300), 0.0, 1.0)
+        ways = []
+        for t in (nearest, np.full(len(points), 0.5)):
+            apart = points - p - t[:, None] * v
+            along = apart @ u
+            half = bodies._insets[k, 0] + (0.0 if t is nearest else 0.5 * abs(v @ u))
+            radial = np.linalg.norm(apart - along[:, None] * u, axis=1) - bodies.radii[k]
+            ways.append(np.maximum(np.abs(along) - half, radial))
+        outside.append(np.minimum(*ways))
+    return np.array(outside)
 
 
 def T_base_meshes(meshes: CollisionMeshes, q: Floats) -> Floats:
     """Where the meshes of all links are at joints (6,) [rad]: matrices (7, 4, 4)."""
     meshes._update_placement(q)
-    return np.array([T.homogeneous for T in meshes._placement.oMg])
+    first = [meshes._shapes[link][0] for link in Link if link is not Link.TOOL]
+    return np.array([meshes._placement.oMg[number].homogeneous for number in first])

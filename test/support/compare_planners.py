@@ -59,7 +59,7 @@ INTENDED = re.compile(r'slowed from (\S+) to \1 |: the arm stops there, because 
 #: Where a margin is equally tight at several places, rounding decides which of them is named.
 PLACE = re.compile(r' at \d+ %')
 #: Between which shapes a clearance was measured was not said before.
-SHAPES = re.compile(r' \((capsules|meshes of the \w+)\)')
+SHAPES = re.compile(r' \((cylinders|meshes of the \w+)\)')
 #: By the last name of a field; else 1e-9 (relative to values above 1).
 TOLERANCES = {
     **dict.fromkeys(('durations', 'duration'), 1e-7),

@@ -79,7 +79,7 @@ def random_robot(seed: int, number: int) -> RandomRobot:
             'max_tool_speed': float(rng.choice((0.25, 0.25, 0.25, 0.08, 0.6, 1.5))),
             'on_too_fast': str(rng.choice(('refuse', 'slow'))),
             'max_approach_distance': float(rng.choice((0.0, 0.5))),
-            # What capsules and meshes say is not what is asked here.
+            # What cylinders and meshes say is not what is asked here.
             'self_collision': 'off',
         },
     )

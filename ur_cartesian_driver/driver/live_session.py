@@ -245,7 +245,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         ),
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
-            # Capsules are thicker than the arm: they stop it only if they also refuse goals.
+            # Cylinders are thicker than the arm: they stop it only if they also refuse goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
         ),

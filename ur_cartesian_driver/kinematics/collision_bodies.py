@@ -4,44 +4,37 @@
 Collision bodies of the arm: a few cylinders per link, for many configurations at once.
 
 A preflight checks tens of thousands of configurations for collisions with itself and planes.
-Cylinders inside capsules (all points within a radius of a segment) allow this in numpy for every
-model. They contain the true shape: if they do not collide, the arm does not. If they do, the arm
-may still be free; :mod:`~.collision_meshes` decides exactly for the models that have meshes.
+Cylinders allow this in numpy for every model. They contain the true shape: if they do not collide,
+the arm does not. If they do, the arm may still be free; :mod:`~.collision_meshes` decides exactly
+for the models that have meshes.
 
-The DH table has one lateral length, d4, which is the sum of three: the upper arm lies beside the
-axis of joint 1 by the *shoulder offset* s, the forearm by the *elbow offset* e, and wrist 1 ends
-at d4. All joint housings are cylinders about their own joint's axis, and all tubes run from axis
-to axis. So each end of a body is a point on an axis, and calibrated arms use the same table.
+All joint housings are cylinders about their own joint's axis, and all tubes run from axis to axis.
+So each end of a body is a point on an axis, and calibrated arms use the same table. The connector
+of the robot cable lies along y of ``base``, towards +y.
 
-Sources. Radii and lengths of the housings: measured on the meshes of UR3, UR5 and UR10 in the
-package example-robot-data and of UR3e and UR5e in airo-models (:data:`_MEASURED`); a test checks
-that these cylinders contain them, except the cable connector at the base. The larger e-Series
-arms are assumed to have the housings of a UR10. The largest ones are a UR10's scaled by the
-footprints of the data sheets (190 mm; UR15 and its relatives 204 mm, UR20 and UR30 245 mm).
-s and e: the offsets in the configuration files of the ROS 2 description package of Universal
-Robots, but for the UR15 and its relatives, for which it has the planes in which the links meet;
-there s and e are these plus the half widths of the housings. The UR10's are the middles of its
-tubes in the meshes.
+The distance of two cylinders is at least their separation along any direction. The one between
+the nearest points of their axes, each shortened by :data:`_CUT` radii at both ends, gives a bound
+in closed form: the distance of these points less what each cylinder reaches beyond its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 from math import hypot, inf
-from types import MappingProxyType
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf
+from ur_cartesian_driver.kinematics.body_sizes import BODY_SIZES, BodySizes
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
+_Skeletons: TypeAlias = tuple[Floats, Floats, Floats]
 
 
 class Link(IntEnum):
@@ -61,111 +54,34 @@ class Link(IntEnum):
         return self.name.lower().replace('_', ' ')
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HousingSizes:
-    """
-    The housings of one size of arm [m].
+#: What a body is: a housing about a joint's axis, a tube from a joint's axis to the next one, or
+#: the connector, along y of ``base``.
+_Kind: TypeAlias = Literal['housing', 'tube', 'connector']
 
-    ``_in`` and ``_out`` are the extents of a housing along its joint's axis, towards the previous
-    link (where the two meet) and away from it. They count from the axis of the tube or, at the
-    wrists, from the axis of the next joint.
-    """
-
-    base_radius: float
-    shoulder_radius: float
-    shoulder_below: float
-    shoulder_above: float
-    #: Both ends of the upper arm, counted from its tube.
-    upper_shoulder_in: float
-    upper_shoulder_out: float
-    upper_elbow_radius: float
-    upper_elbow_in: float
-    upper_elbow_out: float
-    upper_tube: float
-    #: Both ends of the forearm, counted from its tube.
-    elbow_radius: float
-    elbow_in: float
-    elbow_out: float
-    fore_tube: float
-    fore_wrist_in: float
-    fore_wrist_out: float
-    #: Wrists 1 and 2 are alike but for a neck: one housing about the previous joint, one about
-    #: the next.
-    wrist_radius: float
-    wrist_1_in: float
-    wrist_in: float
-    wrist_out: float
-    wrist_back: float
-    wrist_front: float
-    tool_flange_radius: float
-
-    def scaled(self, factor: float) -> HousingSizes:
-        """Return the housings of a larger or smaller arm."""
-        return HousingSizes(**{name: factor * value for name, value in asdict(self).items()})
-
-
-#: The housings of UR3, UR5, UR10, UR3e and UR5e [m].
-_MEASURED: Mapping[str, tuple[float, float, float, float, float]] = {
-    'base_radius': (0.0645, 0.0745, 0.0952, 0.0642, 0.0757),
-    'shoulder_radius': (0.0468, 0.0608, 0.0772, 0.0472, 0.0607),
-    'shoulder_below': (0.0665, 0.0655, 0.0895, 0.0572, 0.064),
-    'shoulder_above': (0.0575, 0.069, 0.0885, 0.0582, 0.0717),
-    'upper_shoulder_in': (0.066, 0.0655, 0.0904, 0.0572, 0.0638),
-    'upper_shoulder_out': (0.058, 0.069, 0.0879, 0.0582, 0.072),
-    'upper_elbow_radius': (0.0395, 0.0605, 0.0628, 0.0396, 0.0609),
-    'upper_elbow_in': (0.051, 0.0655, 0.0601, 0.0542, 0.0779),
-    'upper_elbow_out': (0.058, 0.069, 0.0692, 0.0564, 0.072),
-    'upper_tube': (0.047, 0.059, 0.0763, 0.0454, 0.0586),
-    'elbow_radius': (0.0395, 0.059, 0.0628, 0.0412, 0.0626),
-    'elbow_in': (0.051, 0.055, 0.068, 0.0391, 0.0534),
-    'elbow_out': (0.047, 0.0575, 0.07, 0.0316, 0.0486),
-    'fore_tube': (0.0378, 0.0448, 0.06, 0.0345, 0.0508),
-    'fore_wrist_in': (0.0425, 0.0453, 0.0537, 0.0537, 0.0728),
-    'fore_wrist_out': (0.047, 0.0575, 0.07, 0.0468, 0.0567),
-    'wrist_radius': (0.0343, 0.0397, 0.0474, 0.0325, 0.0401),
-    'wrist_1_in': (0.047, 0.046, 0.0545, 0.0538, 0.0737),
-    'wrist_in': (0.047, 0.046, 0.0545, 0.0355, 0.0462),
-    'wrist_out': (0.031, 0.04, 0.0468, 0.0325, 0.0392),
-    'wrist_back': (0.0484, 0.0575, 0.0578, 0.0471, 0.0569),
-    'wrist_front': (0.0425, 0.048, 0.0625, 0.0505, 0.0537),
-    'tool_flange_radius': (0.0385, 0.0444, 0.0475, 0.0379, 0.0438),
-}
-_UR3, _UR5, _UR10, _UR3E, _UR5E = (
-    HousingSizes(**{name: sizes[k] for name, sizes in _MEASURED.items()}) for k in range(5)
-)
-_UR15 = _UR10.scaled(204 / 190)
-_UR20 = _UR10.scaled(245 / 190)
-
-#: Housings, shoulder offset and elbow offset [m] of each model.
-_SIZES: Mapping[str, tuple[HousingSizes, float, float]] = MappingProxyType(
-    {
-        'ur3': (_UR3, 0.1198, 0.0273),
-        'ur5': (_UR5, 0.13585, 0.01615),
-        'ur10': (_UR10, 0.1758, 0.0486),
-        'ur3e': (_UR3E, 0.12, 0.027),
-        'ur5e': (_UR5E, 0.138, 0.007),
-        'ur7e': (_UR5E, 0.138, 0.007),
-        'ur10e': (_UR10, 0.1762, 0.0393),
-        'ur12e': (_UR10, 0.1762, 0.0393),
-        'ur16e': (_UR10, 0.176, 0.04),
-        'ur15': (_UR15, 0.202, 0.061),
-        'ur18': (_UR15, 0.202, 0.061),
-        'ur8long': (_UR15, 0.202, 0.061),
-        'ur20': (_UR20, 0.26, 0.043),
-        'ur30': (_UR20, 0.26, 0.043),
-    }
+#: The bodies of every arm, and the joint that each of them belongs to, from 0.
+_BODIES: tuple[tuple[Link, _Kind, int], ...] = (
+    (Link.BASE, 'housing', 0),
+    (Link.BASE, 'connector', 6),
+    (Link.BASE, 'housing', 0),
+    (Link.SHOULDER, 'housing', 0),
+    (Link.SHOULDER, 'housing', 1),
+    (Link.UPPER_ARM, 'housing', 1),
+    (Link.UPPER_ARM, 'tube', 1),
+    (Link.UPPER_ARM, 'housing', 2),
+    (Link.FOREARM, 'housing', 2),
+    (Link.FOREARM, 'tube', 2),
+    (Link.FOREARM, 'housing', 3),
+    (Link.WRIST_1, 'housing', 3),
+    (Link.WRIST_1, 'housing', 4),
+    (Link.WRIST_2, 'housing', 4),
+    (Link.WRIST_2, 'housing', 5),
+    (Link.WRIST_3, 'housing', 5),
 )
 
-# The base of the UR5 extends a little below its frame [m].
-_BASE_BOTTOM = -0.0035
-# Overlap of two links where they meet [m].
-_OVERLAP = 0.002
-# A capsule on the whole axis of a cylinder sticks out by its radius at both ends. With 1.1 times
-# the radius its segment can be shorter, and it sticks out by only 0.64 of the cylinder's radius.
-_RADIUS_FACTOR = 1.1
-_END_FACTOR = (_RADIUS_FACTOR**2 - 1.0) ** 0.5
+# Of a cylinder's radius: with it, the bound is tightest on average.
+_CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
-_BLOCK = 256
+_BLOCK = 2048
 # Of so many rows that lie close together the middle one says how near the others may be.
 # Calibration makes no arm longer than its model by more than the slack [m].
 _STRIDE = 16
@@ -175,9 +91,10 @@ _PARALLEL = 1e-12
 _TINY = 1e-300
 
 #: Pairs of links that are checked. Neighbours share a joint that turns freely and are left out, as
-#: are pairs that cannot collide, which the tests show with the meshes: base and upper arm (only
-#: joint 2 matters), forearm and wrist 2 (wrist 3 collides first), wrist 1 and wrist 3 (d5 apart).
-#: Wrist 2 and tool are left out because the tool only turns about the axis of wrist 3.
+#: are pairs that cannot collide, which the tests show with the meshes: forearm and wrist 2 (wrist
+#: 3 collides first), wrist 1 and wrist 3 (d5 apart), wrist 2 and tool (the tool turns about the
+#: axis of wrist 3, and would have to pass through it). The upper arm turns past the round part of
+#: the base, so for it only the connector of the base counts.
 PAIRS: tuple[tuple[Link, Link], ...] = tuple(
     (a, b)
     for a in Link
@@ -185,22 +102,34 @@ PAIRS: tuple[tuple[Link, Link], ...] = tuple(
     if b - a >= 2
     and (a, b)
     not in (
-        (Link.BASE, Link.UPPER_ARM),
         (Link.FOREARM, Link.WRIST_2),
         (Link.WRIST_1, Link.WRIST_3),
         (Link.WRIST_2, Link.TOOL),
     )
 )
+#: The pair in which only the connector of the base counts.
+CONNECTOR_PAIR = (Link.BASE, Link.UPPER_ARM)
+#: The place of the connector among the bodies.
+CONNECTOR = 1
 
 
 @dataclass(frozen=True, slots=True)
-class _LinkCylinder:
-    """A cylinder between two points, each given by an axis (0..5) and a distance along it [m]."""
+class _LinkBody:
+    """
+    A cylinder between two points, each given by an axis and a distance along it [m].
+
+    Axes 0..5 are those of the joints, 6 is the middle line of the connector, 7 the line from
+    flange to TCP.
+
+    :param across: half the length [m] of a cylinder about the axis of its start, along which it
+        moves to its end; 0 = the cylinder is about the line from start to end.
+    """
 
     link: Link
     start: tuple[int, float]
     end: tuple[int, float]
     radius: float
+    across: float = 0.0
 
 
 class CollisionBodies:
@@ -215,20 +144,36 @@ class CollisionBodies:
     def __init__(self, arm: Arm, T_flange_tcp: Pose = IDENTITY, tool_radius: float = 0.0) -> None:
         """Compute the positions of all ends on their axes."""
         self.arm, self._tcp = arm, T_flange_tcp.position
-        bodies = _link_cylinders(arm)
+        size = BODY_SIZES[arm.model.name]
+        bodies = _link_bodies(size)
+        self._tool_length = hypot(*self._tcp) if tool_radius > 0.0 else 0.0
+        if self._tool_length:
+            ends = (7, 0.0), (7, self._tool_length)
+            bodies.append(_LinkBody(Link.TOOL, *ends, tool_radius))
+        x, z = size.connector
+        self._connector = 1e-3 * x, 1e-3 * z
         self._ends_on_axes = _ends_on_axes(arm, bodies)
-        links, radii = [body.link for body in bodies], [body.radius for body in bodies]
-        capsules_of = [_capsule_of(arm, body) for body in bodies]
-        self._has_tool = tool_radius > 0.0 and hypot(*self._tcp) > 0.0
-        if self._has_tool:
-            links.append(Link.TOOL)
-            radii.append(tool_radius)
-            capsules_of.append((0.0, tool_radius))
         #: The link and the radius [m] of each cylinder.
-        self.links, self.radii = tuple(links), np.array(radii)
-        self._cut, self.capsule_radii = np.array(capsules_of).T
-        self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._has_tool)
-        self._first, self._second, self._pair = _comparisons(self.links, self.pairs)
+        self.links = tuple(body.link for body in bodies)
+        self.radii = np.array([body.radius for body in bodies])
+        start, end = self.cylinder_ends(np.zeros((1, 6)))[0].transpose(1, 0, 2)
+        # Columns, a row for each cylinder: half the length of those that move across their axis,
+        across = np.array([[body.across] for body in bodies])
+        self._moves = across > 0.0
+        self._radii = self.radii[:, None]
+        self._lengths = np.linalg.norm(end - start, axis=1, keepdims=True)
+        # and by how much the skeleton of the others is shorter at either end [m].
+        insets = np.minimum(_CUT * self._radii, 0.5 * self._lengths)
+        self._insets = np.where(self._moves, across, insets)
+        self._cuts = np.where(self._moves, 0.0, insets)
+        self._tubes = np.flatnonzero(np.not_equal(*self._ends_on_axes[0])).tolist()
+        self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._tool_length)
+        of = {link: slice(*np.searchsorted(self.links, (link, link + 1))) for link in Link}
+        of_connector = slice(CONNECTOR, CONNECTOR + 1)
+        #: The bodies of both links of each pair.
+        self._compared = [
+            (of_connector if (a, b) == CONNECTOR_PAIR else of[a], of[b]) for a, b in self.pairs
+        ]
         self._reach = self._reaches(bodies)
 
     def distances(self, q: Floats, enough: float = inf) -> Floats:
@@ -236,9 +181,9 @@ class CollisionBodies:
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
         :param q: (n, 6) [rad]; faster with ``enough`` if rows that follow each other are close.
-        :param enough: where a distance is neither less than this [m] nor the smallest of all, a
-            smaller number may stand for it, which is no less than both.
-        :returns: (n, pairs) distance of their capsules [m]; negative where these overlap.
+        :param enough: where a distance is neither less than this [m] nor the smallest of all,
+            another lower bound may stand for it, which is no less than both.
+        :returns: (n, pairs) separation of their cylinders [m]; negative where these may overlap.
         """
         every = np.ones(len(self.pairs), dtype=np.bool_)
         if enough == inf or len(q) <= _STRIDE:
@@ -260,21 +205,28 @@ class CollisionBodies:
 
     def _pair_distances(self, q: Floats, pairs: Flags) -> Floats:
         """Return the distances (n, m) of some pairs."""
-        wanted = pairs[self._pair]
-        first, second = self._first[wanted], self._second[wanted]
-        begins = np.flatnonzero(np.diff(self._pair[wanted], prepend=-1))
-        sums = (self.capsule_radii[first] + self.capsule_radii[second])[:, None]
-        result = np.empty((len(q), len(begins)))
+        wanted = [self._compared[k] for k in np.flatnonzero(pairs)]
+        result = np.empty((len(q), len(wanted)))
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
-            start, vector = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
-            distances = segment_distance(
-                start[:, first], vector[:, first], start[:, second], vector[:, second]
-            )
-            result[rows] = np.minimum.reduceat(distances - sums, begins).T
+            skeletons = self._skeletons(self._lines(q[rows]))
+            for k, bodies in enumerate(wanted):
+                result[rows, k] = self._nearest(skeletons, *bodies)
         return result
 
-    def _reaches(self, bodies: Sequence[_LinkCylinder]) -> Floats:
+    def _nearest(self, skeletons: _Skeletons, first: slice, second: slice) -> Floats:
+        """Return the smallest distance (n,) of some bodies from some others."""
+        one, other = (first, None), (None, second)
+        start, vector, axis = skeletons
+        gap = segment_gap(start[:, *one], vector[:, *one], start[:, *other], vector[:, *other])
+        distance = np.sqrt(_dot(gap, gap))
+        scale = 1.0 / np.maximum(distance, _TINY)
+        for k in (one, other):
+            distance -= _beyond(_dot(gap, axis[:, *k]) * scale, self._insets[k], self._radii[k])
+        nearest: Floats = distance.min(axis=(0, 1))
+        return nearest
+
+    def _reaches(self, bodies: Sequence[_LinkBody]) -> Floats:
         """
         Return how far a turn of each joint moves one link of each pair towards the other.
 
@@ -284,13 +236,18 @@ class CollisionBodies:
         g = self.arm.model.geometry
         # Of the origins of the joints' frames, and of the flange, along the arm.
         along = np.append(0.0, np.cumsum(np.hypot(g.a, g.d)))
-        ends = [(body.link, axis, s) for body in bodies for axis, s in (body.start, body.end)]
-        ends += [(Link.TOOL, 6, hypot(*self._tcp)), (Link.TOOL, 6, 0.0)]
+        ends = [
+            (body.link, axis, abs(s) + hypot(body.radius, body.across))
+            for body in bodies
+            for axis, s in (body.start, body.end)
+        ]
         reach = np.zeros((6, len(self.pairs)))
         for k, (first, second) in enumerate(self.pairs):
             for joint in range(first, min(second, 6)):
                 reach[joint, k] = _REACH_SLACK + max(
-                    along[axis] - along[joint] + abs(s) for link, axis, s in ends if link == second
+                    along[min(axis, 6)] - along[joint] + s
+                    for link, axis, s in ends
+                    if link == second
                 )
         return reach
 
@@ -305,62 +262,97 @@ class CollisionBodies:
         result = np.empty((len(q), len(normals), len(self.links)))
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
-            start, end = self._ends(self.arm.frames_rows(q[rows]))
-            vector = end - start
-            square = np.maximum(np.einsum('ckn,ckn->kn', vector, vector), _TINY)
+            skeletons = self._skeletons(self._lines(q[rows]))
             for m, normal in enumerate(normals):
-                low, rise = (np.tensordot(normal, v, axes=1) for v in (start, vector))
-                # A disc across the unit vector u reaches r sqrt(1 - (n u)^2) down.
-                disc = np.sqrt(np.maximum(0.0, 1.0 - rise**2 / square))
-                result[rows, m] = (low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
+                low, rise, cosine = (np.tensordot(normal, v, axes=1) for v in skeletons)
+                low += np.minimum(rise, 0.0)
+                result[rows, m] = (low - _beyond(cosine, self._insets, self._radii)).T
         return result
 
     def cylinder_ends(self, q: Floats) -> Floats:
         """Return both ends of every cylinder in base [m], (n, k, 2, 3), at joints (n, 6) [rad]."""
-        ends: Floats = self._ends(self.arm.frames_rows(q)).transpose(3, 2, 0, 1)
-        return ends
+        origins, axes = self._lines(q)
+        ends: Floats = np.array(
+            [
+                origins[:, index] + along[:, None] * axes[:, index]
+                for index, along in zip(*self._ends_on_axes, strict=True)
+            ]
+        )
+        return ends.transpose(3, 2, 0, 1)
 
-    def _ends(self, frames: ChainFramesOf[Floats]) -> Floats:
-        """Return both ends of every cylinder, (2 ends, 3 coordinates, k cylinders, n rows)."""
-        origins, axes = np.array(frames.origins), np.array(frames.axes)  # (6, 3, n)
-        index, along = self._ends_on_axes
-        ends = origins[index] + along[:, :, None, None] * axes[index]  # (2, k, 3, n)
-        if self._has_tool:
-            tool = np.array([frames.position, frames.point(self._tcp)])
-            ends = np.concatenate([ends, tool[:, None]], axis=1)
-        ordered: Floats = ends.transpose(0, 2, 1, 3)
-        return ordered
+    def drawn_cylinders(self) -> Iterator[tuple[Link, Floats, Floats, float]]:
+        """
+        Yield link, start and end [m] and radius [m] of cylinders to draw, all joints at 0.
 
-    def _capsules(self, ends: Floats) -> tuple[Floats, Floats]:
-        """Return start and vector of each capsule's segment, each (3, k, n)."""
-        start, end = ends
-        vector = end - start
-        cut = self._cut[:, None]
-        return start + cut * vector, (1.0 - 2.0 * cut) * vector
+        One that moves across its axis is drawn at both ends, and as a tube between them.
+        """
+        halves = self._insets * self._skeletons(self._lines(np.zeros((1, 6))))[2][:, :, 0].T
+        for k, (start, end) in enumerate(self.cylinder_ends(np.zeros((1, 6)))[0]):
+            link, radius = self.links[k], float(self.radii[k])
+            if self._moves[k]:
+                for middle in (start, end):
+                    yield link, middle - halves[k], middle + halves[k], radius
+                radius = min(radius, float(self._insets[k, 0]))
+            yield link, start, end, radius
+
+    def _lines(self, q: Floats) -> Floats:
+        """Return a point and the direction of all axes (2, 3, axes, n)."""
+        frames = self.arm.frames_rows(q)
+        (zero, _, one), (x, z) = frames.axes[0], self._connector
+        origins = [*frames.origins, (zero + x, zero, zero + z)]
+        axes = [*frames.axes, (zero, one, zero)]
+        if self._tool_length:
+            tcp = frames.point(self._tcp)
+            origins.append(frames.position)
+            axes.append(tuple(np.subtract(tcp, frames.position) / self._tool_length))
+        return np.array([list(zip(*each, strict=True)) for each in (origins, axes)])
+
+    def _skeletons(self, lines: Floats) -> _Skeletons:
+        """Return start, vector and the cylinder's axis of all skeletons, each (3, k, n)."""
+        (first, last), (begin, end) = self._ends_on_axes
+        origins, axes = lines
+        axis = axes[:, first]
+        start = origins[:, first] + begin[:, None] * axis
+        spans = self._lengths - 2.0 * self._cuts
+        vector = spans * axis
+        for k in self._tubes:
+            tube = origins[:, last[k]] + end[k] * axes[:, last[k]] - start[:, k]
+            if not self._moves[k]:
+                axis[:, k] = tube / self._lengths[k]
+            vector[:, k] = spans[k] / self._lengths[k] * tube
+        return start + self._cuts * axis, vector, axis
 
 
-def segment_distance(
-    start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Floats
-) -> Floats:
+def _beyond(cosine: Floats, insets: Floats, radii: Floats) -> Floats:
     """
-    Return the distances of pairs of segments, which may be parallel or points.
+    Return how far cylinders reach beyond their skeletons in a direction [m].
+
+    :param cosine: (k, n) of the angle between the direction and each cylinder's axis.
+    """
+    sine = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0))
+    reach: Floats = insets * np.abs(cosine) + radii * sine
+    return reach
+
+
+def segment_gap(start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Floats) -> Floats:
+    """
+    Return the vectors between the nearest points of pairs of segments, from second to first.
 
     The minimum of a convex quadratic form over the unit square (Ericson, Real-Time Collision
-    Detection, 5.1.9).
+    Detection, 5.1.9). Segments can be parallel, or points.
 
     :param start_1: (3, ...) [m]; the segment ends at ``start_1 + vector_1``.
     """
     r = start_1 - start_2
     a, e = _dot(vector_1, vector_1), _dot(vector_2, vector_2)
     b, c, f = _dot(vector_1, vector_2), _dot(vector_1, r), _dot(vector_2, r)
-    denominator = a * e - b * b
-    crossing = denominator > _PARALLEL * a * e
-    s = np.where(crossing, (b * f - c * e) / np.where(crossing, denominator, 1.0), 0.0)
-    t = np.clip((b * np.clip(s, 0.0, 1.0) + f) / np.maximum(e, _TINY), 0.0, 1.0)
+    # Of parallel segments any s will do to begin with.
+    s = (b * f - c * e) / np.maximum(a * e - b * b, _PARALLEL * a * e + _TINY)
+    np.clip(s, 0.0, 1.0, out=s)
+    t = np.clip((b * s + f) / np.maximum(e, _TINY), 0.0, 1.0)
     s = np.clip((b * t - c) / np.maximum(a, _TINY), 0.0, 1.0)
-    gap = r + s * vector_1 - t * vector_2
-    distance: Floats = np.sqrt(_dot(gap, gap))
-    return distance
+    gap: Floats = r + s * vector_1 - t * vector_2
+    return gap
 
 
 def _dot(u: Floats, v: Floats) -> Floats:
@@ -368,45 +360,22 @@ def _dot(u: Floats, v: Floats) -> Floats:
     return product
 
 
-def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
-    """Return the cylinders of the arm's model."""
-    g = arm.model.geometry
-    d1, d4, d5, d6 = g.d[0], *g.d[3:]
-    z, s, e = _SIZES[arm.model.name]
-    # The upper arm begins where the forearm ends.
-    elbow = min(s - z.upper_elbow_in, e + z.elbow_in)
-    return [
-        _housing(Link.BASE, 0, _BASE_BOTTOM, d1 - z.shoulder_below + _OVERLAP, z.base_radius),
-        _housing(
-            Link.SHOULDER, 0, d1 - z.shoulder_below, d1 + z.shoulder_above, z.shoulder_radius
-        ),
-        _housing(Link.SHOULDER, 1, 0.0, s - z.upper_shoulder_in + _OVERLAP, z.shoulder_radius),
-        _housing(
-            Link.UPPER_ARM,
-            1,
-            s - z.upper_shoulder_in,
-            s + z.upper_shoulder_out,
-            z.shoulder_radius,
-        ),
-        _LinkCylinder(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube),
-        _housing(Link.UPPER_ARM, 2, elbow, s + z.upper_elbow_out, z.upper_elbow_radius),
-        _housing(Link.FOREARM, 2, e - z.elbow_out, e + z.elbow_in, z.elbow_radius),
-        _LinkCylinder(Link.FOREARM, (2, e), (3, e), z.fore_tube),
-        _housing(Link.FOREARM, 3, e - z.fore_wrist_out, d4 - z.fore_wrist_in, z.wrist_radius),
-        _housing(Link.WRIST_1, 3, d4 - z.wrist_1_in, d4 + z.wrist_out, z.wrist_radius),
-        _housing(Link.WRIST_1, 4, -z.wrist_back, z.wrist_front, z.wrist_radius),
-        _housing(Link.WRIST_2, 4, d5 - z.wrist_in, d5 + z.wrist_out, z.wrist_radius),
-        _housing(Link.WRIST_2, 5, -z.wrist_back, z.wrist_front, z.wrist_radius),
-        _housing(Link.WRIST_3, 5, z.wrist_front - _OVERLAP, d6, z.tool_flange_radius),
-    ]
+def _link_bodies(size: BodySizes) -> list[_LinkBody]:
+    """Return the bodies of a size, in metres."""
+    bodies = []
+    for (link, kind, axis), row in zip(_BODIES, size.rows, strict=True):
+        if row is None:
+            continue
+        begin, end, radius = (1e-3 * value for value in row)
+        if kind != 'tube':
+            bodies.append(_LinkBody(link, (axis, begin), (axis, end), radius))
+            continue
+        middle, half = 0.5 * (begin + end), 0.5 * (end - begin)
+        bodies.append(_LinkBody(link, (axis, middle), (axis + 1, middle), radius, half))
+    return bodies
 
 
-def _housing(link: Link, axis: int, begin: float, end: float, radius: float) -> _LinkCylinder:
-    """Return a cylinder about one axis, between two distances along it [m]."""
-    return _LinkCylinder(link, (axis, begin), (axis, end), radius)
-
-
-def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.intp], Floats]:
+def _ends_on_axes(arm: Arm, bodies: list[_LinkBody]) -> tuple[NDArray[np.intp], Floats]:
     """
     Return the axis and the distance along it of both ends of each body, (2, k) each.
 
@@ -419,37 +388,4 @@ def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.int
     along = np.array([[position for _, position in row] for row in ends])
     true, nominal = arm.frames((0.0,) * 6), Arm(arm.model).frames((0.0,) * 6)
     shift = np.einsum('ic,ic->i', np.subtract(nominal.origins, true.origins), np.array(true.axes))
-    return index, along + shift[index]
-
-
-def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
-    """Return the fraction of the axis cut off at each end, and the radius of the capsule."""
-    (axis, begin), (other, end) = body.start, body.end
-    if axis != other:
-        # The ends of a tube lie inside housings: the caps of its capsule add nothing.
-        return 0.0, body.radius
-    length = end - begin
-    if length <= 2.0 * _END_FACTOR * body.radius:
-        return 0.5, hypot(body.radius, 0.5 * length)
-    return _END_FACTOR * body.radius / length, _RADIUS_FACTOR * body.radius
-
-
-@cache
-def _comparisons(
-    links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Return first and second body of each comparison, and the number of its pair of links."""
-    first: list[int] = []
-    second: list[int] = []
-    numbers: list[int] = []
-    for number, (a, b) in enumerate(pairs):
-        for i, of in enumerate(links):
-            same = [j for j, other in enumerate(links) if of == a and other == b]
-            first += [i] * len(same)
-            second += same
-            numbers += [number] * len(same)
-    return (
-        np.array(first, dtype=np.intp),
-        np.array(second, dtype=np.intp),
-        np.array(numbers, dtype=np.intp),
-    )
+    return index, along + np.append(shift, (0.0, 0.0))[index]

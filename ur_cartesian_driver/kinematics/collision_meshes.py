@@ -4,8 +4,9 @@
 Exact distances between the links of an arm, from the manufacturer's meshes.
 
 :mod:`~.link_shapes` knows the models that have meshes and where they are; pinocchio computes the
-distances. Packages and meshes are optional; without them the capsules of
-:mod:`~.collision_bodies` decide.
+distances. Packages and meshes are optional; without them the cylinders of
+:mod:`~.collision_bodies` decide. The connector at the base is always the cylinder of that module,
+because the meshes of the e-Series have none.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
-from ur_cartesian_driver.kinematics.collision_bodies import Link
+from ur_cartesian_driver.kinematics.collision_bodies import CONNECTOR_PAIR, Link
 from ur_cartesian_driver.kinematics.link_shapes import (
-    ARM_LINKS,
+    connector_shape,
     link_meshes,
     LinkFrames,
+    LinkShape,
+    mesh_tolerance,
     shortest_turn_of_z,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -63,6 +66,8 @@ class CollisionMeshes:
         :raises FileNotFoundError: the package with the meshes is not installed.
         """
         shapes = link_meshes(arm.model.name, 'collision')
+        # The meshes are simplified [m].
+        self._tolerance = mesh_tolerance(arm.model.name)
         self._model = pinocchio_model(arm)
         import pinocchio
 
@@ -70,10 +75,11 @@ class CollisionMeshes:
         self._geometry = pinocchio.GeometryModel()
         frames = LinkFrames(arm)
         pinocchio.forwardKinematics(self._model, self._data, np.zeros(6))
-        for link, T_base_link in zip(ARM_LINKS, frames.at_zero, strict=True):
-            parts = [shape for shape in shapes if shape.link == link]  # all in the same frame
-            mesh = _mesh(*(str(part.mesh) for part in parts))
-            self._attach(link, T_base_link @ parts[0].T_link_shape, mesh)
+        #: The numbers of the shapes of each link; the last one of the base is the connector.
+        self._shapes: dict[Link, list[int]] = {link: [] for link in Link}
+        for shape in (*shapes, connector_shape(arm)):
+            T_base_shape = frames.at_zero[shape.link] @ shape.T_link_shape
+            self._attach(shape.link, T_base_shape, _solid(shape))
         length = hypot(*T_flange_tcp.position)
         if tool_radius > 0.0 and length > 0.0:
             # The shape is along z and has its origin in the middle.
@@ -87,10 +93,7 @@ class CollisionMeshes:
                 arm.forward((0.0,) * 6) @ T_flange_middle,
                 _coal().Cylinder(tool_radius, length),
             )
-        links = [link for link in Link if link < self._geometry.ngeoms]
-        self._pairs = {pair: k for k, pair in enumerate(combinations(links, 2))}
-        for a, b in self._pairs:
-            self._geometry.addCollisionPair(pinocchio.CollisionPair(int(a), int(b)))
+        self._pairs = {pair: self._add_pairs(pair) for pair in combinations(Link, 2)}
         self._placement = pinocchio.GeometryData(self._geometry)
 
     def _attach(self, link: Link, T_base_shape: Pose, shape: Any) -> None:
@@ -98,9 +101,21 @@ class CollisionMeshes:
         joint = min(link, Link.WRIST_3)
         T = self._pinocchio.SE3(T_base_shape.matrix())
         T_joint_shape = self._data.oMi[joint].inverse() * T
-        self._geometry.addGeometryObject(
-            self._pinocchio.GeometryObject(link.name, int(joint), T_joint_shape, shape)
+        number: int = self._geometry.addGeometryObject(
+            self._pinocchio.GeometryObject(
+                f'{link.name} {len(self._shapes[link])}', int(joint), T_joint_shape, shape
+            )
         )
+        self._shapes[link].append(number)
+
+    def _add_pairs(self, pair: tuple[Link, Link]) -> list[int]:
+        """Register the pairs of shapes of two links, and return their numbers."""
+        first, second = (self._shapes[link] for link in pair)
+        begin = len(self._geometry.collisionPairs)
+        for a in first[-1:] if pair == CONNECTOR_PAIR else first:
+            for b in second:
+                self._geometry.addCollisionPair(self._pinocchio.CollisionPair(a, b))
+        return list(range(begin, len(self._geometry.collisionPairs)))
 
     def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
         """
@@ -110,12 +125,15 @@ class CollisionMeshes:
         :param q: (n, 6) [rad].
         :returns: (n,) [m]; 0 where they touch or overlap.
         """
-        index = self._pairs[pair]
         result = np.empty(len(q))
         for row, joints in enumerate(q):
             self._update_placement(joints)
-            found = self._pinocchio.computeDistance(self._geometry, self._placement, index)
-            result[row] = max(0.0, found.min_distance)
+            found = (
+                self._pinocchio.computeDistance(self._geometry, self._placement, index)
+                for index in self._pairs[pair]
+            )
+            nearest = min(each.min_distance for each in found)
+            result[row] = max(0.0, nearest - self._tolerance)
         return result
 
     def nearer_than(
@@ -126,16 +144,20 @@ class CollisionMeshes:
 
         :returns: (n,) whether they are, and (n,) a lower bound of the distance if not [m].
         """
-        index = self._pairs[pair]
-        self._placement.collisionRequests[index].security_margin = bound
+        indices = self._pairs[pair]
+        for index in indices:
+            request = self._placement.collisionRequests[index]
+            request.security_margin = bound + self._tolerance
         near, lower_bounds = np.zeros(len(q), dtype=np.bool_), np.zeros(len(q))
         for row, joints in enumerate(q):
             self._update_placement(joints)
-            near[row] = self._pinocchio.computeCollision(self._geometry, self._placement, index)
-            # Pinocchio counts it from the security margin.
-            lower_bounds[row] = bound + max(
-                0.0, self._placement.collisionResults[index].distance_lower_bound
+            near[row] = any(
+                self._pinocchio.computeCollision(self._geometry, self._placement, index)
+                for index in indices
             )
+            # Pinocchio counts it from the security margin.
+            found = (self._placement.collisionResults[index] for index in indices)
+            lower_bounds[row] = bound + max(0.0, min(each.distance_lower_bound for each in found))
         return near, lower_bounds
 
     def _update_placement(self, q: Floats) -> None:
@@ -144,22 +166,17 @@ class CollisionMeshes:
         )
 
 
+def _solid(shape: LinkShape) -> Any:
+    """Return a shape as one that pinocchio measures with."""
+    if shape.mesh is None:
+        return _coal().Cylinder(shape.radius, shape.length)
+    return _mesh(str(shape.mesh))
+
+
 @lru_cache
-def _mesh(*files: str) -> Any:
-    """Return meshes together as the tree of triangles that pinocchio measures with."""
-    coal = _coal()
-    parts = [coal.MeshLoader().load(file, np.ones(3)) for file in files]
-    if len(parts) == 1:
-        return parts[0]
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(sum(part.num_tris for part in parts), sum(part.num_vertices for part in parts))
-    for part in parts:
-        corners = part.vertices()
-        for k in range(part.num_tris):
-            triangle = part.tri_indices(k)
-            mesh.addTriangle(*(corners[triangle[i]] for i in range(3)))
-    mesh.endModel()
-    return mesh
+def _mesh(file: str) -> Any:
+    """Return the tree of a mesh's triangles."""
+    return _coal().MeshLoader().load(file, np.ones(3))
 
 
 def _coal() -> Any:

@@ -9,7 +9,8 @@ joint's real axis, as near as possible to where it is on the nominal arm while a
 
 The meshes are the manufacturer's. Those of UR3, UR5 and UR10 come from the package
 example-robot-data (BSD), those of UR3e and UR5e (also a UR7e) from the package airo-models (MIT).
-Both are optional; links without a mesh are the cylinders of :mod:`~.collision_bodies`.
+Both are optional; links without a mesh are the cylinders of :mod:`~.collision_bodies`. The meshes
+of the e-Series have no connector at the base.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, CONNECTOR, Link
 from ur_cartesian_driver.motion.pose import (
     conjugate,
     IDENTITY,
@@ -42,7 +43,8 @@ from ur_cartesian_driver.motion.vectors import Vector3
 
 Floats: TypeAlias = NDArray[np.float64]
 #: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
-#: meshes of the e-Series are convex hulls of the links, those of the UR5e's long links in parts.
+#: meshes of the e-Series are convex hulls of the links, those of the UR5e's long links in parts; a
+#: cylinder fills the gaps between the parts of its forearm.
 Detail: TypeAlias = Literal['visual', 'collision']
 
 #: The links in the order of the joints that move them; the tool is not one of the arm's.
@@ -96,8 +98,12 @@ class _MeshSource:
     collision: str
     #: The files of collision meshes that are in parts.
     parts: Mapping[Link, tuple[str, ...]]
+    #: Cylinders about z of the mesh that fill gaps between parts: from, to, radius [m].
+    fillings: Mapping[Link, tuple[float, float, float]]
     #: Origins of the meshes of upper arm, forearm, wrists 1 to 3 along z of their frames [m].
     offsets: tuple[float, float, float, float, float]
+    #: How much nearer two links were found by their visual than by their collision meshes [m].
+    tolerance: float
 
     def files(self, link: Link, detail: Detail) -> list[Path]:
         """
@@ -122,7 +128,7 @@ class _MeshSource:
         return Pose((0.0, 0.0, along), _TURNS[link])
 
 
-def _cb3(name: str, *offsets: float) -> _MeshSource:
+def _cb3(name: str, tolerance: float, *offsets: float) -> _MeshSource:
     a, b, c, d, e = offsets
     return _MeshSource(
         package='example-robot-data',
@@ -130,12 +136,17 @@ def _cb3(name: str, *offsets: float) -> _MeshSource:
         visual='dae',
         collision='stl',
         parts={},
+        fillings={},
         offsets=(a, b, c, d, e),
+        tolerance=tolerance,
     )
 
 
 def _e_series(
-    name: str, *offsets: float, parts: Mapping[Link, tuple[str, ...]] = MappingProxyType({})
+    name: str,
+    *offsets: float,
+    parts: Mapping[Link, tuple[str, ...]] = MappingProxyType({}),
+    fillings: Mapping[Link, tuple[float, float, float]] = MappingProxyType({}),
 ) -> _MeshSource:
     a, b, c, d, e = offsets
     return _MeshSource(
@@ -144,7 +155,9 @@ def _e_series(
         visual='obj',
         collision='obj',
         parts=parts,
+        fillings=fillings,
         offsets=(a, b, c, d, e),
+        tolerance=0.001,
     )
 
 
@@ -159,13 +172,14 @@ _UR5E = _e_series(
         link: tuple(f'{link.name.lower()}_link_part_{k}' for k in range(3))
         for link in (Link.UPPER_ARM, Link.FOREARM)
     },
+    fillings={Link.FOREARM: (0.087, 0.3775, 0.04)},
 )
 #: The meshes of each model that has any. Offsets: the robot descriptions in these packages.
 _SOURCES: Mapping[str, _MeshSource] = MappingProxyType(
     {
-        'ur3': _cb3('ur3', 0.1198, 0.0273, -0.08505, -0.08535, -0.0819),
-        'ur5': _cb3('ur5', 0.13585, 0.01615, -0.093, -0.09465, -0.0823),
-        'ur10': _cb3('ur10', 0.220941, 0.049041, -0.1149, -0.1157, -0.0922),
+        'ur3': _cb3('ur3', 0.0005, 0.1198, 0.0273, -0.08505, -0.08535, -0.0819),
+        'ur5': _cb3('ur5', 0.0015, 0.13585, 0.01615, -0.093, -0.09465, -0.0823),
+        'ur10': _cb3('ur10', 0.001, 0.220941, 0.049041, -0.1149, -0.1157, -0.0922),
         'ur3e': _e_series('ur3e', 0.12, 0.027, -0.104, -0.08535, -0.0921),
         'ur5e': _UR5E,
         'ur7e': _UR5E,
@@ -215,32 +229,46 @@ def link_meshes(name: str, detail: Detail) -> tuple[LinkShape, ...]:
     if name not in _SOURCES:
         raise ValueError(f'there are no meshes of the {name}')
     source = _SOURCES[name]
-    return tuple(
-        LinkShape(link=link, T_link_shape=source.placement(link), mesh=file)
-        for link in ARM_LINKS
-        for file in source.files(link, detail)
-    )
+    shapes = []
+    for link in ARM_LINKS:
+        T_link_mesh = source.placement(link)
+        shapes += [
+            LinkShape(link=link, T_link_shape=T_link_mesh, mesh=file)
+            for file in source.files(link, detail)
+        ]
+        if detail == 'collision' and link in source.fillings:
+            begin, end, radius = source.fillings[link]
+            T_link_shape = T_link_mesh @ Pose((0.0, 0.0, 0.5 * (begin + end)))
+            shapes.append(
+                LinkShape(link=link, T_link_shape=T_link_shape, radius=radius, length=end - begin)
+            )
+    return tuple(shapes)
+
+
+def mesh_tolerance(name: str) -> float:
+    """Return how much nearer two links of a model can be than their collision meshes [m]."""
+    return _SOURCES[name].tolerance
 
 
 def link_cylinders(arm: Arm) -> tuple[LinkShape, ...]:
     """Return the cylinders of an arm, which contain its links."""
-    bodies, frames = CollisionBodies(arm), LinkFrames(arm).at_zero
-    ends = bodies.cylinder_ends(np.zeros((1, 6)))[0]
+    frames = LinkFrames(arm).at_zero
     shapes = []
-    for link, radius, (start, end) in zip(bodies.links, bodies.radii, ends, strict=True):
+    for link, start, end, radius in CollisionBodies(arm).drawn_cylinders():
         vector = end - start
         length = float(np.linalg.norm(vector))
         x, y, z = (0.5 * (start + end)).tolist()
         T_base_shape = Pose((x, y, z), shortest_turn_of_z(*(vector / length).tolist()))
+        T_link_shape = frames[link].inverse() @ T_base_shape
         shapes.append(
-            LinkShape(
-                link=link,
-                T_link_shape=frames[link].inverse() @ T_base_shape,
-                radius=float(radius),
-                length=length,
-            )
+            LinkShape(link=link, T_link_shape=T_link_shape, radius=radius, length=length)
         )
     return tuple(shapes)
+
+
+def connector_shape(arm: Arm) -> LinkShape:
+    """Return the cylinder of the connector at the base."""
+    return link_cylinders(arm)[CONNECTOR]
 
 
 class LinkFrames:

@@ -33,7 +33,7 @@ class LiveWorkspace:
     """The bounds to keep away from."""
 
     planes: tuple[Plane, ...] = ()
-    #: Smallest distance of the capsules around the links [m]; None = not checked.
+    #: Smallest distance of the cylinders around the links [m]; None = not checked.
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.
     tool_radius: float = 0.0
@@ -130,5 +130,5 @@ class WorkspaceGuard:
         a, b = self._bodies.pairs[index - len(planes) * len(self._names)]
         return (
             f'{a} and {b} would come within {max(0.0, clearance + slack):.4f} m of each other '
-            f'(measured between capsules), min_clearance is {clearance:.4f} m'
+            f'(measured between cylinders), min_clearance is {clearance:.4f} m'
         )

@@ -3,7 +3,7 @@
 """
 Check the clearance of the arm from itself and from the workspace planes along its whole path.
 
-Capsules are checked in every row; where they come close, meshes measure exactly, for the models
+Cylinders are checked in every row; where they come close, meshes measure exactly, for the models
 that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether less than
 `min_clearance` refuses or warns depends on `self_collision` and the model, never on what is
 installed. An arm that starts too close can move away: rows pass as long as a pair that is too
@@ -63,8 +63,8 @@ class ClearanceResult:
     violation: Violation | None
     #: ... and what only warns.
     warning: Violation | None
-    #: The smallest distance of all rows [m], negative where capsules overlap or a plane is
-    #: crossed, infinite where nothing is checked; between capsules it is a lower bound.
+    #: The smallest distance of all rows [m], negative where cylinders overlap or a plane is
+    #: crossed, infinite where nothing is checked; between cylinders it is a lower bound.
     margin: float
     #: The pair with that distance, and the shapes that it was measured between.
     description: str
@@ -74,7 +74,7 @@ class Clearance:
     """
     The clearance of one arm with one tool.
 
-    :param T_flange_tcp: the TCP of the goal; from the flange to it goes the tool's capsule.
+    :param T_flange_tcp: the TCP of the goal; from the flange to it goes the cylinder of the tool.
     :param options: self_collision, min_clearance, tool_radius, workspace_planes.
     """
 
@@ -205,16 +205,16 @@ class _InitialViolations:
         """
         Return which (rows, columns) are refused.
 
-        :param lower: distances of capsules, which keep changing while meshes touch.
+        :param lower: distances of cylinders, which keep changing while meshes touch.
         :param distances: those that count.
         """
         near = distances < self._bounds
         if not (near.any() or self.pending.any()):
             return near
         free = np.logical_or.accumulate(np.vstack([~self.pending, ~near]))
-        self._lower, of_capsules = _is_receding(lower, self._lower)
+        self._lower, of_cylinders = _is_receding(lower, self._lower)
         self._reached, exact = _is_receding(distances, self._reached)
-        leaving = ~free[:-1] & np.where(distances > 0.0, exact, of_capsules)
+        leaving = ~free[:-1] & np.where(distances > 0.0, exact, of_cylinders)
         self.pending = ~free[-1]
         refused: Flags = near & ~leaving
         return refused
@@ -242,7 +242,7 @@ class _SelfCollisionChecker:
 
     @cached_property
     def _meshes(self) -> CollisionMeshes | None:
-        """The meshes, loaded where capsules first come close: most goals need none."""
+        """The meshes, loaded where cylinders first come close: most goals need none."""
         if missing_meshes(self._name):
             return None
         try:
@@ -251,10 +251,10 @@ class _SelfCollisionChecker:
             return None
 
     def description(self, column: int, lower: float) -> str:
-        """Return the pair of a column, and the shapes, given the distance of its capsules."""
+        """Return the pair of a column, and the shapes, given the distance of its cylinders."""
         a, b = self._bodies.pairs[column]
         exact = lower < self._bound and self._meshes is not None
-        return f'{a} and {b} ({self._mesh_name if exact else "capsules"})'
+        return f'{a} and {b} ({self._mesh_name if exact else "cylinders"})'
 
     @property
     def _mesh_name(self) -> str:
@@ -262,7 +262,7 @@ class _SelfCollisionChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return distances (n, columns) of the capsules, and those that count.
+        Return distances (n, columns) of the cylinders, and those that count.
 
         :param pending: the columns that need exact distances; the others only need to be known as
             below the bound (then they are 0), which is faster.
@@ -289,8 +289,8 @@ class _SelfCollisionChecker:
             distance = float(self._meshes.distances((a, b), q)[0])
             shapes, advice = self._mesh_name, ''
         else:
-            shapes = 'capsules, which are thicker than the arm'
-            advice = '; self_collision decides whether capsules refuse'
+            shapes = 'cylinders that contain the arm'
+            advice = '; self_collision decides whether cylinders refuse'
         near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
         return Violation(
             row=row,
@@ -315,7 +315,7 @@ def self_collision_remark(name: str, options: PlanningOptions) -> str:
         return ''  # nobody has them, and nothing is refused
     verdict = 'refuse' if refuses else 'warn of'
     return (
-        f'{missing[0].upper()}{missing[1:]}: capsules, which are thicker than the arm, {verdict} '
+        f'{missing[0].upper()}{missing[1:]}: cylinders that contain the arm {verdict} '
         f'self-collisions (self_collision is {options.self_collision}).'
     )
 
