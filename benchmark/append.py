@@ -18,9 +18,9 @@ from typing import Any
 
 from figures import Figure
 
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 #: Time between points, a cycle of the controller [s]; points of one request; time left at which
 #: the next one is sent [s].

@@ -22,7 +22,7 @@ from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.known_frames import Frames
+from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows

@@ -71,7 +71,7 @@ def record_spiral(folder: Path, packets: int) -> None:
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     from synthetic_recording import packet, record
 
-    from ur_cartesian_driver.motion.pose import Pose
+    from ur_cartesian_driver.motion.geometry.pose import Pose
 
     here = packet(0)  # type: ignore[no-untyped-call]  # tests have no types
     record(  # type: ignore[no-untyped-call]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 #: Distance of each seed from the solution, in each joint [rad].
 OFF = 0.1

@@ -16,8 +16,8 @@ import paths
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_rows import solve_path
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import pose_from_row
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 NAME = 'kinematics, poses of a path per second'
 START: Vector6 = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)

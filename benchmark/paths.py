@@ -11,11 +11,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 MODEL = 'ur5e'

@@ -25,10 +25,10 @@ import paths
 from processes import answer_calls, Child, child, HOST
 
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
-from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
-from ur_cartesian_driver.motion.plan import Plan, PlannedRows
-from ur_cartesian_driver.motion.pose import pose_rows
-from ur_cartesian_driver.motion.primitive import MoveL
+from ur_cartesian_driver.motion.geometry.pose import pose_rows
+from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows
+from ur_cartesian_driver.motion.plan.primitive import MoveL
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.registers import POINTS_BEGUN
 from ur_cartesian_driver.protocol.program.trajectory_points import (

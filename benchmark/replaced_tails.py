@@ -23,10 +23,10 @@ from ur_cartesian_driver.driver import Driver, DriverConfig, MotionHandle
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import AlreadySent
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 NAME = 'replaced tails'
 #: The circle: radius [m], period [s]; the height of a step, and where it counts as begun [m].

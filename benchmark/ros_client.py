@@ -18,7 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
 ACTION = '/ur_cartesian_driver/follow_cartesian_trajectory'

@@ -27,12 +27,12 @@ from processes import Child, simulator
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.events import Progress
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.sim import SimulatedRobot
 
 NAME = 'set-points at 500 Hz'

@@ -41,8 +41,8 @@ from wire_tap import Relay, RelayDirection, TAP_HOST
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.driver.loop import loop_host as host
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance, Waypoint
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Through points at their times, without a stop; the driver chooses the velocities."""
 
-from ur_cartesian_driver.motion.pose import multiply
+from ur_cartesian_driver.motion.geometry.pose import multiply
 from ur_cartesian_driver.path import axis_angle, deg, mm, Path, Pose, Z
 
 

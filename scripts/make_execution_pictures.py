@@ -56,8 +56,8 @@ def a_goal(
         from ur_cartesian_driver.cli.commands import goal_file
         from ur_cartesian_driver.kinematics.chain import Arm
         from ur_cartesian_driver.kinematics.robot_models import robot_model
-        from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-        from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+        from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+        from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
         from ur_cartesian_driver.planning import plan
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
@@ -87,9 +87,9 @@ async def a_late_producer(cell: Any) -> Any:
     """Run a circle whose points are appended half a second ahead, once too late."""
     from append_goals import AppendMotion, circle
 
-    from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-    from ur_cartesian_driver.motion.goal import Goal
-    from ur_cartesian_driver.motion.vectors import ZERO6
+    from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+    from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+    from ur_cartesian_driver.motion.goal.goal import Goal
 
     home = cell.memory.read().actual_tcp_pose
     motion = AppendMotion(
@@ -120,7 +120,7 @@ async def a_replanner(cell: Any) -> Any:
     from append_goals import AppendMotion
     from replanner import Readings, replan, Replanner
 
-    from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+    from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 
     home = cell.memory.read().actual_tcp_pose
     motion = AppendMotion(cell, Replanner(home).goal(ExecutionMode.SERVO))

@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal

@@ -21,7 +21,7 @@ from tracked_files import tracked_files
 
 import ur_cartesian_driver
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.program import ProgramSettings, render
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import GoalClient, load_goal

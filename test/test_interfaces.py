@@ -12,10 +12,10 @@ from tracked_files import tracked_files
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, FreeAxis, OutputKind, SegmentType
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.robot_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, OutputKind, SegmentType
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTolerance,

@@ -153,7 +153,7 @@ def test_send_goal_is_the_goal_of_the_square_example(send_goal):
 def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
-    from ur_cartesian_driver.motion.known_frames import Frames
+    from ur_cartesian_driver.motion.goal.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
     from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.ros.client import load_goal
@@ -170,7 +170,7 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
 def test_plain_goal_passes_planning_from_home():
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robot_models import robot_model
-    from ur_cartesian_driver.motion.known_frames import Frames
+    from ur_cartesian_driver.motion.goal.known_frames import Frames
     from ur_cartesian_driver.planning import plan, PlanningOptions
     from ur_cartesian_driver.planning.stop_prediction import state_at_rest
     from ur_cartesian_driver.ros.client import load_goal

@@ -18,8 +18,13 @@ import socket
 import pytest
 from tracked_files import tracked_files
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.motion.state_age import explain_age
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
+from ur_cartesian_driver.motion.state.state_age import explain_age
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.robot.connection_status import required_action
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -39,7 +44,7 @@ pytestmark = pytest.mark.skipif(not PAGES[0].is_file(), reason='only a checkout 
 SOURCES = [
     *tracked_files(PACKAGE, 'robot/**/*.py'),
     *tracked_files(PACKAGE, 'driver/**/*.py'),
-    PACKAGE / 'motion' / 'state_age.py',
+    PACKAGE / 'motion' / 'state' / 'state_age.py',
     PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
     *tracked_files(PACKAGE, 'sim/**/*.py'),

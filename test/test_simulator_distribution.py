@@ -35,7 +35,12 @@ ROOMS = {
     'urscript',
 }
 #: What a controller does not know of the driver's goals, plans and robot program.
-OF_THE_DRIVER = {'motion/goal.py', 'motion/plan.py', 'protocol/program', 'protocol/robot_api.py'}
+OF_THE_DRIVER = {
+    'motion/goal/goal.py',
+    'motion/plan/plan.py',
+    'protocol/program',
+    'protocol/robot_api.py',
+}
 OWN = {'__init__.py', '__main__.py', 'py.typed', 'pytest_plugin.py'}
 
 

@@ -34,17 +34,17 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.primitive import MoveJ, OptimoveJ
-from ur_cartesian_driver.motion.vectors import add, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import add, Vector6
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance

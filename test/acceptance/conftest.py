@@ -12,7 +12,7 @@ import pytest
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import POINT_SIZE
 from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec

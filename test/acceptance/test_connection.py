@@ -14,8 +14,8 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

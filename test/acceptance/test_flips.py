@@ -22,14 +22,14 @@ from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidPosture, NearSingularity
-from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.primitive import MoveJ
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.plan.primitive import MoveJ
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

@@ -22,8 +22,12 @@ from waiting import wait_for
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.pose import (
+    IDENTITY,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.sim.calibration import random_calibration

@@ -24,8 +24,8 @@ from ur_cartesian_driver.driver.ipc.channel import CancelMotion
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint, JointTolerance
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, JointTolerance
 from ur_cartesian_driver.planning import plan_joint_goal, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

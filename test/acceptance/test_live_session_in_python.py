@@ -8,8 +8,8 @@ import pytest
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, RobotNotReady
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import multiply, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.pose import multiply, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 pytestmark = [

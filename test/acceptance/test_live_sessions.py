@@ -13,7 +13,7 @@ from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 

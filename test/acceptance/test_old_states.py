@@ -12,7 +12,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
-from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance, Waypoint
 
 pytestmark = [
     pytest.mark.acceptance,

@@ -30,7 +30,7 @@ from ur_cartesian_driver.execution.goal import goal_monitor
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import DOWN, Frames, mm, Path
 from ur_cartesian_driver.program.render import ProgramSettings
 from ur_cartesian_driver.robot.program import program_sockets

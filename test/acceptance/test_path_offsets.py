@@ -15,8 +15,8 @@ from robot_cell import run_cell
 
 from ur_cartesian_driver.driver.ipc.channel import SetPathOffset
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     PathOffset,
     Segment,

@@ -24,7 +24,7 @@ from random_goals import random_case
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -19,7 +19,12 @@ from robot_cell import run_cell
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import (
+    multiply,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     Goal,
     Press,
@@ -28,7 +33,6 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import multiply, Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.interfaces import rtde_output_values
 from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody

@@ -13,11 +13,11 @@ from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, ProportionalOutput, Segment, Waypoint
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, ProportionalOutput, Segment, Waypoint
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
 

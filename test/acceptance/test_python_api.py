@@ -14,8 +14,8 @@ from waiting import wait_for
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal, LocalProtocolError
-from ur_cartesian_driver.motion.goal import Goal, Segment, Tolerance, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Tolerance, Waypoint
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 

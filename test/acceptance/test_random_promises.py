@@ -35,10 +35,10 @@ from virtual_network import HOST
 from ur_cartesian_driver.cli.demo import process
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.errors import GoalRefused, TooFast
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveC, MoveP
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveP
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

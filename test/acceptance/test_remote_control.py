@@ -6,9 +6,9 @@ import pytest
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.services.service_calls import SendProgramCall
 
 pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.exhaustive]

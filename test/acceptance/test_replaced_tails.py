@@ -25,7 +25,7 @@ from robot_cell import run_cell
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import AlreadySent, GoalRefused
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

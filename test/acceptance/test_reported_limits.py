@@ -6,8 +6,8 @@ import pytest
 
 from ur_cartesian_driver.kinematics.robot_models import JointLimits, robot_model
 from ur_cartesian_driver.motion.errors import JointLimitExceeded, TooFast
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

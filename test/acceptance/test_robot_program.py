@@ -15,7 +15,7 @@ from robot_ports import fetch_program
 from waiting import wait_for
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (

@@ -17,12 +17,12 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import CancelRequested, ServoReceived, StateReceived
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Tolerance
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Tolerance
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import Spline
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

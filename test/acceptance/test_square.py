@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 pytestmark = [
     pytest.mark.acceptance,

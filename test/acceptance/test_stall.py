@@ -11,7 +11,7 @@ from recorded_goal import RecordedGoal
 from robot_cell import run_cell
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import OnPathTolerance, Tolerance
+from ur_cartesian_driver.motion.goal.goal import OnPathTolerance, Tolerance
 from ur_cartesian_driver.sim.faults.fault_values import AfterDistance, DeviationFault
 
 pytestmark = [pytest.mark.acceptance]

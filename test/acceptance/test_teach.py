@@ -7,7 +7,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.cli.teach_command import guide, Lesson
 from ur_cartesian_driver.importing import import_file, ImportOptions
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.sim.simulator_config import HOME
 

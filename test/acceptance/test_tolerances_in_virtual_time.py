@@ -17,10 +17,10 @@ from virtual_network import deliver
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.robot_state import RuntimeState
-from ur_cartesian_driver.motion.vectors import vector3, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.vectors import vector3, vector6
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES

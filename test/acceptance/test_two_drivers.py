@@ -8,7 +8,7 @@ import pytest
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
+from ur_cartesian_driver.motion.goal.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

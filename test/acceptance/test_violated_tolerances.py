@@ -5,7 +5,7 @@
 import pytest
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance, Waypoint
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]
 

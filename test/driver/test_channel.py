@@ -14,8 +14,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.robot.connection_status import LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services import service_calls

@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES, ExecutionMode
+from ur_cartesian_driver.motion.goal.execution_modes import EXECUTION_MODES, ExecutionMode
 
 
 def test_every_mode_but_auto_is_registered() -> None:

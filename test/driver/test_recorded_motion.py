@@ -15,16 +15,16 @@ from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotate
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
     Segment,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose, rotate
-from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,

@@ -44,9 +44,9 @@ from ur_cartesian_driver.driver.recordings.recording_folder import enforce_quota
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 # ---- what is in a file --------------------------------------------------------------------------

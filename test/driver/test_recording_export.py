@@ -19,8 +19,8 @@ from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver.recordings import message_definitions
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.importing import import_file
-from ur_cartesian_driver.motion.pose import Pose, rotate
-from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotate
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 
 NODE = '/ur_cartesian_driver'
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.driver.ipc import state_memory
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.robot_state import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.state.robot_state import (
     RobotMode,
     RobotState,
     RobotStatus,

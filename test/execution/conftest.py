@@ -14,11 +14,11 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
-from ur_cartesian_driver.motion.vectors import scale6, subtract6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.vectors import scale6, subtract6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.motion import MotionGenerator
 

@@ -16,9 +16,13 @@ import pytest
 from ur_cartesian_driver.execution.goal.goal_commands import Finish, SendControl
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Segment, SegmentType, Tolerance
-from ur_cartesian_driver.motion.pose import multiply, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.vectors import vector3, vector6
+from ur_cartesian_driver.motion.geometry.pose import (
+    multiply,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.geometry.vectors import vector3, vector6
+from ur_cartesian_driver.motion.goal.goal import Segment, SegmentType, Tolerance
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 TYPE = SegmentType

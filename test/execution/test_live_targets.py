@@ -11,7 +11,7 @@ from ur_cartesian_driver.execution.live.live_targets import LiveSettings, LiveTa
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
 ARM = Arm(robot_model('ur5e'))
 HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)

@@ -35,12 +35,12 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.offset_band import NO_OFFSET, OffsetBand, OffsetFeedback
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import StaleOffset
+from ur_cartesian_driver.motion.plan.offset_band import NO_OFFSET, OffsetBand, OffsetFeedback
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.registers import OFFSET_INPUTS
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 

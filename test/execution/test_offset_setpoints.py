@@ -17,8 +17,8 @@ from ur_cartesian_driver.execution.servo.offset_setpoints import (
 )
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.offset_band import OffsetBand
+from ur_cartesian_driver.motion.goal.goal import StaleOffset
+from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
 from ur_cartesian_driver.planning.preflight.offset_bands import fade_time
 
 #: How many random streams; 10,000 take two minutes.

@@ -21,9 +21,9 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.geometry.workspace import Plane
 
 UR5E = robot_model('ur5e')
 NOMINAL = Arm(UR5E)

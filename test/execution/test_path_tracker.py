@@ -16,9 +16,9 @@ from ur_cartesian_driver.execution.monitoring.path_tracker import (
     PathPosition,
     PathTracker,
 )
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))
 

@@ -30,19 +30,19 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Tolerance
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.robot_state import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Tolerance
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import Spline
+from ur_cartesian_driver.motion.state.robot_state import (
     RobotMode,
     RobotState,
     RuntimeState,
     SafetyStatus,
 )
-from ur_cartesian_driver.motion.servo_report import ServoFeedback
+from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 STEP, REST = 0.002, (0.0,) * 6
 LENGTH, DURATION = 0.1, 0.2

@@ -22,9 +22,9 @@ from ur_cartesian_driver.execution.servo.servo_stream import (
     TRANSITIONS,
 )
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.servo_report import ServoActivity, ServoFeedback
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.primitive import Spline
+from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, ServoMode
 
 STEP = 0.002

@@ -19,11 +19,15 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.goal import Tolerance
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.geometry.pose import (
+    IDENTITY,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.goal import Tolerance
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
 TARGET = Pose((0.6, 0.0, 0.2))
 AT_REST = RobotState(

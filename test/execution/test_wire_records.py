@@ -10,10 +10,10 @@ import pytest
 from ur_cartesian_driver.execution.goal.goal_commands import Finish, ReportProgress
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
-from ur_cartesian_driver.motion.goal import Goal, OutputKind, Segment, Waypoint
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.primitive import SwitchOutput
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.goal.goal import Goal, OutputKind, Segment, Waypoint
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 VALVE = SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=1, value=1.0)

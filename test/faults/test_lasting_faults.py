@@ -10,8 +10,8 @@ from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Tolerance
-from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Tolerance
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.primary_client import SILENCE_TIMEOUT

@@ -14,7 +14,7 @@ from robot_cell import CellMotion, run_cell
 from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 pytestmark = pytest.mark.slow

@@ -101,7 +101,7 @@ def test_angles_about_three_axes(tmp_path):
 
 
 def test_scale_unit_frame_and_origin(tmp_path):
-    from ur_cartesian_driver.motion.pose import Pose
+    from ur_cartesian_driver.motion.geometry.pose import Pose
 
     found = imported(
         tmp_path,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.importing import BrokenFile
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 #: As Inkscape's export for desktop cutting plotters: no header variables of units, no handles.
 INKSCAPE = '\n'.join(

@@ -8,7 +8,7 @@ from gcode_programs import imported, positions, refusal, remarks
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 
 def vias(found):

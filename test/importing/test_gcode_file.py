@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.importing import BrokenFile, parse_code_output
-from ur_cartesian_driver.motion.goal import OutputKind, SegmentType
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SegmentType
 
 #: As the LinuxCNC post-processor of FreeCAD's Path workbench writes it.
 FREECAD = """(Exported by FreeCAD)

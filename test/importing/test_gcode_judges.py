@@ -18,7 +18,7 @@ from random_cases import random_of
 from ur_cartesian_driver.importing import FORMATS, ImportOptions, parse_code_output, Treatment
 from ur_cartesian_driver.importing.gcode.codes import CODES
 from ur_cartesian_driver.importing.imported_path import PathCollector
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 JUDGED = json.loads((Path(__file__).parent / 'files' / 'rs274.json').read_text())
 #: [m]; the interpreter prints 0.1 µm.

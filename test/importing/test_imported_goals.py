@@ -23,8 +23,8 @@ from ur_cartesian_driver.importing.imported_path import PathCollector
 from ur_cartesian_driver.importing.tables.csv_file import collect_csv
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import InputKind, InputWait, Posture, SegmentType
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait, Posture, SegmentType
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)

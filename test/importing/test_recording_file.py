@@ -13,7 +13,7 @@ from synthetic_recording import only_file, packet, record
 
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions, Treatment
 from ur_cartesian_driver.importing.recording_file import TERMS
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 
 def moving(i, period=0.002):

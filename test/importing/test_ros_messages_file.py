@@ -24,7 +24,7 @@ from ur_cartesian_driver.importing import (
 from ur_cartesian_driver.importing.messages.message_terms import TERMS
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
-from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 HEADER = 'header:\n  stamp:\n    sec: 3\n    nanosec: 0\n  frame_id: map\n'
 POSE = """position:

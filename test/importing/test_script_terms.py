@@ -9,8 +9,8 @@ import pytest
 
 from ur_cartesian_driver.importing import BrokenFile, FORMATS, import_file, Treatment
 from ur_cartesian_driver.importing.script.script_terms import FUNCTIONS, STATEMENTS
-from ur_cartesian_driver.motion.goal import OutputKind, SegmentType
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SegmentType
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.builtins import controller_builtins
 from ur_cartesian_driver.sim.controller import Controller

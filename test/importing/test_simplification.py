@@ -12,7 +12,7 @@ import pytest
 
 from ur_cartesian_driver.importing.imported_path import PathCollector
 from ur_cartesian_driver.importing.simplification import MAX_TURN, simplify
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, SegmentType
+from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, SegmentType
 
 cKDTree = pytest.importorskip('scipy.spatial').cKDTree
 EXAMPLES = int(os.environ.get('IMPORT_EXAMPLES', '30'))

@@ -11,10 +11,10 @@ import pytest
 from ur_cartesian_driver.importing import BrokenFile, import_file, ImportOptions
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import InputKind, InputWait, OutputKind, SegmentType
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait, OutputKind, SegmentType
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 #: As an offline programming tool writes it: one function, speeds as variables, a loop.
 PROGRAM = """def weld():

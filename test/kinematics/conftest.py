@@ -22,7 +22,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 
 GOLDEN = Path(__file__).parent / 'golden'
 

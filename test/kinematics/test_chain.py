@@ -13,7 +13,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 
 UR5E = MODELS['ur5e']
 JOINTS = st.tuples(*[st.floats(-2 * pi, 2 * pi)] * 6)

@@ -18,7 +18,7 @@ from ur_cartesian_driver.kinematics.collision_bodies import (
     segment_gap,
 )
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 TCP = Pose((0.0, 0.05, 0.15), (0.0, 0.0, 0.0, 1.0))
 H = pi / 2

@@ -31,7 +31,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     MODELS_WITH_MESHES,
 )
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 

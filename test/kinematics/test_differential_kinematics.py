@@ -8,7 +8,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, tool_rates
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 
 TOOL = Pose((0.05, -0.1, 0.2), quaternion_from_rotation_vector((0.3, -0.2, 0.5)))
 RANDOM = np.random.default_rng(11)

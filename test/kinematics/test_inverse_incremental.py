@@ -11,8 +11,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances, track_pose
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.planning.preflight.tightest_margins import singularity_distance_rows
 
 UR5E = robot_model('ur5e')

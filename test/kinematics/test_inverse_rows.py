@@ -17,7 +17,7 @@ from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, nearest_rows, solve_path
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row, pose_rows
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row, pose_rows
 
 UR5E = Arm(MODELS['ur5e'])
 READY = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)

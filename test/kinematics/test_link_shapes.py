@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     MODELS_WITH_MESHES,
 )
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 
 FRAMES = [f'{link.name.lower()}_link' for link in ARM_LINKS]
 

@@ -18,8 +18,8 @@ from ur_cartesian_driver.kinematics.link_shapes import (
 )
 from ur_cartesian_driver.kinematics.robot_description import LINK_NAMES, robot_description
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
-from ur_cartesian_driver.motion.known_frames import T_BASE_BASE_LINK, T_TOOL0_FLANGE
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.goal.known_frames import T_BASE_BASE_LINK, T_TOOL0_FLANGE
 
 PREFIX = 'left_'
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed, RISE_AFTER_PAUSE
-from ur_cartesian_driver.motion.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed, RISE_AFTER_PAUSE
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 
 PLAYING, PAUSED, RESUMING = RuntimeState.PLAYING, RuntimeState.PAUSED, RuntimeState.RESUMING
 CYCLE = 0.002

@@ -11,8 +11,9 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
     OutputKind,
@@ -22,9 +23,8 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.primitive import MoveL
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import MoveL
 from ur_cartesian_driver.resources import share_path
 
 ZEROS = (0.0,) * 6

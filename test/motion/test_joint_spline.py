@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.primitive import Spline
 
 START = (0.1, -1.5, 1.6, -1.2, -1.4, 0.3)
 

@@ -5,14 +5,18 @@ from math import sqrt
 import pytest
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
-from ur_cartesian_driver.motion.known_frames import (
+from ur_cartesian_driver.motion.geometry.pose import (
+    IDENTITY,
+    Pose,
+    quaternion_from_rotation_vector,
+)
+from ur_cartesian_driver.motion.goal.known_frames import (
     ArmSnapshot,
     Frames,
     StaticFrame,
     T_TOOL0_FLANGE,
 )
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 T_BASE_FLANGE = Pose((0.4, 0.1, 0.5), quaternion_from_rotation_vector((1.0, 2.0, 0.5)))
 T_FLANGE_TCP = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))

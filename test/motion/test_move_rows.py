@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.move_rows import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.plan.move_rows import (
     blend_radii,
     has_optimized,
     MoveRows,
     MOVES,
     SplineRows,
 )
-from ur_cartesian_driver.motion.plan import LateLines, PlannedRows
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,
     MoveL,

@@ -4,9 +4,9 @@
 
 import pytest
 
-from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.output_names import parse_safe_outputs
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 

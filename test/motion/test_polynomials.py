@@ -5,7 +5,12 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
+from ur_cartesian_driver.motion.geometry.polynomials import (
+    cubic_rows,
+    evaluate,
+    MotionRows,
+    quintic_rows,
+)
 
 
 def random_rates(seed):

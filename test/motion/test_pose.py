@@ -13,7 +13,7 @@ from matrices import pose_from_matrix, quaternion_from_rotation
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     angle_between,
     conjugate,
     IDENTITY,

@@ -8,15 +8,19 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     Pose,
     quaternion_from_rotation_vector,
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rigid_body import (
+    acceleration_at,
+    shift_reference_point,
+    twist_at,
+)
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 FRAME = Pose((0.1, -0.2, 0.3), quaternion_from_rotation_vector((0.3, 0.2, -0.5)))
 H = 1e-4

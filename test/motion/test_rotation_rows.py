@@ -5,9 +5,9 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.polynomials import evaluate, MotionRows
-from ur_cartesian_driver.motion.pose_rows import conjugate_rows, multiply_rows
-from ur_cartesian_driver.motion.rotation_rows import (
+from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.motion.geometry.pose_rows import conjugate_rows, multiply_rows
+from ur_cartesian_driver.motion.geometry.rotation_rows import (
     angular_rates,
     exp_rows,
     log_rows,

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from ur_cartesian_driver.motion.state_age import (
+from ur_cartesian_driver.motion.state.state_age import (
     DRIFT,
     explain_age,
     RECOVERY_TIME,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion import vectors
-from ur_cartesian_driver.motion.vectors import Vector3, vector3, Vector6, vector6
+from ur_cartesian_driver.motion.geometry import vectors
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, Vector6, vector6
 
 A3: Vector3 = (1.0, -2.0, 3.5)
 B3: Vector3 = (0.25, 4.0, -1.0)

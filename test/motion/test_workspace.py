@@ -4,7 +4,7 @@
 
 import pytest
 
-from ur_cartesian_driver.motion.workspace import parse_planes, Plane
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 

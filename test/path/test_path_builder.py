@@ -14,7 +14,9 @@ from tracked_files import tracked_files
 
 from ur_cartesian_driver.goal_files import GoalFileError
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import rotate
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     ContactEnd,
     OutputKind,
@@ -23,8 +25,6 @@ from ur_cartesian_driver.motion.goal import (
     ScriptCall,
     SegmentType,
 )
-from ur_cartesian_driver.motion.pose import rotate
-from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.path import (
     against,
     analog,

@@ -18,7 +18,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
-from ur_cartesian_driver.motion.pose import quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.pose import quaternion_from_rotation_vector
 from ur_cartesian_driver.path import (
     analog,
     AnalogDomain,

@@ -11,7 +11,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
 from ur_cartesian_driver.path import Frames, Path, Pose, StaticFrame
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     FreeAxis,
     Goal,
@@ -31,7 +32,6 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.path import Path, PathPlace, resume
 
 LINEAR, JOINT, PROCESS = SegmentType.LINEAR, SegmentType.JOINT, SegmentType.PROCESS

@@ -11,8 +11,10 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
@@ -20,10 +22,8 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import SwitchOutput
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

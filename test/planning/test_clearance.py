@@ -15,8 +15,8 @@ from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Lin
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
 from ur_cartesian_driver.motion.errors import CollisionPredicted, ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.planner import plan
 from ur_cartesian_driver.planning.preflight.clearance import (

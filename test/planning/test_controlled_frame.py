@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import CollisionPredicted, InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     Pose,
     pose_from_row,
     quaternion_from_rotation_vector,
 )
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 T_FLANGE_NOZZLE = Pose((0.03, -0.02, 0.15), quaternion_from_rotation_vector((0.4, -0.3, 0.2)))

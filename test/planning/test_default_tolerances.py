@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.goal import Goal, Tolerance
+from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
 

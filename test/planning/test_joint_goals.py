@@ -21,8 +21,8 @@ from ur_cartesian_driver.motion.errors import (
     OldHeaderTimestamp,
     TooFast,
 )
-from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint, JointTolerance
-from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, JointTolerance
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.planning import plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 

@@ -28,9 +28,16 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.primitive import MoveJ, MoveL
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.goal.goal import (
+    ArcMode,
+    Goal,
+    Posture,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, MoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
 from ur_cartesian_driver.planning.geometry.curves import (

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves
 from ur_cartesian_driver.sim.motion.motion_values import Move
 from ur_cartesian_driver.sim.motion.paths.motion_calls import constant_speed_parameters

@@ -14,9 +14,9 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, PathOffset, Segment
-from ur_cartesian_driver.motion.pose import rotate
+from ur_cartesian_driver.motion.geometry.pose import rotate
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, PathOffset, Segment
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 OPTIONS = PlanningOptions(self_collision='off')

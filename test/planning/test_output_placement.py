@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     IOCommand,
     OutputKind,
     Segment,
     SegmentType,
 )
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import SwitchOutput
+from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
 from ur_cartesian_driver.protocol.program.trajectory_points import (

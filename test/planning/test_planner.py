@@ -28,8 +28,9 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
     Posture,
@@ -38,8 +39,7 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,
     MoveL,
@@ -48,7 +48,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.preview import table
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS

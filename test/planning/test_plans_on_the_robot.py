@@ -17,8 +17,8 @@ import pytest
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, TooFast
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 TYPE = SegmentType

@@ -8,9 +8,9 @@ import pytest
 
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import NotAvailable
-from ur_cartesian_driver.motion.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
-from ur_cartesian_driver.motion.goal_table import goal_table
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
+from ur_cartesian_driver.motion.goal.goal_table import goal_table
 from ur_cartesian_driver.planning.request.presses import check_press_support, press_records
 
 PRESS = Press(first_waypoint=0, last_waypoint=1, axes=('rx', 'z'), forces=(0.5, 20.0))

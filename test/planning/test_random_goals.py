@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     FreeAxis,
     Goal,
@@ -23,7 +24,6 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS

@@ -19,9 +19,9 @@ import pytest
 
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes
 from ur_cartesian_driver.planning.moves.segment_timing import shortest_duration

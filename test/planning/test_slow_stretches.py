@@ -13,11 +13,11 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import IDENTITY, multiply, Pose
-from ur_cartesian_driver.motion.pose import quaternion_from_rotation_vector as rotated
-from ur_cartesian_driver.motion.slow_stretch import SlowCause, speed_advice
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, multiply, Pose
+from ur_cartesian_driver.motion.geometry.pose import quaternion_from_rotation_vector as rotated
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, speed_advice
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 

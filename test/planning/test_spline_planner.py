@@ -26,14 +26,14 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, Waypoint
-from ur_cartesian_driver.motion.goal_table import goal_table
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
-from ur_cartesian_driver.motion.pose_rows import angle_rows
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector, rotate
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.goal_table import goal_table
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.primitive import Spline
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline

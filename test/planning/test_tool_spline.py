@@ -9,15 +9,15 @@ from math import cos, nan, sin
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.goal_table import goal_table
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     Pose,
     pose_from_row,
     quaternion_from_rotation_vector,
     rotate,
 )
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.goal_table import goal_table
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 

@@ -17,8 +17,9 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     OldHeaderTimestamp,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     FreeAxis,
     Goal,
@@ -39,8 +40,7 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal_table import goal_table
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.goal.goal_table import goal_table
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.validate import RULES

@@ -20,8 +20,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import GoalRefused, Unreachable
-from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.preview import ArmPlan, motion_page, refusal_page

@@ -7,8 +7,8 @@ import re
 import pytest
 from robot_in_memory import REVERSE, RobotInMemory
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import MoveL
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.plan.primitive import MoveL
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.program.reverse import stop
 

@@ -5,8 +5,8 @@
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.primitive import MoveJ
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.plan.primitive import MoveJ
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
 MOVE = MoveJ(target=(0.3001, *HOME[1:]), velocity=1.0, acceleration=10.0)

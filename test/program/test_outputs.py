@@ -15,11 +15,11 @@ from robot_in_memory import RobotInMemory
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
-from ur_cartesian_driver.motion.vectors import add6, scale6, subtract6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import add6, scale6, subtract6
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS

@@ -17,11 +17,11 @@ from robot_in_memory import REVERSE, RobotInMemory
 
 from ur_cartesian_driver.execution.servo.offset_setpoints import BoundedOffset
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.offset_band import OffsetBand
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import MoveL
-from ur_cartesian_driver.motion.vectors import vector3
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector3
+from ur_cartesian_driver.motion.goal.goal import StaleOffset
+from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
+from ur_cartesian_driver.motion.plan.primitive import MoveL
 from ur_cartesian_driver.program.render import OFFSET_CONSTANTS
 from ur_cartesian_driver.protocol.program.registers import (
     InputInteger,

@@ -8,7 +8,7 @@ from math import pi, sin
 import pytest
 from robot_in_memory import REVERSE, RobotInMemory, TRAJECTORY
 
-from ur_cartesian_driver.motion.primitive import MoveJ
+from ur_cartesian_driver.motion.plan.primitive import MoveJ
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.program.registers import (
     InputDouble,

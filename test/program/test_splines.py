@@ -14,9 +14,9 @@ import pytest
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.primitive import MoveJ, Spline
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, Spline
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.program.render import PREFIX
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points

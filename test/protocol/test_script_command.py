@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.framing import encode_result
 from ur_cartesian_driver.protocol.program.script_command import (
     COMMAND_SIZE,

@@ -14,10 +14,10 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     BeginPress,
     CallFunction,
@@ -35,7 +35,7 @@ from ur_cartesian_driver.motion.primitive import (
     SwitchOutput,
     Wait,
 )
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.framing import encode_result
 from ur_cartesian_driver.protocol.program.point_fields import (
     motion_type,

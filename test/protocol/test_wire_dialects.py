@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,
     MoveL,
@@ -28,7 +29,6 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.program.point_fields import MotionType
 from ur_cartesian_driver.protocol.program.reverse import trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import (

@@ -2,8 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from math import inf
 
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.robot.connection_status import timestamped
 from ur_cartesian_driver.robot.event_log import EventLog, MAX_AGE, MAX_ENTRIES, mode_changes
 

@@ -6,7 +6,12 @@ from itertools import product
 
 import pytest
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services.recovery import STEP_COMMANDS
 from ur_cartesian_driver.robot.services.recovery_steps import (

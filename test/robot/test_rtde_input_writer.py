@@ -6,8 +6,8 @@ from itertools import product
 
 import pytest
 
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.rtde.rtde_fields import INPUT_TYPES, OUTPUT_TYPES
 from ur_cartesian_driver.robot.services import rtde_input_writer
 from ur_cartesian_driver.robot.services.service_calls import (

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import normalize, Pose
+from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol import dashboard
 import ur_cartesian_driver.protocol.program.script_command as script_command
 from ur_cartesian_driver.protocol.rtde.rtde_fields import INPUT_TYPES

@@ -6,8 +6,13 @@ from typing import Any
 import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode, STATE_TABLE
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RuntimeState,
+    SafetyMode,
+    STATE_TABLE,
+)
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.robot.rtde.state_recipe import (
     in_recipe_order,

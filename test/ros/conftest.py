@@ -14,7 +14,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message

@@ -15,11 +15,11 @@ from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     InvalidGoal,
 )
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SafeOutput, SegmentType
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ArcMode, OutputKind, SafeOutput, SegmentType
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTrajectoryPoint,

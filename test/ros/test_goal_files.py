@@ -19,7 +19,7 @@ from ur_cartesian_driver.goal_files import (
     read_goal_file,
 )
 from ur_cartesian_driver.goal_files.goal_schema import GOAL, Whole
-from ur_cartesian_driver.motion.known_frames import Frames
+from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.messages.goal_messages import goal_message

@@ -12,7 +12,11 @@ from waiting import wait_for
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.pose import (
+    IDENTITY,
+    Pose,
+    quaternion_from_rotation_vector,
+)
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup

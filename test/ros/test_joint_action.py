@@ -25,9 +25,9 @@ from rclpy.action.client import ActionClient
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint
-from ur_cartesian_driver.motion.joint_goal import JointTolerance as OurTolerance
-from ur_cartesian_driver.motion.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint
+from ur_cartesian_driver.motion.goal.joint_goal import JointTolerance as OurTolerance
 from ur_cartesian_driver.ros.goals.goal_actions import (
     CartesianAction,
     installed_actions,

@@ -13,8 +13,8 @@ import pytest
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused, InvalidGoal
-from ur_cartesian_driver.motion.goal import Posture, SegmentType
-from ur_cartesian_driver.motion.known_frames import Frames
+from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
+from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTrajectoryPoint,

@@ -9,7 +9,7 @@ import pytest
 from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig

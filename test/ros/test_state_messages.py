@@ -11,8 +11,13 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.driver import ConnectionState, ConnectionStatus
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode, STATE_TABLE
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector, rotate
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    SafetyMode,
+    STATE_TABLE,
+)
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ToolData
 from ur_cartesian_driver.robot.rtde.signal_stream import (
     OPTIONAL_FIELDS,

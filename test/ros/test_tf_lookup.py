@@ -10,8 +10,8 @@ import pytest
 from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.ros.tf import tf_lookup
 from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import add_tf_prefix, load_goal

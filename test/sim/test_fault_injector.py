@@ -9,8 +9,8 @@ from math import dist
 import pytest
 from rtde_requests import setup_outputs, START, VERSION_2
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim import assemble, MemorySockets, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import (

@@ -6,7 +6,7 @@ from math import dist
 
 import pytest
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: What the slow start of a program costs its first motion [s].

@@ -12,9 +12,9 @@ from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import add, vector3
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import add, vector3
+from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, Segment, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

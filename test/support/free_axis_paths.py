@@ -19,10 +19,10 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import FreeAxis, Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tightest_margins import (

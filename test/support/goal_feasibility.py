@@ -30,7 +30,7 @@ from goal_geometry import (
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType
 
 #: Samples are at most this far apart [m], [rad]; near a singularity they are halved so often.
 STEP, STEP_TURN, HALVINGS = 2e-3, 0.02, 8

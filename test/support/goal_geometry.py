@@ -15,7 +15,7 @@ from functools import cached_property
 from forward_model import dh_frames, pose_matrix, turn_between
 import numpy as np
 
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, SegmentType
 
 #: A turn counts as much as its arc at this radius [m], where poses are compared by one number.
 ARM = 0.1

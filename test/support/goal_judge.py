@@ -20,10 +20,10 @@ import numpy as np
 from plain_clients import RtdeRow
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.primitive import MoveJ
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, SegmentType
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.primitive import MoveJ
 
 #: Speeds may be exceeded by this share.
 OVER = 0.02

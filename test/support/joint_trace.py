@@ -8,7 +8,7 @@ from fault_goals import ARM
 import numpy as np
 from robot_cell import CYCLE
 
-from ur_cartesian_driver.motion.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 
 
 class JointTrace:

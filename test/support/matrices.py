@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import normalize, Pose, Quaternion
+from ur_cartesian_driver.motion.geometry.pose import normalize, Pose, Quaternion
 
 
 def pose_from_matrix(matrix: NDArray[np.float64] | Sequence[Sequence[float]]) -> Pose:

@@ -18,8 +18,10 @@ from random_goals import ANY, Case, GoalDraw, random_case, STRAIGHT
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import MODELS
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotate
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
     IOCommand,
@@ -28,8 +30,6 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose, rotate
-from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 TYPE = SegmentType

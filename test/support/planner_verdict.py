@@ -24,10 +24,17 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.primitive import (
+    MoveC,
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+)
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Checks of speeds and distances are off; geometry is checked without a margin.

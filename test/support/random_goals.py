@@ -16,14 +16,21 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import (
+    ArcMode,
+    Goal,
+    Posture,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
 
 LINEAR, JOINT, CIRCULAR, PROCESS = (
     SegmentType.LINEAR,

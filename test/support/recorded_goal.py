@@ -9,8 +9,8 @@ import numpy as np
 from ur_cartesian_driver.driver.ipc.channel import ArmSetup
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 ARM = Arm(robot_model('ur5e'))

@@ -14,10 +14,10 @@ from plain_clients import RtdeRecorder
 from robot_cell import RobotCell, RTDE
 from virtual_network import HOST
 
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 #: Time between two points of a chunk, and how far it looks ahead [s].
 STEP, AHEAD = 0.05, 0.8

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
-from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
+from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataReceived,

@@ -21,7 +21,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSe
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.protocol.program.registers import ServoMode, SyncState
 
 UNBUFFERED = GUIDE.with_name('servoj_unbuffered.script')

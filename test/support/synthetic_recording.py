@@ -12,15 +12,15 @@ from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Reco
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.io_signals import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.state.io_signals import (
     AnalogChannel,
     AnalogDomain,
     DigitalChannels,
     Signals,
 )
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 DONE = Outcome(code=ErrorCode.SUCCESSFUL, text='Done.', report=('a line',))
 START = 100.0

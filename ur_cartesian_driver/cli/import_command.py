@@ -19,7 +19,7 @@ from ur_cartesian_driver.importing import (
 )
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 __all__ = ['FORMATS', 'import_goal', 'options_of']

@@ -25,13 +25,13 @@ from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.slow_stretch import speed_advice
-from ur_cartesian_driver.motion.vectors import vector6
-from ur_cartesian_driver.motion.workspace import parse_planes, Plane
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.slow_stretch import speed_advice
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
@@ -198,7 +198,7 @@ class GoalPlanning:
 
         :raises GoalRefused: the text says why.
         """
-        from ur_cartesian_driver.motion.known_frames import ArmSnapshot
+        from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
         from ur_cartesian_driver.planning import plan
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 

@@ -18,8 +18,8 @@ from ur_cartesian_driver.cli.commands import read_goal
 from ur_cartesian_driver.cli.progress import counted
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.command_line.simulate import calibration

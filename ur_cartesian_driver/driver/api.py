@@ -75,16 +75,16 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.io_signals import Signals
-from ur_cartesian_driver.motion.joint_goal import JointGoal
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.servo_report import ServoReport
-from ur_cartesian_driver.motion.workspace import parse_planes
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part

@@ -23,9 +23,9 @@ from ur_cartesian_driver.execution.goal.appended_records import CLOSED_BY_CLIENT
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import AlreadySent, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_append
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints

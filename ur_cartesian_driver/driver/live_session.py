@@ -23,16 +23,16 @@ from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
 from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal, SafeOutput, Waypoint
-from ur_cartesian_driver.motion.output_names import parse_safe_outputs
-from ur_cartesian_driver.motion.plan import Plan, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import Joints, vector6
-from ur_cartesian_driver.motion.workspace import parse_planes
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal, SafeOutput, Waypoint
+from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
+from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 #: How far the square of a quaternion's length may be from 1.

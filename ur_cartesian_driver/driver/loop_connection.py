@@ -19,7 +19,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
 )
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop import loop_host as host
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: Pause before a robot loop that died is replaced [s]: what ended it may end the next one too.
 RESTART_PAUSE = 0.5

@@ -18,12 +18,12 @@ from ur_cartesian_driver.driver.ipc.channel import (
     SetPathOffset,
     TemporaryTcpSet,
 )
-from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.vectors import vector3
+from ur_cartesian_driver.motion.geometry.vectors import vector3
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 OnProgress = Callable[[Progress], None]
@@ -108,8 +108,8 @@ class MotionHandle:
         Displace the tool from its path from now on; ignored by a motion that has ended.
 
         :param along: [m], in the frame of the path
-            (:mod:`~ur_cartesian_driver.motion.offset_band`), as ``across`` and ``normal``; what is
-            beyond ``path_offset.limits`` of the goal is cut.
+            (:mod:`~ur_cartesian_driver.motion.plan.offset_band`), as ``across`` and ``normal``;
+            bounded by ``path_offset.limits`` of the goal.
         :param age: how long ago that was measured [s].
         :raises InvalidGoal: the goal permits no offset, a number is none, or the age is more than
             ``path_offset.timeout``; the offset before stays.

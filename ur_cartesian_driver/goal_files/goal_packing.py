@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import Posture
-from ur_cartesian_driver.motion.goal_table import Integers, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import Posture
+from ur_cartesian_driver.motion.goal.goal_table import Integers, SegmentRows, WaypointRows
 
 
 def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any] | None:

@@ -18,8 +18,11 @@ import numpy as np
 
 from ur_cartesian_driver.goal_files.goal_schema import Message, PACKED
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     ContactEnd,
     FreeAxis,
@@ -41,17 +44,14 @@ from ur_cartesian_driver.motion.goal import (
     StaleOffset,
     Tolerance,
 )
-from ur_cartesian_driver.motion.goal_table import (
+from ur_cartesian_driver.motion.goal.goal_table import (
     GoalTable,
     rows_where,
     SegmentRows,
     WaypointRows,
     zeros,
 )
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 _Enum = TypeVar('_Enum', bound=IntEnum)
 

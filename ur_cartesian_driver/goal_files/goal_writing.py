@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 from ur_cartesian_driver.goal_files.goal_packing import packed_fields
 from ur_cartesian_driver.goal_files.goal_reading import PRESS_SETTINGS, PROPORTIONAL_NUMBERS
-from ur_cartesian_driver.motion.goal import Goal, IOCommand, Posture, SafeOutput, Tolerance
-from ur_cartesian_driver.motion.goal_table import goal_table, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, Posture, SafeOutput, Tolerance
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, SegmentRows, WaypointRows
 
 #: The fields of a message, by name.
 Fields: TypeAlias = dict[str, Any]

@@ -11,9 +11,9 @@ import re
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
-from ur_cartesian_driver.motion.output_names import output_fault, output_name
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
 
 #: Length units [m].
 LENGTH_UNITS: Mapping[str, float] = {

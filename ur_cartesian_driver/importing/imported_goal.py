@@ -22,10 +22,8 @@ from ur_cartesian_driver.importing.imported_path import (
 )
 from ur_cartesian_driver.importing.path_times import with_times
 from ur_cartesian_driver.importing.simplification import simplify
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     cross_rows,
     distance_rows,
@@ -33,6 +31,13 @@ from ur_cartesian_driver.motion.pose_rows import (
     keep_hemisphere,
     normalized_rows,
     transform_rows,
+)
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import (
+    GoalTable,
+    rows_where,
+    SegmentRows,
+    WaypointRows,
 )
 
 #: Straight down, x along y of the frame.

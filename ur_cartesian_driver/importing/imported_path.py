@@ -15,15 +15,15 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     InputWait,
     IOCommand,
     Posture,
     SegmentType,
 )
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import Vector3
 
 #: The numbers of a point that a file may leave out, and how many each has.
 _OPTIONAL = {
@@ -126,12 +126,12 @@ class ImportedPath:
     positions: Floats
     #: (n,) 1-based lines of the file; 0 = unknown.
     lines: NDArray[np.int64]
-    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.SegmentType`.
+    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
     types: NDArray[np.int64]
     #: (n,) whether the tool only travels, and whether it has to be lifted for that.
     travels: NDArray[np.bool_]
     lifts: NDArray[np.bool_]
-    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.ArcMode`.
+    #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`.
     arc_modes: NDArray[np.int64]
     #: (n, 3) points on arcs, (n, 4) unit quaternions, (n, 3) normals of the surface.
     vias: Floats

@@ -15,8 +15,8 @@ import numpy as np
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import ImportedPath, ImportNotes
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
 #: A tool that stands for so long rests [s]; shorter, it may be slow: it has 5 um to go.
 _MIN_REST = 0.5

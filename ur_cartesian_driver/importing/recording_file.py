@@ -20,7 +20,7 @@ from ur_cartesian_driver.importing.import_format import (
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes, PathCollector
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Posture, SegmentType
 
 #: Of the bits of a recording.
 _OUTPUTS = (

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.importing.imported_path import ImportedPath
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 #: How far the orientation of a point that is left out may be from the new path [rad].
 MAX_TURN = radians(0.5)

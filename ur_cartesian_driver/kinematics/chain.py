@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.pose import IDENTITY, N, Pose
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, N, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 #: A float for one pose, or an array with one value per pose of a batch.
 

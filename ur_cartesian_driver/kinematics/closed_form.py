@@ -20,8 +20,8 @@ from math import atan2, cos, hypot, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple
 
 from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
-from ur_cartesian_driver.motion.vectors import Joints, Vector3
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
 
 # A square this little below zero counts as zero [m^2]: the flange is a nanometre out of reach, as
 # happens when a robot rounds the pose of its own stretched arm.

@@ -23,7 +23,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
     WRIST_SINGULAR,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
-from ur_cartesian_driver.motion.pose import rotation_from_quaternion
+from ur_cartesian_driver.motion.geometry.pose import rotation_from_quaternion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.body_sizes import BODY_SIZES, BodySizes
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]

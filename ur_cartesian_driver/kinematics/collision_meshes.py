@@ -30,7 +30,7 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     mesh_tolerance,
     shortest_turn_of_z,
 )
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 Floats = NDArray[np.float64]
 

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames
 from ur_cartesian_driver.kinematics.robot_models import dh_table
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import Vector6, vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 
 _SAMPLES = 24
 _ITERATIONS = 5

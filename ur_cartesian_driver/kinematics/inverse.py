@@ -25,8 +25,8 @@ from ur_cartesian_driver.kinematics.closed_form import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits, RobotModel
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
 # Rounding by which a position may exceed its limit [rad].
 _LIMIT_ROUNDING = 1e-9

@@ -17,8 +17,8 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
-from ur_cartesian_driver.motion.vectors import add6, Joints, Vector3, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
+from ur_cartesian_driver.motion.geometry.vectors import add6, Joints, Vector3, vector6
 
 #: A squared error (metres and radians) below this leaves an error of 1e-10 after the next step,
 #: unless the arm is nearly singular.

@@ -32,8 +32,8 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, nearest
-from ur_cartesian_driver.motion.pose import pose_from_row
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 1024

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, CONNECTOR, Link
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     IDENTITY,
     multiply,
@@ -38,8 +38,8 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
     rotate,
 )
-from ur_cartesian_driver.motion.pose_rows import compose_rows, multiply_rows
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 Floats: TypeAlias = NDArray[np.float64]
 #: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision

@@ -25,7 +25,9 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     LinkShape,
 )
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.known_frames import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.goal.known_frames import (
     BASE,
     BASE_LINK,
     FLANGE,
@@ -33,8 +35,6 @@ from ur_cartesian_driver.motion.known_frames import (
     T_TOOL0_FLANGE,
     TOOL0,
 )
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector3
 
 #: The names of the links' frames, in the order of :data:`ARM_LINKS`.
 LINK_NAMES: tuple[str, ...] = (BASE, *(f'{link.name.lower()}_link' for link in ARM_LINKS[1:]))

@@ -31,7 +31,7 @@ from math import inf, isfinite, pi, radians
 from types import MappingProxyType
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.vectors import Vector6, vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 
 PositionLimits: TypeAlias = tuple[tuple[float, float], ...]
 

@@ -10,12 +10,12 @@ from math import nan
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
-from ur_cartesian_driver.motion.goal import SafeOutput
-from ur_cartesian_driver.motion.offset_band import OffsetFeedback
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.servo_report import ServoFeedback
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
+from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.plan.offset_band import OffsetFeedback
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 
 class TrajectoryResult(IntEnum):

@@ -12,11 +12,11 @@ Compose a path of the tool in a few lines, without ROS and for ROS.
 """
 
 from ur_cartesian_driver.motion.events import PathPlace
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ContactEnd, PressFrame, StaleOffset, Tolerance
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ContactEnd, PressFrame, StaleOffset, Tolerance
+from ur_cartesian_driver.motion.goal.known_frames import Frames, StaticFrame
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.path.orientations import (
     against,
     axis_angle,

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from itertools import accumulate
 from math import atan2, cos, pi, sin, sqrt
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     Pose,
     quaternion_from_rotation_vector,
     rotate,
     slerp,
 )
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     cross,
     dot,

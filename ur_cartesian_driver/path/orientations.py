@@ -12,8 +12,16 @@ from collections.abc import Sequence
 from math import cos, isfinite, pi, sin, sqrt
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.pose import multiply, normalize, Quaternion
-from ur_cartesian_driver.motion.vectors import cross, dot, norm, scale, subtract, unit, Vector3
+from ur_cartesian_driver.motion.geometry.pose import multiply, normalize, Quaternion
+from ur_cartesian_driver.motion.geometry.vectors import (
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+    unit,
+    Vector3,
+)
 
 #: The tool's axis z straight down, its x along y of the frame.
 DOWN: Quaternion = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)

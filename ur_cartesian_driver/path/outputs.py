@@ -7,15 +7,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.goal.goal import (
     InputKind,
     InputWait,
     IOCommand,
     OutputKind,
     SafeOutput,
 )
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.output_names import output_fault, output_name
+from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 @dataclass(frozen=True, slots=True)

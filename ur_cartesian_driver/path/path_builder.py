@@ -25,8 +25,9 @@ from ur_cartesian_driver.goal_files import (
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     OnPathTolerance,
     PathOffset,
@@ -34,9 +35,8 @@ from ur_cartesian_driver.motion.goal import (
     StaleOffset,
     Tolerance,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.path.centre_line import CentreLine, RestToRest
 from ur_cartesian_driver.path.outputs import Output
 from ur_cartesian_driver.path.path_events import PathWithEvents

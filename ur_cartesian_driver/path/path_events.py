@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
+from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     InputWait,
     OutputKind,
@@ -19,7 +20,6 @@ from ur_cartesian_driver.motion.goal import (
     ProportionalOutput,
     ScriptCall,
 )
-from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
 from ur_cartesian_driver.path.path_numbers import amount, NANOSECONDS, to_nanoseconds, vector

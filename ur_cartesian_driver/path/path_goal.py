@@ -11,8 +11,9 @@ from math import inf
 from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     Goal,
     InputWait,
     IOCommand,
@@ -23,8 +24,7 @@ from ur_cartesian_driver.motion.goal import (
     Segment,
     SegmentType,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows, WaypointRows
 from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, PathSettings, SAME_POSITION
 

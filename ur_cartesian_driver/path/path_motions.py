@@ -10,10 +10,10 @@ from math import nan, tau
 from typing import Any, Self, TypeAlias
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import ArcMode, FreeAxis, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import multiply, Pose, Quaternion, rotate
-from ur_cartesian_driver.motion.vectors import add, Vector6
+from ur_cartesian_driver.motion.geometry.pose import multiply, Pose, Quaternion, rotate
+from ur_cartesian_driver.motion.geometry.vectors import add, Vector6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.path.centre_line import arc, turned
 from ur_cartesian_driver.path.path_numbers import (
     amount,

@@ -9,9 +9,9 @@ from math import isfinite, isnan, nan
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import Posture
-from ur_cartesian_driver.motion.pose import normalize, Quaternion
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.pose import normalize, Quaternion
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.goal.goal import Posture
 
 NANOSECONDS = 1_000_000_000
 #: Larger twists and accelerations, and joint positions, are mistakes.

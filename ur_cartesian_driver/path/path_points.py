@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion, rotate
+from ur_cartesian_driver.motion.geometry.vectors import add, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     FreeAxis,
     InputWait,
@@ -25,9 +27,7 @@ from ur_cartesian_driver.motion.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import Pose, Quaternion, rotate
-from ur_cartesian_driver.motion.rigid_body import acceleration_at, twist_at
-from ur_cartesian_driver.motion.vectors import add, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.state.rigid_body import acceleration_at, twist_at
 
 #: Poses that are nearer are the same [m], [rad].
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6

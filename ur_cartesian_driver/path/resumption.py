@@ -22,7 +22,9 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
     InputWait,
@@ -36,10 +38,8 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable
-from ur_cartesian_driver.motion.known_frames import FRAMES_OF_TOOL
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
+from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode

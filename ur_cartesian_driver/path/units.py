@@ -7,7 +7,7 @@ from __future__ import annotations
 from math import radians
 from typing import overload
 
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 
 @overload

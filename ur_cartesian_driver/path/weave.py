@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from math import nan
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, line, RestToRest, Stroke
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 

@@ -6,7 +6,7 @@ Check a goal and plan it: primitives, times, joint configurations, report.
 :func:`check` makes the checks that need no robot, :func:`plan` all others; both refuse a goal by
 raising a :class:`~ur_cartesian_driver.motion.errors.GoalRefused`; :func:`plan_joint_goal` does
 both for a joint goal. A goal that passes becomes a
-:class:`~ur_cartesian_driver.motion.plan.Plan`. Nothing here moves a robot.
+:class:`~ur_cartesian_driver.motion.plan.plan.Plan`. Nothing here moves a robot.
 """
 
 from typing import TYPE_CHECKING

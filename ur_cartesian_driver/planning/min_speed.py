@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.slow_stretch import (
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.plan.slow_stretch import (
     name_points,
     SlowCause,
     SLOWER_BY,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import get_args, Literal, TypeAlias
 
-from ur_cartesian_driver.motion.declared_types import declare_types
-from ur_cartesian_driver.motion.output_names import parse_safe_outputs
-from ur_cartesian_driver.motion.workspace import parse_planes
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes
+from ur_cartesian_driver.motion.goal.declared_types import declare_types
+from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 

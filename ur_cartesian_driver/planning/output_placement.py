@@ -17,11 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import IOCommand, OutputKind, ProportionalOutput
-from ur_cartesian_driver.motion.plan import PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
+from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, ProportionalOutput
+from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import (
     OutputRecord,
     SpeedLaw,
     Spline,
@@ -29,7 +30,6 @@ from ur_cartesian_driver.motion.primitive import (
     SwitchOutput,
     Wait,
 )
-from ur_cartesian_driver.motion.vectors import subtract, Vector6
 from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 

@@ -26,13 +26,13 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import transform_rows
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.slow_stretch import SlowStretch
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.free_axis.free_rotations import as_named, choose_rotations
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import NoRotation
 from ur_cartesian_driver.planning.min_speed import (

@@ -16,9 +16,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import add_scaled6, Joints, subtract6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Joints, subtract6, ZERO6
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: How far friction may leave a joint beside its set-point [rad]: 0.2 to 0.4 mrad were recorded.
 MAX_STATIC_ERROR = 0.005

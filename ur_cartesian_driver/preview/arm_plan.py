@@ -10,8 +10,8 @@ from tempfile import mkstemp
 import webbrowser
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.preview.motion_page import motion_page
 
 

@@ -11,10 +11,10 @@ from math import hypot
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.preview.motion_page import scene_of_plan, serve, Server
 
 #: The trail of the TCP has an edge for each of these lengths [m], and so many of them at most.

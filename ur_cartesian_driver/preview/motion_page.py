@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_shapes, LinkFrames
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import AwaitInput, CallFunction, SpeedLaw
-from ur_cartesian_driver.motion.vectors import Joints
-from ur_cartesian_driver.motion.workspace import Plane
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.workspace import Plane
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.plan.plan import Plan
+from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, SpeedLaw
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
 from ur_cartesian_driver.planning.request.io_commands import describe_command
 from ur_cartesian_driver.preview.plan_samples import Preview, sample, table

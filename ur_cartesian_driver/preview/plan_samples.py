@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import MoveJ, OptimoveJ, OptimoveL, Spline, Stop
-from ur_cartesian_driver.motion.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, OptimoveL, Spline, Stop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

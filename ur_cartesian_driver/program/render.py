@@ -34,10 +34,10 @@ from functools import cache
 from importlib.resources import files
 import re
 
-from ur_cartesian_driver.motion.approach import ARRIVAL_TOLERANCE, BRAKING_FRACTION
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.goal.goal import ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.plan.approach import ARRIVAL_TOLERANCE, BRAKING_FRACTION
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command

@@ -8,7 +8,7 @@ They do what has to be done while our own program does not run.
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 
 def tcp_program(offset: Vector6) -> str:

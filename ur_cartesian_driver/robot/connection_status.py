@@ -9,7 +9,12 @@ from dataclasses import dataclass, field
 from datetime import datetime, UTC
 from math import nan
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 

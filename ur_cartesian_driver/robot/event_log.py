@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Protocol
 
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: Older entries do not explain what has just ended [s].
 MAX_AGE = 3.0

@@ -25,11 +25,11 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
-from ur_cartesian_driver.motion.io_signals import Signals
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.state_age import explain_age, StaleStates
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.state_age import explain_age, StaleStates
 from ur_cartesian_driver.program import PROGRAM_NAME, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 import ipaddress
 from math import isfinite
 
-from ur_cartesian_driver.motion.declared_types import declare_types
+from ur_cartesian_driver.motion.goal.declared_types import declare_types
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 

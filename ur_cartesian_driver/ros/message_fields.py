@@ -12,7 +12,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds, pose_from_message, seconds
 from ur_cartesian_driver.goal_files.goal_schema import Message
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 __all__ = [
     'Message',

@@ -17,15 +17,15 @@ from pathlib import PurePosixPath
 from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import add, dot, Vector3, Vector6
+from ur_cartesian_driver.motion.state.robot_state import (
     RobotMode,
     RobotStatus,
     RuntimeState,
     SafetyMode,
     SafetyStatus,
 )
-from ur_cartesian_driver.motion.vectors import add, dot, Vector3, Vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.contact_motion import ArmState, ContactMotion

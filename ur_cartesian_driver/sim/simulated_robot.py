@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import threading
 from typing import Any, TypeVar
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.controller_assembly import assemble

@@ -7,7 +7,7 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.sim.motion.controller_offset import BASE, FRAMES, MOTION, TCP, WORLD
 
 CYCLE = 0.002

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 pytestmark = pytest.mark.slow
 

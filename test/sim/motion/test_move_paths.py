@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
+from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.sim.motion import MotionError
 from ur_cartesian_driver.sim.motion.paths.move_paths import (
     CircularMovePath,

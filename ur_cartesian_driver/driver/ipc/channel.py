@@ -26,10 +26,10 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, RobotModel
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, LocalProtocolError
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.io_signals import Signals
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.servo_report import ServoReport
-from ur_cartesian_driver.motion.vectors import Joints, Vector3
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 

@@ -18,9 +18,9 @@ import struct
 import tempfile
 from typing import Any
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.robot_state import RobotState, STATE_TABLE
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.state.robot_state import RobotState, STATE_TABLE
 
 _COUNTER = struct.Struct('<Q')
 #: How many numbers the types of fields hold that hold more than one.

@@ -31,7 +31,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, Serv
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.motion.goal import PIECES_PER_HORIZON
+from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
 
 #: What the registry of execution modes names as feeder.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]

@@ -69,9 +69,9 @@ from ur_cartesian_driver.motion.events import (
     PreemptRequested,
     StateReceived,
 )
-from ur_cartesian_driver.motion.io_signals import Signals
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.rtde.register_connection import (

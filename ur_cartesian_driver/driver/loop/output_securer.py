@@ -11,7 +11,7 @@ import logging
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.motion.events import OutputsSecured
-from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.output_writer import write_outputs
 

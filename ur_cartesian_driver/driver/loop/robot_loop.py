@@ -50,7 +50,7 @@ from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.motion.events import CancelRequested, Tick
-from ur_cartesian_driver.motion.io_signals import Signals
+from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver.recordings.message_definitions import message_definition
 from ur_cartesian_driver.driver.recordings.recording import Floats, Recording
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.known_frames import BASE, TCP
-from ur_cartesian_driver.motion.pose import conjugate, rotate
+from ur_cartesian_driver.motion.geometry.pose import conjugate, rotate
+from ur_cartesian_driver.motion.goal.known_frames import BASE, TCP
 
 #: Topics of the node are below its name.
 NODE = '/ur_cartesian_driver'

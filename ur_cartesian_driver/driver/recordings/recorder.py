@@ -30,9 +30,9 @@ from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_folder import RecordingFolder
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.io_signals import Signals
-from ur_cartesian_driver.motion.plan import Plan, ReferencePath
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.planning.options import PlanningOptions

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_format import Event
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
-from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
 
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int32]

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings import recording_format as disk
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 
 #: Names of recordings; other files in the directory are left alone.
 _RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')

@@ -8,7 +8,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 
 #: The answer to points that come after a request with ``last: true``.
 CLOSED_BY_CLIENT = 'The goal was closed by an earlier request with last: true.'

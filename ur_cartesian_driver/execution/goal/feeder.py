@@ -22,10 +22,10 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 )
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.events import Event
-from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 
 class Feeder(ABC):

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.goal import SafeOutput
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.goal import SafeOutput
+from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 

@@ -70,9 +70,9 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.goal import DEFAULT_GOAL_TIME_TOLERANCE
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.state_age import explain_age
+from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.state_age import explain_age
 
 #: Codes of a goal whose stop the robot has not confirmed in time.
 _UNCONFIRMED = (ErrorCode.EXECUTION_FAILED, ErrorCode.CONNECTION_LOST)

@@ -22,11 +22,11 @@ from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
 from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
 from ur_cartesian_driver.motion.events import PathPlace, Progress
-from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
-from ur_cartesian_driver.motion.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
-from ur_cartesian_driver.motion.vectors import add, scale, Vector3
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import add, scale, Vector3
+from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
+from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
 #: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01

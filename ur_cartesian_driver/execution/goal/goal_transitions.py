@@ -60,7 +60,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.robot_state import (
+from ur_cartesian_driver.motion.state.robot_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -13,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     DEFAULT_STALL_TIMEOUT,
     DEFAULT_YIELDS,
@@ -24,20 +27,17 @@ from ur_cartesian_driver.motion.goal import (
     SafeOutput,
     Tolerance,
 )
-from ur_cartesian_driver.motion.joint_goal import JointTolerances
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.move_rows import blend_radii, has_optimized, stops
-from ur_cartesian_driver.motion.offset_band import OffsetBand
-from ur_cartesian_driver.motion.plan import Plan, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.move_rows import blend_radii, has_optimized, stops
+from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     CallFunction,
     OutputRecord,
     SwitchOutput,
 )
-from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 

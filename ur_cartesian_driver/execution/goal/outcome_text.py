@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp, TemporaryTcp
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 
 def failure_text(clause: str, location: str) -> str:

@@ -17,8 +17,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendSafeOutputs,
 )
 from ur_cartesian_driver.motion.events import OutputsSecured
-from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
 _PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})

@@ -13,8 +13,8 @@ from __future__ import annotations
 from math import inf
 
 from ur_cartesian_driver.execution.goal.goal_transitions import is_at_rest
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: How much a TCP that the robot reports may differ from the one that was sent [m], [rad]: the
 #: resolution of the wire on each axis.

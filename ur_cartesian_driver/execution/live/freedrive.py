@@ -9,8 +9,8 @@ from ur_cartesian_driver.execution.goal.goal_transitions import GoalSignal, Goal
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.motion.events import Event, ServoReceived
-from ur_cartesian_driver.motion.servo_report import ServoFeedback
-from ur_cartesian_driver.motion.vectors import Joints, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
+from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import ServoMode
 
 #: How long the robot program may take to let the arm be guided [s].

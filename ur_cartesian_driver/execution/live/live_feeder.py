@@ -16,8 +16,8 @@ from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.motion.events import Event
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: The arm goes where the targets lead it: there is no plan that it could leave.
 ANY_DEVIATION = (0.0, 0.0)

@@ -18,8 +18,8 @@ from ur_cartesian_driver.execution.live.online_trajectory import (
     OnlineTrajectoryGenerator,
 )
 from ur_cartesian_driver.execution.offsets.freshness import Freshness
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,15 +23,14 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import explain_unreachable
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances, track_pose
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.approach import approach_speed, ARRIVAL_TOLERANCE
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
     Quaternion,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     Joints,
     norm,
@@ -41,6 +40,7 @@ from ur_cartesian_driver.motion.vectors import (
     Vector6,
     ZERO3,
 )
+from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
 
 #: A stopped arm goes on only if it can go at least so far [m], [rad]; otherwise it would jitter at
 #: a bound.

@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.events import PathPlace
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 #: Weight of a radian in the distance that decides which position is the nearest [m/rad].
 METRES_PER_RADIAN = 0.1

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
@@ -22,8 +22,8 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import add, subtract, Vector3, vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: The tracker may be so much before the time of a point at which the arm stands [s].
 POINT_TIME_TOLERANCE = 0.01

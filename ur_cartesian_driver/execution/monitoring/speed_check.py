@@ -16,8 +16,8 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
 #: The peak of a motion from rest to rest is at most twice its average.
 PEAK_TO_MEAN = 2.0

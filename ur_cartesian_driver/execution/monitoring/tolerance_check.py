@@ -14,8 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import isnan, nan
 
-from ur_cartesian_driver.motion.goal import Tolerance
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
@@ -23,8 +22,9 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import subtract, Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector3, Vector6
+from ur_cartesian_driver.motion.goal.goal import Tolerance
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 _AXES = ('x', 'y', 'z')
 _UNKNOWN: Vector6 = (nan,) * 6

@@ -14,9 +14,9 @@ from math import inf, isfinite, nan
 
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, LogWarning
 from ur_cartesian_driver.execution.offsets.freshness import Freshness
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.offset_band import OFFSET_AXES, OffsetBand
-from ur_cartesian_driver.motion.vectors import Vector3, vector3, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, ZERO3
+from ur_cartesian_driver.motion.goal.goal import StaleOffset
+from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
 
 #: Shortest time between two warnings [s].
 WARNING_PERIOD = 2.0

@@ -40,7 +40,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 )
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.execution.points.send_window import SendWindow
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 #: How long a motion that is only its ending so far waits for more before it begins [s]: the robot

@@ -29,14 +29,14 @@ from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.motion.events import Event, INPUTS_LINK, LinkLost, OffsetReceived
-from ur_cartesian_driver.motion.offset_band import (
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
+from ur_cartesian_driver.motion.plan.offset_band import (
     AppliedOffset,
     NO_OFFSET,
     OffsetBand,
     OffsetFeedback,
 )
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector3, ZERO3
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 #: The first sequence number is so far beyond the last one that the robot has read: more than a

@@ -23,10 +23,8 @@ from ur_cartesian_driver.execution.servo.servo_stream import MIN_STEP
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_incremental import track_pose
-from ur_cartesian_driver.motion.approach import approach_speed, ARRIVAL_TOLERANCE
-from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     add6,
     Joints,
@@ -39,6 +37,8 @@ from ur_cartesian_driver.motion.vectors import (
     ZERO3,
     ZERO6,
 )
+from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
+from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
 
 #: The offset moves in steps of the motion's time that are no longer [s].
 STEP = MIN_STEP

@@ -54,10 +54,10 @@ from ur_cartesian_driver.motion.events import (
     ServoReceived,
     TrajectoryEnded,
 )
-from ur_cartesian_driver.motion.offset_band import AppliedOffset, NO_OFFSET
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.servo_report import ServoFeedback, UNKNOWN6
-from ur_cartesian_driver.motion.vectors import subtract6, Vector3, Vector6, vector6
+from ur_cartesian_driver.motion.geometry.vectors import subtract6, Vector3, Vector6, vector6
+from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.servo_report import ServoFeedback, UNKNOWN6
 
 #: A robot program that has read one of our sequence numbers so lately does not hang, wherever the
 #: arm stands [s].

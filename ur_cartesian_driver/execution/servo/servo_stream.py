@@ -39,13 +39,13 @@ from math import ceil, inf
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
-from ur_cartesian_driver.motion.servo_report import (
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.state.servo_report import (
     ServoActivity,
     ServoFeedback,
     ServoReport,
     UNKNOWN6,
 )
-from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoMode, SyncState
 
 #: Shortest time between two writes, as a part of a control step: of two writes in one step the

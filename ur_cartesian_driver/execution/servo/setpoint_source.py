@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.vectors import Vector6, vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 
 #: How many set-points of a spline are computed at a time: in an array each costs a fiftieth.
 BATCH = 128

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSignal
-from ur_cartesian_driver.motion.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
 
 class WaitForArm:

@@ -9,8 +9,8 @@ from math import cos, sin
 
 import numpy as np
 
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import cross, norm, unit, Vector3, ZERO3
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import cross, norm, unit, Vector3, ZERO3
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from math import floor
 
 from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut
 from ur_cartesian_driver.importing.dxf.entity_curves import Stretch
-from ur_cartesian_driver.motion.vectors import norm, subtract, Vector3
+from ur_cartesian_driver.motion.geometry.vectors import norm, subtract, Vector3
 
 # Shares of the distance of ends that meet:
 #: Stretches whose points are as near as this are one that was drawn twice.

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.importing.simplification import farthest_row
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 
 #: The share of the tolerance for the pieces; smaller ones take more time and save few chords.
 _FINE = 1.0 / 8.0

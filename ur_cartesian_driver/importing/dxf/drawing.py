@@ -18,7 +18,7 @@ from ur_cartesian_driver.importing.dxf.affine import (
 )
 from ur_cartesian_driver.importing.dxf.dxf_records import read_records, Record
 from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut, TERMS
-from ur_cartesian_driver.motion.vectors import add, scale, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import add, scale, ZERO3
 
 _COMMENT, _NAME, _VARIABLE = 999, 2, 9
 _FROZEN, _EXTERNAL = 1, (4, 8)

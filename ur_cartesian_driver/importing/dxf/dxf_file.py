@@ -14,8 +14,8 @@ from ur_cartesian_driver.importing.dxf.entity_curves import JOINED, Stretch, str
 from ur_cartesian_driver.importing.import_format import ImportFormat
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector, SAME_POINT
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.vectors import norm, subtract
+from ur_cartesian_driver.motion.geometry.vectors import norm, subtract
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 
 def collect_dxf(file: Path, options: ImportOptions, into: PathCollector) -> None:

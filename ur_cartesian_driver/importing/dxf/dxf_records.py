@@ -17,7 +17,7 @@ import re
 
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import decoded, file_lines
-from ur_cartesian_driver.motion.vectors import Vector3, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 
 #: The key of all extended data, which have the codes from here on.
 EXTENDED_DATA = 1001

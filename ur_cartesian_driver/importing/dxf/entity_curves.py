@@ -16,7 +16,15 @@ from ur_cartesian_driver.importing.dxf.curve_chords import chords, ellipse_curve
 from ur_cartesian_driver.importing.dxf.dxf_records import Record, Z_AXIS
 from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut
 from ur_cartesian_driver.importing.imported_path import BrokenFile
-from ur_cartesian_driver.motion.vectors import add, cross, dot, norm, scale, subtract, Vector3
+from ur_cartesian_driver.motion.geometry.vectors import (
+    add,
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+    Vector3,
+)
 
 #: One arc of the robot turns by no more; longer ones are halved.
 _LONGEST_ARC = 0.95 * pi

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from math import acos, atan2, ceil, cos, hypot, pi, sin
 from typing import NamedTuple
 
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 #: The radii at both ends of an arc may differ by so much [m], or by this share, but never by more
 #: than the last [m]: LinuxCNC and GRBL.

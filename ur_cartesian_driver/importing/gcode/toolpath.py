@@ -10,8 +10,8 @@ from ur_cartesian_driver.importing.gcode.arcs import arc_between, ArcPlane, PLAN
 from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
 from ur_cartesian_driver.importing.import_options import ImportOptions, LENGTH_UNITS
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 _MAX_TURNS = 1000
 

@@ -36,9 +36,9 @@ from ur_cartesian_driver.importing.messages.message_terms import (
 )
 from ur_cartesian_driver.importing.text_file import file_text
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import Posture, SegmentType
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.pose_rows import compose_rows
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
+from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
 #: Of the header of a pose.

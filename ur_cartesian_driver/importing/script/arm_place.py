@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript import RuntimeException, to_text, Value
 from ur_cartesian_driver.urscript.script_values import ScriptPose

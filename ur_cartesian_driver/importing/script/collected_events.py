@@ -11,15 +11,15 @@ from ur_cartesian_driver.importing.imported_path import PathCollector
 from ur_cartesian_driver.importing.script.arm_place import ArmPlace
 from ur_cartesian_driver.importing.script.running_script import MAIN, RunningScript
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     InputWait,
     IOCommand,
     Posture,
     SegmentType,
 )
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
 from ur_cartesian_driver.planning.request.stops import MAX_DWELL
 from ur_cartesian_driver.urscript import RuntimeException

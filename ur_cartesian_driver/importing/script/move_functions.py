@@ -16,9 +16,9 @@ from ur_cartesian_driver.importing.script.collected_events import (
     CollectedPoint,
     Steps,
 )
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.sim.builtins.arguments import (
     is_pose,
     not_negative,

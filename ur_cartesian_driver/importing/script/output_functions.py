@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.importing.script.collected_events import CollectedEvents, Steps
-from ur_cartesian_driver.motion.goal import InputKind, InputWait, IOCommand, OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait, IOCommand, OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.planning.request.stops import MAX_DWELL
 from ur_cartesian_driver.sim.builtins.arguments import index, not_negative, within
 from ur_cartesian_driver.sim.controller import Controller

@@ -22,7 +22,7 @@ from ur_cartesian_driver.importing.script.output_functions import OutputFunction
 from ur_cartesian_driver.importing.script.running_script import MAIN, RunningScript
 from ur_cartesian_driver.importing.script.script_layout import END_OF_ROUND, PAUSE, WAIT
 from ur_cartesian_driver.importing.script.script_terms import FUNCTIONS, TERMS
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.sim.builtins import controller_builtins
 from ur_cartesian_driver.sim.builtins.arguments import script_pose, six
 from ur_cartesian_driver.sim.controller import Controller

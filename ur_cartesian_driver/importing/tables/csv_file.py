@@ -31,9 +31,9 @@ from ur_cartesian_driver.importing.tables.column_names import (
 from ur_cartesian_driver.importing.tables.table_columns import find_columns, is_header
 from ur_cartesian_driver.importing.tables.table_text import read_table
 from ur_cartesian_driver.importing.text_file import file_lines, file_text
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.pose_rows import Floats, multiply_rows, normalized_rows
-from ur_cartesian_driver.motion.rotation_rows import exp_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats, multiply_rows, normalized_rows
+from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
 #: Larger turns are degrees [rad].
 _MAX_TURN = 4.0 * np.pi

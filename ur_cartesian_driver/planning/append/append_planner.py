@@ -25,14 +25,14 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import IOCommand, Segment
-from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, WaypointRows
-from ur_cartesian_driver.motion.joint_spline import JointSpline, SAME_TIME
-from ur_cartesian_driver.motion.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose_rows import keep_hemisphere
-from ur_cartesian_driver.motion.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.goal.goal import IOCommand, Segment
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, WaypointRows
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
     AppendedPoints,

@@ -11,16 +11,16 @@ from enum import IntEnum
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
-from ur_cartesian_driver.motion.goal_table import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.goal.goal_table import (
     goal_table,
     rows_where,
     SegmentRows,
     WaypointRows,
 )
-from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.motion.plan.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error

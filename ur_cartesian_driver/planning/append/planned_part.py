@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.joint_spline import JointSpline, SAME_TIME
-from ur_cartesian_driver.motion.plan import PlannedSegment
-from ur_cartesian_driver.motion.polynomials import evaluate
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.polynomials import evaluate
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
+from ur_cartesian_driver.motion.plan.plan import PlannedSegment
+from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 # Digits of joint rates that are more than rounding, and of times: microseconds.

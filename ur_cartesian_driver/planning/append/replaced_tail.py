@@ -16,8 +16,8 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import AlreadySent, InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
-from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import ArcMode, FreeAxis, Posture, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, SegmentRows
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
     normalize,
@@ -29,7 +27,7 @@ from ur_cartesian_driver.motion.pose import (
     Quaternion,
     rotate,
 )
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
     cross_rows,
@@ -40,8 +38,10 @@ from ur_cartesian_driver.motion.pose_rows import (
     normalized_rows,
     transform_rows,
 )
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import cross, dot, Vector3, vector6
+from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Posture, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     Layer,
     MAX_AXIS_DEVIATION,

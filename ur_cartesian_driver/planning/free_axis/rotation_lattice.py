@@ -34,9 +34,9 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats, multiply_rows
-from ur_cartesian_driver.motion.vectors import Joints
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats, multiply_rows
+from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     singularity_distance_rows,

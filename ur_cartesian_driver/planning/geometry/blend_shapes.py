@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import N
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose import N
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
     Floats,

@@ -18,14 +18,13 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.goal import ArcMode
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     distance,
     multiply,
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     distance_rows,
     Floats,
@@ -33,7 +32,7 @@ from ur_cartesian_driver.motion.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     cross,
     dot,
     Joints,
@@ -42,6 +41,7 @@ from ur_cartesian_driver.motion.vectors import (
     Vector3,
     vector6,
 )
+from ur_cartesian_driver.motion.goal.goal import ArcMode
 
 #: This close to half a turn, rounding on the wire and the arm's actual pose decide in which
 #: direction a line turns the tool [rad].

@@ -19,8 +19,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.blended_path import (
     BlendedPath,
     CurveSequence,

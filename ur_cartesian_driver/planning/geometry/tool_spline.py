@@ -16,14 +16,14 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.polynomials import (
+from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
     MotionRows,
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
     distance_rows,
@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.motion.rotation_rows import (
+from ur_cartesian_driver.motion.geometry.rotation_rows import (
     angular_rates,
     exp_rows,
     log_rows,

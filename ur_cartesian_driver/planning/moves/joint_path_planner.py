@@ -25,11 +25,16 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Posture, Segment, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
-from ur_cartesian_driver.motion.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import Posture, Segment, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import (
+    GoalTable,
+    rows_where,
+    SegmentRows,
+    WaypointRows,
+)
 from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined

@@ -21,8 +21,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.plan import BlendEntry
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.plan.plan import BlendEntry
 
 Rows = NDArray[np.intp]
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats, keep_hemisphere
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time

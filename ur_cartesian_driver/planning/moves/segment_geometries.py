@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ur_cartesian_driver.motion.goal_table import Integers, SegmentRows, WaypointRows
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal_table import Integers, SegmentRows, WaypointRows
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Flags
 from ur_cartesian_driver.planning.moves.path_samples import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins

@@ -15,11 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidPosture
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,
     MoveL,
@@ -31,7 +32,6 @@ from ur_cartesian_driver.motion.primitive import (
     Stop,
     Target,
 )
-from ur_cartesian_driver.motion.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.segment_drafts import JOINT_SPACE_TYPES

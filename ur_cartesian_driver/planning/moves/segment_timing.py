@@ -16,10 +16,10 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.plan import PlannedSegment
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.planning.geometry.blended_path import Flags, Integers
 from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples

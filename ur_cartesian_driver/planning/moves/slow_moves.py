@@ -15,11 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings

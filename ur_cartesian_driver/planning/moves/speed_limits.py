@@ -15,9 +15,9 @@ from math import inf
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.planning.geometry.blended_path import CurveRows, Flags, Integers
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries

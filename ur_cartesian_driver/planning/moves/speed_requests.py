@@ -14,11 +14,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.goal_table import rows_where
-from ur_cartesian_driver.motion.plan import PlannedSegment
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import Spline, Stop
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import rows_where
+from ur_cartesian_driver.motion.plan.plan import PlannedSegment
+from ur_cartesian_driver.motion.plan.primitive import Spline, Stop
 from ur_cartesian_driver.planning.moves.move_chain import Moves
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits

@@ -26,10 +26,10 @@ from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Lin
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
 from ur_cartesian_driver.motion.errors import CollisionPredicted
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import Joints
-from ur_cartesian_driver.motion.workspace import parse_planes, Plane
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_path
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (

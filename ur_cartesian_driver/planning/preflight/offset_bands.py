@@ -29,12 +29,12 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     TooFast,
 )
-from ur_cartesian_driver.motion.goal import PathOffset
-from ur_cartesian_driver.motion.offset_band import OFFSET_AXES, OffsetBand
-from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import compose_rows, Floats, interpolate_rows
-from ur_cartesian_driver.motion.vectors import Joints, norm, Vector3, vector3, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.geometry.vectors import Joints, norm, Vector3, vector3, vector6
+from ur_cartesian_driver.motion.goal.goal import PathOffset
+from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location

@@ -33,9 +33,9 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Posture
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: How far a named joint may arrive from the chosen solution, turns included [rad].

@@ -23,8 +23,8 @@ from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, NearSingularity
-from ur_cartesian_driver.motion.goal_table import Rows
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath

@@ -17,12 +17,12 @@ from math import degrees, isnan
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.pose_rows import compose_rows, cross_rows, normalized_rows
-from ur_cartesian_driver.motion.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, cross_rows, normalized_rows
+from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -48,7 +48,7 @@ class RetargetedGoal:
 
     goal: GoalTable
     state: RobotState
-    #: As in :class:`~ur_cartesian_driver.motion.plan.Plan`.
+    #: As in :class:`~ur_cartesian_driver.motion.plan.plan.Plan`.
     T_flange_tcp: Pose | None = None
     T_tcp_controlled: Pose = IDENTITY
     remarks: tuple[str, ...] = ()

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
-from ur_cartesian_driver.motion.goal import Goal, Tolerance
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.goal.goal import Goal, Tolerance
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 G = TypeVar('G', bound=Goal)

@@ -12,8 +12,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import NotAvailable
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveC,
     MoveJ,
     OptimoveJ,
@@ -22,7 +23,6 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
     Stop,
 )
-from ur_cartesian_driver.motion.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
 from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.motion.slow_stretch import name_points
+from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.plan.slow_stretch import name_points
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
 
 #: Motions whose time is on the wire, without an acceleration.

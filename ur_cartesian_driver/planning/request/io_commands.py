@@ -7,21 +7,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.goal.execution_modes import EXECUTION_MODES
+from ur_cartesian_driver.motion.goal.goal import (
     IOCommand,
     OutputKind,
     ProportionalOutput,
     SafeOutput,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.output_names import (
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.output_names import (
     output_fault,
     output_name,
     parse_safe_outputs,
     repeated_output,
 )
-from ur_cartesian_driver.motion.primitive import SwitchOutput
+from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.number_rules import check_output_enums

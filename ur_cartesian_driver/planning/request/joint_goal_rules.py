@@ -14,19 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MAX_JOINT_VALUE
-from ur_cartesian_driver.motion.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, NotAvailable
-from ur_cartesian_driver.motion.joint_goal import (
+from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.goal.joint_goal import (
     JointErrorBounds,
     JointGoal,
     JointPoint,
     JointTolerance,
     JointTolerances,
 )
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
-from ur_cartesian_driver.motion.polynomials import MotionRows
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.number_rules import check_finite

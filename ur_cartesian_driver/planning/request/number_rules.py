@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import Quaternion
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     ContactEnd,
     DEFAULT_STALL_TIMEOUT,
@@ -27,10 +29,8 @@ from ur_cartesian_driver.motion.goal import (
     StaleOffset,
     Waypoint,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Quaternion
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.default_tolerances import named_tolerances
 from ur_cartesian_driver.planning.request.goal_fields import (

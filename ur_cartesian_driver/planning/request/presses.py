@@ -13,17 +13,17 @@ from collections.abc import Iterator
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     Press,
     PRESS_AXES,
     PressFrame,
     SegmentType,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import BeginPress, PressLaw
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.primitive import BeginPress, PressLaw
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,

@@ -9,9 +9,9 @@ from math import isnan
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import Segment, SegmentType
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.motion.joint_spline import SAME_TIME
+from ur_cartesian_driver.motion.goal.goal import Segment, SegmentType
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,

@@ -21,17 +21,18 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import (
     InputKind,
     InputWait,
     PayloadChange,
     ScriptCall,
     Segment,
 )
-from ur_cartesian_driver.motion.goal_table import GoalTable, rows_where, SegmentRows
-from ur_cartesian_driver.motion.plan import LateLines, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where, SegmentRows
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     CallFunction,
     ChangePayload,
@@ -41,7 +42,6 @@ from ur_cartesian_driver.motion.primitive import (
     Stop,
     Wait,
 )
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,

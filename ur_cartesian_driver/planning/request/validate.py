@@ -19,14 +19,15 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MAX_JOINT_VALUE
-from ur_cartesian_driver.motion.declared_types import WrongType
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidJoints,
     NotAvailable,
     OldHeaderTimestamp,
 )
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.declared_types import WrongType
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
     OnPathTolerance,
@@ -34,8 +35,7 @@ from ur_cartesian_driver.motion.goal import (
     Segment,
     SegmentType,
 )
-from ur_cartesian_driver.motion.goal_table import goal_table, GoalTable, rows_where
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, rows_where
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose, SAME_POSITION
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.blend_limits import check_blends

@@ -19,15 +19,15 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal_table import GoalTable, WaypointRows, zeros
-from ur_cartesian_driver.motion.joint_goal import JointGoal
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.move_rows import SplineRows
-from ur_cartesian_driver.motion.plan import LateLines, Plan, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.polynomials import evaluate, MotionRows
-from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats, keep_hemisphere
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats, keep_hemisphere
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows, zeros
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan.plan import LateLines, Plan, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import PlanningOptions

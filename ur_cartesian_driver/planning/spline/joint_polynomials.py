@@ -19,8 +19,13 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import TooFast
-from ur_cartesian_driver.motion.polynomials import cubic_rows, MotionRows, quintic_rows, values
-from ur_cartesian_driver.motion.pose_rows import angle_rows, compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.polynomials import (
+    cubic_rows,
+    MotionRows,
+    quintic_rows,
+    values,
+)
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
-from ur_cartesian_driver.motion.goal_table import Integers
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.goal_table import Integers
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointPolynomials
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath

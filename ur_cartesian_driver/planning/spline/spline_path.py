@@ -24,9 +24,9 @@ from ur_cartesian_driver.motion.errors import (
     JointLimitExceeded,
     NearSingularity,
 )
-from ur_cartesian_driver.motion.goal import Posture
-from ur_cartesian_driver.motion.pose_rows import angle_rows, Floats
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,

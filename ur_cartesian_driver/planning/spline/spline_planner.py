@@ -22,23 +22,23 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import JointLimitExceeded
-from ur_cartesian_driver.motion.goal import PIECES_PER_HORIZON
-from ur_cartesian_driver.motion.goal_table import GoalTable, zeros
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.move_rows import SplineRows
-from ur_cartesian_driver.motion.plan import (
+from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, zeros
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.move_rows import SplineRows
+from ur_cartesian_driver.motion.plan.plan import (
     LateLines,
     Plan,
     PlannedRows,
     PlannedSegment,
     ReferencePath,
 )
-from ur_cartesian_driver.motion.polynomials import MotionRows
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import Floats, keep_hemisphere
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.vectors import Joints, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.plan.primitive import Spline
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.min_speed import slower_by

@@ -15,15 +15,15 @@ from functools import partial
 
 import numpy as np
 
-from ur_cartesian_driver.motion.goal_table import GoalTable
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     conjugate_rows,
     Floats,
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.motion.rotation_rows import log_rows, rotation_rates
+from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows, rotation_rates
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 

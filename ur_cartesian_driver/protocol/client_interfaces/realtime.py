@@ -25,7 +25,7 @@ import struct
 from typing import Any, cast, Final
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.protocol.framing import FrameBuffer, hex_text
 
 #: Size of the packet [bytes] from a version (major, minor) on, oldest first.

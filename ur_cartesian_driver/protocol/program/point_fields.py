@@ -78,12 +78,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.move_rows import MoveRows, MOVES, SplineRows
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.plan.move_rows import MoveRows, MOVES, SplineRows
+from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     BeginPress,
     CallFunction,
@@ -106,8 +107,7 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
     Wait,
 )
-from ur_cartesian_driver.motion.rotation_rows import log_rows
-from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 

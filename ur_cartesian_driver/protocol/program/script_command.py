@@ -46,9 +46,9 @@ import struct
 from typing import Any, ClassVar, get_args, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,

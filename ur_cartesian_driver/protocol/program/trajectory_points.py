@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.move_rows import MoveRows, SplineRows
-from ur_cartesian_driver.motion.plan import PlannedRows
-from ur_cartesian_driver.motion.primitive import Instruction
+from ur_cartesian_driver.motion.plan.move_rows import MoveRows, SplineRows
+from ur_cartesian_driver.motion.plan.plan import PlannedRows
+from ur_cartesian_driver.motion.plan.primitive import Instruction
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,

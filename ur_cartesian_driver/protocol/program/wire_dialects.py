@@ -42,7 +42,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
 
 _V = TypeVar('_V', float, str)

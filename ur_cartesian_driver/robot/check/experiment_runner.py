@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,

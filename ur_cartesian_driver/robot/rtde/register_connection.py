@@ -18,12 +18,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
 from ur_cartesian_driver.motion.events import Event, OffsetReceived, ServoReceived
-from ur_cartesian_driver.motion.offset_band import OffsetFeedback
-from ur_cartesian_driver.motion.robot_state import RuntimeState
-from ur_cartesian_driver.motion.servo_report import ServoFeedback
-from ur_cartesian_driver.motion.vectors import vector3
+from ur_cartesian_driver.motion.geometry.vectors import vector3
+from ur_cartesian_driver.motion.plan.offset_band import OffsetFeedback
+from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
+from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import (
     OFFSET_INPUTS,
     OFFSET_OUTPUTS,

@@ -13,7 +13,7 @@ from math import nan
 from typing import Any, NoReturn
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.motion.io_signals import (
+from ur_cartesian_driver.motion.state.io_signals import (
     AnalogChannel,
     AnalogDomain,
     DigitalChannels,

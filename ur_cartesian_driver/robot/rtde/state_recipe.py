@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The RTDE recipe of a :class:`~ur_cartesian_driver.motion.robot_state.RobotState`, and its packets.
+The RTDE recipe of a robot state, and its packets.
 
 Both follow from the table of the state. What does not change from packet to packet is worked out
 once: 500 come in a second, and a CANCEL may wait behind each.
@@ -17,8 +17,8 @@ from operator import itemgetter
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.robot_state import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.robot_state import (
     RobotMode,
     RobotState,
     RuntimeState,

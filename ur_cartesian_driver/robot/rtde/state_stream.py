@@ -8,9 +8,9 @@ import asyncio
 from collections.abc import Callable, Sequence
 from math import inf
 
-from ur_cartesian_driver.motion.effective_speed import EffectiveSpeed
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.state_age import STALE_TIMEOUT, StateAge
+from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.state_age import STALE_TIMEOUT, StateAge
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection

@@ -14,7 +14,12 @@ import asyncio
 from collections.abc import Callable, Mapping
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.protocol.dashboard import (
     COMMAND_SPECS,
     DashboardGreeting,

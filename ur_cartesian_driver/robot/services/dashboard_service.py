@@ -12,7 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import DriverError
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.dashboard_connection import (
     DashboardConnection,

@@ -16,7 +16,7 @@ from math import isclose
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import OutputsSecured
-from ur_cartesian_driver.motion.goal import SafeOutput
+from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.services.rtde_input_writer import (
     joint_write,
     value_before,

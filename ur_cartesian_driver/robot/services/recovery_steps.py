@@ -16,7 +16,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
 
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.robot_state import (
+    RobotMode,
+    RobotState,
+    RuntimeState,
+    SafetyMode,
+)
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from math import isclose
 from typing import Any
 
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection

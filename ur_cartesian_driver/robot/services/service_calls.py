@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from math import hypot
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.declared_types import declare_types, WrongType
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
+from ur_cartesian_driver.motion.goal.declared_types import declare_types, WrongType
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
 #: How many outputs there are of each kind.

@@ -25,7 +25,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
-from ur_cartesian_driver.motion.known_frames import Frames
+from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
 from ur_cartesian_driver.ros.goals.deferred_action_server import DeferredActionServer
 from ur_cartesian_driver.ros.goals.goal_actions import GoalAction, installed_actions

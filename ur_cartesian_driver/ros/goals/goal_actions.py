@@ -14,9 +14,9 @@ from typing import Any, Protocol, TypeAlias
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.joint_goal import JointGoal
-from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.goals.goal_context import GoalContext
 from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.messages.action_messages import (

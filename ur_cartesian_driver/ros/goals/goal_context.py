@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from rclpy.clock import Clock
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 

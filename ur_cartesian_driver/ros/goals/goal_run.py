@@ -28,8 +28,8 @@ from ur_cartesian_driver.motion.errors import (
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.joint_goal import JointGoal
-from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.planning.request.joint_goal_rules import check_joint_goal
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmRequest

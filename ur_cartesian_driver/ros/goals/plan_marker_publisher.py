@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import MarkerArray
 
-from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.messages.marker_messages import plan_markers
 
 #: Late subscribers get the newest plan at once.

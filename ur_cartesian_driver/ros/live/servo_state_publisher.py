@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.motion.servo_report import ServoActivity, ServoReport
+from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoReport
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
 

@@ -19,8 +19,8 @@ from geometry_msgs.msg import Accel, Twist
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome, PathPlace, Progress
-from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate
-from ur_cartesian_driver.motion.vectors import subtract6, Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_error, rotate
+from ur_cartesian_driver.motion.geometry.vectors import subtract6, Vector6
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message, vector_message
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal message to :class:`~ur_cartesian_driver.motion.goal.Goal`, with its frames resolved.
+From a goal message to a goal with its frames resolved.
 
 Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
 planning, which knows no messages, checks the rest.
@@ -18,8 +18,8 @@ from ur_cartesian_driver.goal_files.goal_reading import (
     nanoseconds,
     rows_of_points,
 )
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints, Replacement
 from ur_cartesian_driver.ros.message_fields import Message
 

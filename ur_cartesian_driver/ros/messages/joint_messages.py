@@ -15,8 +15,8 @@ from builtin_interfaces.msg import Time
 
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.joint_goal import JointGoal, JointPoint, JointTolerance
-from ur_cartesian_driver.motion.vectors import subtract6, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import subtract6, Vector6
+from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint, JointTolerance
 from ur_cartesian_driver.ros.message_fields import (
     duration_message,
     Message,

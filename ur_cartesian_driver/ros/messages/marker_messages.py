@@ -12,8 +12,8 @@ import numpy as np
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.message_fields import pose_message
 
 #: How many samples of a path, and how many points are drawn at most.

@@ -19,8 +19,8 @@ from std_msgs.msg import Header
 from ur_cartesian_driver.driver import ConnectionStatus
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_description import LINK_NAMES
-from ur_cartesian_driver.motion.io_signals import AnalogChannel, Signals
-from ur_cartesian_driver.motion.known_frames import (
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
+from ur_cartesian_driver.motion.goal.known_frames import (
     BASE,
     BASE_LINK,
     FLANGE,
@@ -28,9 +28,9 @@ from ur_cartesian_driver.motion.known_frames import (
     T_TOOL0_FLANGE,
     TOOL0,
 )
-from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate
-from ur_cartesian_driver.motion.robot_state import RobotMode, RobotState, SafetyMode
-from ur_cartesian_driver.motion.servo_report import ServoReport
+from ur_cartesian_driver.motion.state.io_signals import AnalogChannel, Signals
+from ur_cartesian_driver.motion.state.robot_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
 from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage

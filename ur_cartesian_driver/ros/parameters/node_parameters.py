@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.known_frames import Frames, StaticFrame
+from ur_cartesian_driver.motion.goal.known_frames import Frames, StaticFrame
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     DECLARATIONS,

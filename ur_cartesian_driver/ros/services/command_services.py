@@ -19,8 +19,8 @@ from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.errors import DriverError, LocalProtocolError
-from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
     DashboardLineCall,

@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.pose import normalize, Pose
+from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
 #: Time to wait for a transform [s]: that of this moment is published in the next.

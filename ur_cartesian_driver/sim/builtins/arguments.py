@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from math import isfinite
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector3, vector3, Vector6, vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, Vector6, vector6
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import (
     INT_MAX,

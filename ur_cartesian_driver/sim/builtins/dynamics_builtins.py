@@ -8,8 +8,8 @@ The links of this arm weigh nothing, so mass matrix and torques are those of the
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import scale, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import scale, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.builtins.arguments import pose, six
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.motion.point_motion import flange_point, moments_for, point_motion

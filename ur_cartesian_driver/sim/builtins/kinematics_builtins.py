@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.builtins.arguments import is_pose, pose, script_pose, six
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from math import asin, atan2, cos, dist, sin
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.pose import (
     rotation_from_quaternion,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import add, subtract
+from ur_cartesian_driver.motion.geometry.vectors import add, subtract
 from ur_cartesian_driver.sim.builtins.arguments import (
     is_pose,
     number,

@@ -16,7 +16,7 @@ from math import hypot, inf
 from random import Random
 from types import MappingProxyType
 
-from ur_cartesian_driver.motion.vectors import vector6
+from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,

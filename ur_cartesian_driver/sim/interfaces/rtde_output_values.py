@@ -15,9 +15,9 @@ from math import hypot
 from types import MappingProxyType
 from typing import Any
 
-from ur_cartesian_driver.motion.pose import IDENTITY
-from ur_cartesian_driver.motion.robot_state import RobotMode
-from ur_cartesian_driver.motion.vectors import add, add6, scale, Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY
+from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale, Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.state.robot_state import RobotMode
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
     flange_point,

@@ -17,12 +17,12 @@ from math import dist
 import numpy as np
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     multiply,
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import add, add6, scale6, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion

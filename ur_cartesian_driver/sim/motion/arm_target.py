@@ -8,8 +8,8 @@ from math import inf
 from typing import NamedTuple
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.ik_branch import IkBranchTracker
 from ur_cartesian_driver.sim.motion.joint_kinematics import (
     difference_rate,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import hypot, isfinite
 
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     dot,
     norm,

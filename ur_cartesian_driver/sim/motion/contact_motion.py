@@ -17,7 +17,7 @@ from math import hypot
 from typing import NamedTuple
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
     rotate,
 )
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     add6,
     dot,

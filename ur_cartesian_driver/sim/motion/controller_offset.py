@@ -19,7 +19,7 @@ manual. Where that is silent the law is ours:
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     cross,
     dot,

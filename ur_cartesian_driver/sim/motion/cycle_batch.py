@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.inverse_rows import solve_path
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     conjugate_rows,
     Floats,
     multiply_rows,
 )
-from ur_cartesian_driver.motion.rotation_rows import log_rows
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 from math import inf, log
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch, CycleStep
 from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular

@@ -16,8 +16,8 @@ from random import Random
 from typing import Protocol
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import add_scaled6, Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 #: What is left of friction and ringing when nothing more is computed [rad], [rad/s].

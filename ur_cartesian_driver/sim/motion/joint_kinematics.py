@@ -11,14 +11,21 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import scale, scale6, subtract, subtract6, Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import (
+    scale,
+    scale6,
+    subtract,
+    subtract6,
+    Vector6,
+    ZERO6,
+)
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters

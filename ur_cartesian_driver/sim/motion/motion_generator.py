@@ -18,8 +18,8 @@ from collections.abc import Callable
 from math import inf, radians
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion

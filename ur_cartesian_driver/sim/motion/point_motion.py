@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ur_cartesian_driver.kinematics.chain import ChainFrames
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     cross,
     dot,

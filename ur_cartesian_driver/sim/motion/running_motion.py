@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.vectors import scale6, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import scale6, Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import Motion
 from ur_cartesian_driver.sim.motion.joint_kinematics import STILL

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2

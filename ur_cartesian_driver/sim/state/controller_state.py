@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from ur_cartesian_driver.motion.pose import (
+from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     distance,
     multiply,
@@ -26,14 +26,14 @@ from ur_cartesian_driver.motion.pose import (
     pose_rows,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.pose_rows import (
+from ur_cartesian_driver.motion.geometry.pose_rows import (
     Floats,
     interpolate_rows,
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.motion.rotation_rows import exp_rows
-from ur_cartesian_driver.motion.vectors import (
+from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
+from ur_cartesian_driver.motion.geometry.vectors import (
     add,
     add6,
     add_scaled6,

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any
 
-from ur_cartesian_driver.motion.pose import distance
+from ur_cartesian_driver.motion.geometry.pose import distance
 from ur_cartesian_driver.sim.motion.motion_values import Move
 from ur_cartesian_driver.sim.motion.paths.motion_profile import (
     MotionProfile,

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate
-from ur_cartesian_driver.motion.robot_state import RobotState
-from ur_cartesian_driver.motion.vectors import add, cross, Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, rotate
+from ur_cartesian_driver.motion.geometry.vectors import add, cross, Vector3, Vector6
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 
 def twist_at(twist: Vector6, offset: Vector3) -> Vector6:

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal_table import Integers, Rows
-from ur_cartesian_driver.motion.pose import pose_from_row
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal_table import Integers, Rows
+from ur_cartesian_driver.motion.plan.primitive import (
     MoveJ,
     MoveL,
     MoveP,
@@ -29,7 +30,6 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
     Stop,
 )
-from ur_cartesian_driver.motion.vectors import vector6
 
 #: The classes that have rows; a kind is an index into it.
 MOVES = (MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL)

@@ -17,9 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
-from ur_cartesian_driver.motion.primitive import Spline
-from ur_cartesian_driver.motion.vectors import Joints, Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.polynomials import (
+    cubic_rows,
+    evaluate,
+    MotionRows,
+    quintic_rows,
+)
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, ZERO6
+from ur_cartesian_driver.motion.plan.primitive import Spline
 
 Floats = NDArray[np.float64]
 #: Times that differ by less are the same [s]; the wire counts in microseconds.

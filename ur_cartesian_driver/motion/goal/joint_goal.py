@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

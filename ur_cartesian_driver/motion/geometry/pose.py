@@ -22,7 +22,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
 #: One number, or those of a batch.

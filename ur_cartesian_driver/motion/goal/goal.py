@@ -4,7 +4,7 @@
 A goal as the client sent it, in the frame of the client.
 
 A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
-(:mod:`~ur_cartesian_driver.motion.plan`) is known to be feasible.
+(:mod:`~ur_cartesian_driver.motion.plan.plan`) is known to be feasible.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class SegmentType(IntEnum):

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode, ContactEnd, InputKind, OutputKind
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Joints, Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3, Vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 Target: TypeAlias = Pose | Joints
 

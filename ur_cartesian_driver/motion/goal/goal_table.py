@@ -5,8 +5,8 @@ The points and segments of a goal in columns: a row for each point, an array for
 
 Sliced and scanned paths have up to 100,000 points. An object for each takes longer to make than
 all checks of the arrays take. So inside they are rows; each is still a sequence of
-:class:`~ur_cartesian_driver.motion.goal.Waypoint` or
-:class:`~ur_cartesian_driver.motion.goal.Segment`, which are made when somebody looks at them.
+:class:`~ur_cartesian_driver.motion.goal.goal.Waypoint` or
+:class:`~ur_cartesian_driver.motion.goal.goal.Segment`, which are made when somebody looks at them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from typing import Any, ClassVar, overload, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.declared_types import with_declared_types
-from ur_cartesian_driver.motion.goal import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types
+from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     FreeAxis,
     Goal,
@@ -30,9 +33,6 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Waypoint,
 )
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
-from ur_cartesian_driver.motion.pose_rows import Floats
-from ur_cartesian_driver.motion.vectors import vector6, ZERO6
 
 Integers = NDArray[np.int64]
 
@@ -204,7 +204,7 @@ class WaypointRows(Rows[Waypoint]):
 class SegmentRows(Rows[Segment]):
     """The segments of a goal: none, or one for each point; units as those of a segment."""
 
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.SegmentType`
+    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`
     types: Integers
     #: (n,) each
     blend_radii: Floats
@@ -214,9 +214,10 @@ class SegmentRows(Rows[Segment]):
     #: (n, 7) poses on the arcs, and whether there is one (n,)
     vias: Floats
     has_via: NDArray[np.bool_]
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.ArcMode`
+    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`
     arc_modes: Integers
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.FreeAxis`, and the ranges [rad]
+    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.FreeAxis`, and the
+    #: ranges [rad]
     free_axes: Integers
     free_minima: Floats
     free_maxima: Floats

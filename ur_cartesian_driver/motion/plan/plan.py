@@ -16,22 +16,22 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.goal_table import Rows
-from ur_cartesian_driver.motion.joint_goal import JointTolerances
-from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.offset_band import OffsetBand
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import (
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.goal_table import Rows
+from ur_cartesian_driver.motion.goal.joint_goal import JointTolerances
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
+from ur_cartesian_driver.motion.plan.primitive import (
     Instruction,
     OutputRecord,
     Primitive,
     Spline,
     Stop,
 )
-from ur_cartesian_driver.motion.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.vectors import Joints, vector6
+from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The formulas of :mod:`~ur_cartesian_driver.motion.pose` for rows of poses.
+The formulas of :mod:`~ur_cartesian_driver.motion.geometry.pose` for rows of poses.
 
 A row is x y z [m] and the unit quaternion x y z w; arrays are (n, 7). The checks along a goal need
 so many poses that an object for each would take longer than the inverse kinematics.
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.geometry.pose import Pose
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
     """Return ``T_a_c`` (n, 7) of rows ``T_a_b`` (n, 7) and one pose behind all of them."""
     ax, ay, az, aw = T_a_b[:, 3:].T
     x, y, z = T_b_c.position
-    # v + 2 u x (u x v + w v), as in motion.pose.
+    # v + 2 u x (u x v + w v), as in motion.geometry.pose.
     tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
     rows = np.empty((len(T_a_b), 7))
     rows[:, 0] = T_a_b[:, 0] + x + aw * tx + ay * tz - az * ty
@@ -79,7 +79,7 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
     """Return ``T_a_c`` (n, 7) of one pose before rows ``T_b_c`` (n, 7), normalised."""
     ux, uy, uz, w = T_a_b.quaternion
     x, y, z = T_b_c[:, :3].T
-    # v + 2 u x (u x v + w v), as in motion.pose.
+    # v + 2 u x (u x v + w v), as in motion.geometry.pose.
     tx, ty, tz = 2.0 * (uy * z - uz * y), 2.0 * (uz * x - ux * z), 2.0 * (ux * y - uy * x)
     px, py, pz = T_a_b.position
     rows = np.empty((len(T_b_c), 7))
@@ -87,7 +87,7 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
     rows[:, 1] = y + w * ty + uz * tx - ux * tz + py
     rows[:, 2] = z + w * tz + ux * ty - uy * tx + pz
     turned = multiply_rows(np.array([T_a_b.quaternion]), T_b_c[:, 3:])
-    # In the order of motion.pose, so that both give the same bits.
+    # In the order of motion.geometry.pose, so that both give the same bits.
     x, y, z, w = turned.T
     rows[:, 3:] = turned * (1.0 / np.sqrt(x * x + y * y + z * z + w * w))[:, None]
     return rows

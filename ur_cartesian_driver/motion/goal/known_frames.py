@@ -24,9 +24,9 @@ from math import isfinite, sqrt
 from typing import Protocol, TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
-from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
-from ur_cartesian_driver.motion.robot_state import RobotState
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, normalize, Pose
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 G = TypeVar('G', bound=Goal)
 

@@ -10,8 +10,8 @@ from enum import IntEnum, IntFlag
 from types import NoneType
 from typing import Annotated, Any, get_args, get_type_hints
 
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 
 
 class RobotMode(IntEnum):

@@ -19,8 +19,8 @@ from math import factorial
 
 import numpy as np
 
-from ur_cartesian_driver.motion.polynomials import MotionRows
-from ur_cartesian_driver.motion.pose_rows import cross_rows, Floats
+from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
+from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows, Floats
 
 # Terms of the series: exact to rounding for turns up to two full turns.
 _TERMS = 26

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import nan
 
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 
 class AnalogDomain(IntEnum):

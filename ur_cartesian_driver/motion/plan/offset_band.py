@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import StaleOffset
-from ur_cartesian_driver.motion.vectors import Vector3, vector3, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, ZERO3
+from ur_cartesian_driver.motion.goal.goal import StaleOffset
 
 #: The axes of the frame, as words for users.
 OFFSET_AXES = ('along', 'across', 'normal')

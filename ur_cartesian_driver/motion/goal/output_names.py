@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ur_cartesian_driver.motion.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.io_signals import AnalogDomain
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 #: By kind: the name in a sentence, and how many there are.
 OUTPUTS = {
