@@ -12,7 +12,7 @@ import pytest
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.link import LinkCallbacks, RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LOG_DELAY
 
@@ -34,12 +34,14 @@ class Ear:
                 script_sender_port=0,
                 headless_mode=headless,
             ),
-            on_state=self.heard.append,
-            on_event=lambda event: None,
-            on_status=self._status,
-            on_geometry=lambda geometry: None,
-            on_limits=lambda limits: None,
-            on_log=lambda level, text: self.log.append((level, text)),
+            LinkCallbacks(
+                state=self.heard.append,
+                event=lambda event: None,
+                status=self._status,
+                geometry=lambda geometry: None,
+                limits=lambda limits: None,
+                log=lambda level, text: self.log.append((level, text)),
+            ),
         )
 
     def _status(self, status):
@@ -102,7 +104,7 @@ def test_a_program_that_was_told_to_end_takes_no_goal_until_it_has(ur_sim):
         async with listening(ur_sim) as ear:
             await ear.ready()
             ear.link.set_executing(True)
-            ear.link.stop_program('a test')
+            ear.link.control.stop('a test')
             ear.link.set_executing(False)
             assert ear.link.status.state is ConnectionState.CONNECTED
             assert 'told to end' in ear.link.status.not_ready()

@@ -7,7 +7,8 @@ The link connects to RTDE first (which reports the version of the software and s
 opens its own ports, connects to the primary interface (which reports model, geometry and errors,
 and takes the robot program), and then waits for the robot program to connect.
 
-It starts power, brakes and programs on the first connection only (:mod:`~.program.auto_start`).
+Commands go through :mod:`~.program.program_control`. Power, brakes and programs are started on the
+first connection only (:mod:`~.program.auto_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
 happened, on the event loop. A status that follows from an event is reported before it, so that
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 import logging
 from math import inf
 from typing import NoReturn
@@ -25,20 +27,16 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JointLimits, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
-from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age, StaleStates
-from ur_cartesian_driver.program import PROGRAM_NAME, wrap_in_program
-from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.program import PROGRAM_NAME
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
-from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
-    has_ended,
     is_paused,
     is_stopped,
     required_action,
@@ -47,12 +45,10 @@ from ur_cartesian_driver.robot.connection_status import (
 from ur_cartesian_driver.robot.event_log import EventLog, mode_changes
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings
-from ur_cartesian_driver.robot.link_status import LinkStatus, OUT_OF_REACH
+from ur_cartesian_driver.robot.link_status import LinkStatus
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
-from ur_cartesian_driver.robot.program.auto_start import ProgramAutoStart
+from ur_cartesian_driver.robot.program.program_control import ProgramControl
 from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
-from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
-from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
 from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
@@ -61,56 +57,54 @@ from ur_cartesian_driver.robot.transport import Backoff
 CAUSE_TIMEOUT = 0.1
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkCallbacks:
+    """The ears of a link's owner; each is called on the event loop."""
+
+    #: The robot's newest state, before any status or event that follows from it: at READY the
+    #: state is known.
+    state: Callable[[RobotState], None]
+    #: An event for the running goal.
+    event: Callable[[Event], None]
+    #: The status changed.
+    status: Callable[[ConnectionStatus], None]
+    #: The robot reported its calibrated geometry.
+    geometry: Callable[[DhTable], None]
+    #: The robot reported the limits of its joints, before it is accepted.
+    limits: Callable[[JointLimits], None]
+    #: A line for the log, with its level.
+    log: Callable[[int, str], None]
+    #: Inputs, outputs or tool changed.
+    signals: Callable[[Signals], None] = lambda _: None
+
+
 class RobotLink:
     """The only owner of the driver's sockets; used from one event loop."""
 
     def __init__(
-        self,
-        settings: LinkSettings,
-        *,
-        on_state: Callable[[RobotState], None],
-        on_event: Callable[[Event], None],
-        on_status: Callable[[ConnectionStatus], None],
-        on_geometry: Callable[[DhTable], None],
-        on_limits: Callable[[JointLimits], None],
-        on_log: Callable[[int, str], None],
-        on_signals: Callable[[Signals], None] = lambda _: None,
-        may_upload: bool = True,
+        self, settings: LinkSettings, callbacks: LinkCallbacks, *, may_upload: bool = True
     ) -> None:
         """
         Prepare; :meth:`run` connects.
 
-        :param on_state: the robot's newest state, before any status or event that follows from
-            it: at READY the state is known.
-        :param on_event: what happened to the robot, for the running goal.
-        :param on_status: the status changed.
-        :param on_geometry: the robot reported its calibrated geometry.
-        :param on_limits: the robot reported the limits of its joints, before it is accepted.
-        :param on_log: a line for the log, with its level.
-        :param on_signals: inputs, outputs or tool changed.
         :param may_upload: whether the first connection to the robot is the owner's first.
         """
-        self._settings = settings
-        self._state_callback, self._on_event, self._on_log = on_state, on_event, on_log
-        self._on_geometry, self._on_limits = on_geometry, on_limits
-        self._signals_callback = on_signals
+        self._settings, self._callbacks = settings, callbacks
         self._status = LinkStatus(
             f'Connecting to the robot at {settings.robot_ip}.',
             self._required_action,
-            on_status,
-            on_log,
+            callbacks.status,
+            callbacks.log,
         )
         #: The software of the robot; None = it never answered.
         self.version: ControllerVersion | None = None
-        #: What the robot reported last; None = it is not connected.
+        #: The robot's newest state; None = it is not connected.
         self.robot: RobotState | None = None
         #: When that was true [s], and whether it is too old to go by.
         self._state_time = inf
         self._stale = StaleStates(settings.max_state_age)
         #: Its inputs, outputs and tool; None = not reported yet.
         self.signals: Signals | None = None
-        #: Whether the TCP from before the last goal is still to be restored.
-        self.tcp_restore_pending = False
         #: Whether it was in remote control when it was asked last; None = never asked.
         self._remote_control: bool | None = None
         self._explain_timer: asyncio.TimerHandle | None = None
@@ -129,26 +123,22 @@ class RobotLink:
             ProgramCallbacks(
                 connected=self._on_program_connected,
                 lost=self._on_program_lost,
-                result=lambda result: self._on_event(TrajectoryEnded(result=result)),
+                result=lambda result: callbacks.event(TrajectoryEnded(result=result)),
                 warning=self._warn,
             ),
         )
-        self._tracker = ProgramTracker(self.program)
         self.event_log = EventLog(
             asyncio.get_running_loop().time, self.program, settings.robot_receive_timeout
         )
-        self._tcp_setter = TemporaryTcpSetter(
-            self.program, self._primary, headless_mode=settings.headless_mode
-        )
-        self._auto_start = ProgramAutoStart(
+        self.control = ProgramControl(
             settings,
-            pending=may_upload,
-            upload=self.upload_program,
+            self.program,
+            self._primary,
+            self._status,
+            self.event_log,
+            robot=lambda: self.robot,
             warn=self._warn,
-            power_up=lambda: self.send_primary(
-                primary.PrimaryCommand.RUN,
-                lambda: self.robot is not None and not is_stopped(self.robot),
-            ),
+            may_upload=may_upload,
         )
 
     @property
@@ -185,33 +175,7 @@ class RobotLink:
         """Set the serial number of the robot."""
         self._status.update(serial_number=serial_number)
 
-    # ---- commands -----------------------------------------------------------------------------
-
-    def send_control(
-        self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
-    ) -> None:
-        """Send a trajectory action to the robot program."""
-        self.program.send_control(action, count, takes_offsets=takes_offsets)
-        if action is TrajectoryAction.CANCEL:
-            self.event_log.note('the driver sent CANCEL')
-
-    def send_servo(self, on: bool) -> None:
-        """Have the robot program enter the buffered servo, or leave it and brake."""
-        self.program.send_servo(on)
-        self.event_log.note('the driver entered the servo' if on else 'the driver left the servo')
-
-    def send_primary(self, command: primary.PrimaryCommand, is_wanted: Callable[[], bool]) -> bool:
-        """
-        Send a command to the primary interface; False = there is no connection.
-
-        :param is_wanted: whether it is to be sent again, if the connection was read-only.
-        """
-        return self._primary.send(primary.encode_command(command), is_wanted)
-
-    def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
-        """Send a script of others, as :meth:`send_primary` sends commands."""
-        self.event_log.note('the driver sent a script of others')
-        return self._primary.send(data, is_wanted)
+    # ---- news from the owner ------------------------------------------------------------------
 
     def note_remote_control(self, remote: bool) -> None:
         """Take note of whether clients may control the robot: a change needs new connections."""
@@ -229,80 +193,15 @@ class RobotLink:
                 ConnectionEvent.GOAL_ENDED if self._takes_goals() else ConnectionEvent.PROGRAM_LOST
             )
 
-    def set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
-        """Have the robot program set the TCP for the time of a goal."""
-        self._tcp_setter.set_temporary(T_flange_tcp)
-
-    def restore_tcp(self, T_flange_tcp: Pose) -> None:
-        """Restore the TCP from before a goal, if the robot is connected."""
-        if self.robot is not None:
-            self._tcp_setter.restore(
-                T_flange_tcp,
-                self.robot,
-                lambda: (
-                    self.tcp_restore_pending and not self._tracker.foreign_program_runs(self.robot)
-                ),
-            )
-
     def set_tcp_restore_pending(self, pending: bool) -> None:
         """Set whether the TCP has to be restored: until it is, no goal starts."""
-        if pending == self.tcp_restore_pending:
+        if pending == self.control.tcp_restore_pending:
             return
-        self.tcp_restore_pending = pending
+        self.control.tcp_restore_pending = pending
         if pending:
             self._status.apply(ConnectionEvent.TCP_RESTORE_PENDING)
         else:
             self._review_state()
-
-    def stop_program(self, reason: str) -> None:
-        """End the robot program, so that its motion cannot resume."""
-        self._warn(f'the robot program is stopped: {reason}')
-        self.event_log.note('the driver ended the robot program')
-        self._tracker.is_ending = self.program.connected
-        self.send_primary(primary.PrimaryCommand.STOP_PROGRAM, self._has_program_of_ours)
-        self.program.send_stop()
-
-    def _has_program_of_ours(self) -> bool:
-        robot = self.robot
-        return (
-            robot is not None
-            and not has_ended(robot)
-            and not self._tracker.foreign_program_runs(robot)
-        )
-
-    def upload_program(self) -> None:
-        """Upload the robot program; it replaces ours, never a foreign one."""
-        if refusal := self.upload_refusal():
-            self._warn(f'the robot program is not sent: {refusal}')
-        elif not self._primary.send(
-            primary.encode_program(wrap_in_program(self.program.text)),
-            lambda: not self.upload_refusal(),
-        ):
-            self._warn(
-                'the robot program is not sent: there is no connection to the primary '
-                'interface of the robot'
-            )
-        else:
-            self.event_log.note('the driver sent the robot program')
-
-    def upload_refusal(self) -> str:
-        """Return why no program may be sent now; empty if one may."""
-        if self._status.state in (*OUT_OF_REACH, ConnectionState.CONNECTING):
-            return self.status.message
-        if self._status.state is ConnectionState.EXECUTING:
-            return 'a goal is running; cancel it first'
-        if self._tracker.foreign_program_runs(self.robot):
-            return (
-                'another program runs on the robot, maybe that of another driver; let it end, '
-                'or stop it'
-            )
-        if not self.program.text:
-            return 'wire_dialect says that the robot has an older one; play that on the pendant'
-        return ''
-
-    async def has_own_program(self) -> bool:
-        """Return whether the connected program is ours; a new one takes a moment to show it."""
-        return await self._tracker.wait_for_identity()
 
     # ---- connection ---------------------------------------------------------------------------
 
@@ -364,24 +263,24 @@ class RobotLink:
 
     def _on_state(self, robot: RobotState) -> None:
         before, self.robot = self.robot, robot
-        self._state_callback(robot)
+        self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
         # Unless a mode changes, no status follows from the packet: then the reaction of the goal,
         # maybe a CANCEL, goes first.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
-            self._on_event(StateReceived(state=robot))
+            self._callbacks.event(StateReceived(state=robot))
         self.event_log.note_report(robot)
         for change in changes:
             self.event_log.note(change)
-        self._tracker.observe(robot)
-        if self._tracker.is_own and not self.status.program_is_own:
+        self.control.tracker.observe(robot)
+        if self.control.tracker.is_own and not self.status.program_is_own:
             self._status.update(program_is_own=True)
         self._state_time = asyncio.get_running_loop().time() - robot.state_age
         self.check_age()
         if status_may_change:
             self._review_state()
-            self._on_event(StateReceived(state=robot))
+            self._callbacks.event(StateReceived(state=robot))
 
     def check_age(self) -> None:
         """Take goals again, or no more, as the newest state ages; called often."""
@@ -391,7 +290,7 @@ class RobotLink:
 
     def _on_signals(self, signals: Signals) -> None:
         self.signals = signals
-        self._signals_callback(signals)
+        self._callbacks.signals(signals)
 
     def _on_configuration(self, configuration: ConfigurationData) -> None:
         """Accept the robot, or refuse it if it is another model."""
@@ -402,7 +301,7 @@ class RobotLink:
         expected = self._settings.ur_type
         found = ' or '.join(models)
         if expected in models:
-            self._on_limits(
+            self._callbacks.limits(
                 JointLimits(
                     position=configuration.position_limits,
                     speed=vector6(speed for speed, _ in configuration.motion_limits),
@@ -424,7 +323,7 @@ class RobotLink:
 
     def _on_kinematics(self, geometry: DhTable) -> None:
         if not self.status.calibration_known:
-            self._on_geometry(geometry)
+            self._callbacks.geometry(geometry)
             self._status.update(calibration_known=True)
 
     def _on_robot_error(self, text: str) -> None:
@@ -434,14 +333,14 @@ class RobotLink:
 
     def _on_robot_text(self, text: str) -> None:
         """Log a line of the robot's log; lines of our program may explain an end."""
-        self._on_log(logging.INFO, f'robot: {text}')
+        self._callbacks.log(logging.INFO, f'robot: {text}')
         program, _, said = text.partition(': ')
         if program == PROGRAM_NAME and said:
             self.event_log.note(f'the robot program says: {said}')
 
     def _on_program_connected(self) -> None:
         self.event_log.note('the robot program has connected')
-        self._tracker.program_connected()
+        self.control.tracker.program_connected()
         self._status.update(program_running=True)
         self._review_state()
 
@@ -453,11 +352,11 @@ class RobotLink:
             self._explain_timer = asyncio.get_running_loop().call_later(
                 CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
             )
-        self._tcp_setter.program_lost()
+        self.control.tcp_setter.program_lost()
         self._status.apply(
             ConnectionEvent.PROGRAM_LOST, program_running=False, program_is_own=False
         )
-        self._on_event(LinkLost(link='program', reason=reason))
+        self._callbacks.event(LinkLost(link='program', reason=reason))
 
     def _on_robot_lost(self, reason: str, status_text: str) -> None:
         """
@@ -482,7 +381,7 @@ class RobotLink:
             message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )
         if before is not None:
-            self._on_event(LinkLost(link='RTDE', reason=reason))
+            self._callbacks.event(LinkLost(link='RTDE', reason=reason))
 
     # ---- status -------------------------------------------------------------------------------
 
@@ -494,18 +393,20 @@ class RobotLink:
         self._status.apply(
             ConnectionEvent.ROBOT_STOPPED if is_stopped(robot) else ConnectionEvent.STOP_CLEARED
         )
-        self._auto_start.review(robot, self.status, program_connected=self.program.connected)
+        self.control.auto_start.review(
+            robot, self.status, program_connected=self.program.connected
+        )
         self.program.is_paused = is_paused(robot)
         if not self._takes_goals():
             self._status.apply(ConnectionEvent.PROGRAM_PAUSED)
-        elif not self.tcp_restore_pending:
+        elif not self.control.tcp_restore_pending:
             self._status.apply(ConnectionEvent.PROGRAM_CONNECTED)
             if self.program.is_executing:  # a stop that did not end the goal is over
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
 
     def _takes_goals(self) -> bool:
         """Tell whether the robot program reads what is sent, and the states show what follows."""
-        return self._tracker.reads(self.robot) and not self._stale.age
+        return self.control.tracker.reads(self.robot) and not self._stale.age
 
     def _required_action(self, state: ConnectionState) -> str:
         return required_action(
@@ -516,13 +417,13 @@ class RobotLink:
             stale=explain_age(self._stale.age, self._settings.max_state_age)
             if self._stale.age
             else '',
-            tcp_restore_pending=self.tcp_restore_pending,
-            program_is_ending=self._tracker.is_ending,
-            foreign_program=self._tracker.foreign_program_runs(self.robot),
+            tcp_restore_pending=self.control.tcp_restore_pending,
+            program_is_ending=self.control.tracker.is_ending,
+            foreign_program=self.control.tracker.foreign_program_runs(self.robot),
         )
 
     def _warn(self, text: str) -> None:
-        self._on_log(logging.WARNING, text)
+        self._callbacks.log(logging.WARNING, text)
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:

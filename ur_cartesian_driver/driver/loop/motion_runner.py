@@ -177,7 +177,7 @@ class MotionRunner:
     async def _foreign_program(self, job: MotionJob | None) -> str:
         """Return what of a motion the program on the robot cannot do; empty if nothing."""
         needs = '' if job is None else job.own_program_needs
-        if not needs or await self._link.has_own_program():
+        if not needs or await self._link.control.tracker.wait_for_identity():
             return ''
         return (
             f'The goal has {needs}, for which the robot has to run the program of this driver, '
@@ -247,19 +247,19 @@ class MotionRunner:
             text = f'The motion cannot go on ({type(error).__name__}: {error}).'
             self._pipe.log(logging.ERROR, f'{text} {traceback.format_exc()}')
             self._finish(Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
-            self._link.stop_program(text)
+            self._link.control.stop(text)
 
     def _execute(self, commands: list[GoalCommand]) -> None:
         for command in commands:
             match command:
                 case SendControl(action=action, count=count, takes_offsets=takes_offsets):
-                    self._link.send_control(action, count, takes_offsets=takes_offsets)
+                    self._link.control.send_control(action, count, takes_offsets=takes_offsets)
                 case SendPoints(first=first, end=end):
                     self._link.program.send_points(self._points.take(first, end))
                 case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):
                     self._set_temporary_tcp(T_flange_tcp)
                 case RestoreTcp(T_flange_tcp=T_flange_tcp):
-                    self._link.restore_tcp(T_flange_tcp)
+                    self._link.control.restore_tcp(T_flange_tcp)
                 case SendSafeOutputs(action=action, token=token, outputs=outputs):
                     self._link.program.send_command(
                         script_command.encode(
@@ -273,7 +273,7 @@ class MotionRunner:
                 case RestoreOutputs(outputs=outputs):
                     self._outputs.restore(outputs)
                 case StopProgram(reason=reason):
-                    self._link.stop_program(reason)
+                    self._link.control.stop(reason)
                 case ReportProgress(progress=progress):
                     self._pipe.send(MotionProgress(motion=self._number, progress=progress))
                 case WriteInputs(values=values):
@@ -286,7 +286,7 @@ class MotionRunner:
                 case OpenServo():
                     self._open_inputs(servo_exchange(self.handle_event))
                 case EnterServo():
-                    self._link.send_servo(True)
+                    self._link.control.send_servo(True)
                 case LeaveServo():
                     self._leave_servo()
                 case ReportServo(report=report):
@@ -324,7 +324,7 @@ class MotionRunner:
     def _leave_servo(self) -> None:
         """Have the robot program leave the servo, and give the inputs back."""
         if self._inputs is not None:
-            self._link.send_servo(False)
+            self._link.control.send_servo(False)
             self._close_inputs()
 
     def _close_inputs(self) -> None:
@@ -343,7 +343,7 @@ class MotionRunner:
                 T_flange_temporary=temporary_tcp.T_flange_temporary,
             )
         )
-        self._link.set_temporary_tcp(T_flange_tcp)
+        self._link.control.set_temporary_tcp(T_flange_tcp)
 
     def _finish(self, outcome: Outcome) -> None:
         if self._link.program.servo:

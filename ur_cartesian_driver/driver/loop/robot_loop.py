@@ -53,7 +53,7 @@ from ur_cartesian_driver.motion.events import CancelRequested, Tick
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.link import LinkCallbacks, RobotLink
 from ur_cartesian_driver.robot.services.dashboard_service import DashboardPorts
 from ur_cartesian_driver.robot.services.service_calls import DashboardCall
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
@@ -76,13 +76,15 @@ class RobotLoop:
         self._pipe = OwnerPipe(notify, self._newest.publish)
         self._link = RobotLink(
             config,
-            on_state=self._newest.keep,
-            on_event=lambda event: self._motion.handle_event(event),
-            on_status=self._status_changed,
-            on_geometry=lambda dh: self._pipe.send(GeometryReceived(geometry=dh)),
-            on_limits=lambda limits: self._pipe.send(LimitsReceived(limits=limits)),
-            on_signals=self._signals_changed,
-            on_log=self._pipe.log,
+            LinkCallbacks(
+                state=self._newest.keep,
+                event=lambda event: self._motion.handle_event(event),
+                status=self._status_changed,
+                geometry=lambda dh: self._pipe.send(GeometryReceived(geometry=dh)),
+                limits=lambda limits: self._pipe.send(LimitsReceived(limits=limits)),
+                signals=self._signals_changed,
+                log=self._pipe.log,
+            ),
             may_upload=configure.may_upload,
         )
         self._dispatcher = ServiceDispatcher(
@@ -172,7 +174,7 @@ class RobotLoop:
             case CancelMotion():
                 self._motion.cancel(request)
             case ResendProgram():
-                self._link.upload_program()
+                self._link.control.upload()
             case CallRobot():
                 self._calls.start(request)
             case OwnerHeartbeat():

@@ -53,4 +53,4 @@ class TcpRestorer:
             and state is not None
             and self._pending.is_restore_due(state, now)
         ):
-            self._link.restore_tcp(self._pending.T_flange_original)
+            self._link.control.restore_tcp(self._pending.T_flange_original)

@@ -205,7 +205,7 @@ class RecoveryRunner:
         self, step: RecoveryStep, effect: ExpectedEffect
     ) -> ServiceAnswer:
         for _ in range(2):  # an unlock is refused for 5 s after the stop
-            if not self._link.send_primary(
+            if not self._link.control.send_primary(
                 PRIMARY_COMMANDS[step],
                 lambda: self._link.robot is not None and not effect.is_reached(self._link.robot),
             ):

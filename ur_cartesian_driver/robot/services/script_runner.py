@@ -74,7 +74,7 @@ class ScriptRunner:
 
     async def _secondary(self, call: RunScriptCall) -> ServiceAnswer:
         begin = self._link.event_log.now
-        if not self._link.send_script(encode_program(call.script), lambda: True):
+        if not self._link.control.send_script(encode_program(call.script), lambda: True):
             return failed('The script was not sent: the primary interface is not connected.')
         await asyncio.sleep(REPORT_TIME)
         if error := self._link.event_log.robot_error(since=begin):
@@ -88,9 +88,11 @@ class ScriptRunner:
                 'headless_mode. Send a secondary one (sec), or load it on the pendant.'
             )
         link, begin = self._link, self._link.event_log.now
-        if refusal := link.upload_refusal():
+        if refusal := link.control.upload_refusal():
             return failed(f'The script was not sent: {refusal}.')
-        if not link.send_script(encode_program(call.script), lambda: not link.upload_refusal()):
+        if not link.control.send_script(
+            encode_program(call.script), lambda: not link.control.upload_refusal()
+        ):
             return failed('The script was not sent: the primary interface is not connected.')
         was_connected = link.program.connected
         has_begun = await wait_for_state(link, self._runs_script, BEGIN_TIMEOUT)
@@ -98,7 +100,9 @@ class ScriptRunner:
         has_run = has_begun or (was_connected and not link.program.connected)
         in_time = not has_begun or await self._ends_within(call.timeout)
         if not in_time:
-            link.send_primary(PrimaryCommand.STOP_PROGRAM, lambda: self._runs_script(link.robot))
+            link.control.send_primary(
+                PrimaryCommand.STOP_PROGRAM, lambda: self._runs_script(link.robot)
+            )
             await wait_for_state(link, has_ended, STOP_TIMEOUT)
         error = link.event_log.robot_error(since=begin)
         if has_begun and link.program.connected:

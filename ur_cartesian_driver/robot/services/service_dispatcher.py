@@ -160,7 +160,7 @@ class ServiceDispatcher:
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)
-        if isinstance(call, SetTcpCall) and self._link.tcp_restore_pending:
+        if isinstance(call, SetTcpCall) and self._link.control.tcp_restore_pending:
             return failed(
                 'The TCP of the last goal is being restored; try again when the status is READY.'
             )
@@ -281,7 +281,7 @@ class ServiceDispatcher:
         if self._link.robot is None:
             return failed(self._link.status.message)
         replaces = self._link.program.connected
-        self._link.upload_program()
+        self._link.control.upload()
         if replaces:  # its predecessor disconnects first
             await wait_for_state(
                 self._link, lambda _: not self._link.program.connected, SETTING_TIMEOUT

@@ -1,0 +1,163 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Start, stop and command the robot program, over whichever connection can do it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.robot.connection_status import has_ended, is_stopped
+from ur_cartesian_driver.robot.event_log import EventLog
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.link_status import LinkStatus, OUT_OF_REACH
+from ur_cartesian_driver.robot.primary_client import PrimaryClient
+from ur_cartesian_driver.robot.program.auto_start import ProgramAutoStart
+from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
+from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
+from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
+
+
+class ProgramControl:
+    """
+    Commands to the robot program and to the controller that runs it.
+
+    A connected program reads the reverse socket; one that is paused, stuck or gone is reached by
+    the primary interface, which takes whole programs and a few commands.
+    """
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        sockets: ProgramSockets,
+        primary_client: PrimaryClient,
+        status: LinkStatus,
+        event_log: EventLog,
+        *,
+        robot: Callable[[], RobotState | None],
+        warn: Callable[[str], None],
+        may_upload: bool,
+    ) -> None:
+        """
+        Prepare; nothing is sent.
+
+        :param robot: returns the newest state; None = the robot is not connected.
+        :param warn: takes a line for the log.
+        :param may_upload: whether the first connection to the robot is the owner's first.
+        """
+        self._sockets, self._primary = sockets, primary_client
+        self._status, self._event_log = status, event_log
+        self._robot, self._warn = robot, warn
+        self.tracker = ProgramTracker(sockets)
+        self.tcp_setter = TemporaryTcpSetter(
+            sockets, primary_client, headless_mode=settings.headless_mode
+        )
+        #: Whether the TCP from before the last goal is still to be restored.
+        self.tcp_restore_pending = False
+        self.auto_start = ProgramAutoStart(
+            settings,
+            pending=may_upload,
+            upload=self.upload,
+            warn=warn,
+            power_up=lambda: self.send_primary(
+                primary.PrimaryCommand.RUN,
+                lambda: (robot := self._robot()) is not None and not is_stopped(robot),
+            ),
+        )
+
+    def send_control(
+        self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
+    ) -> None:
+        """Send a trajectory action to the robot program."""
+        self._sockets.send_control(action, count, takes_offsets=takes_offsets)
+        if action is TrajectoryAction.CANCEL:
+            self._event_log.note('the driver sent CANCEL')
+
+    def send_servo(self, on: bool) -> None:
+        """Make the robot program enter the buffered servo, or leave it and brake."""
+        self._sockets.send_servo(on)
+        self._event_log.note('the driver entered the servo' if on else 'the driver left the servo')
+
+    def send_primary(self, command: primary.PrimaryCommand, is_wanted: Callable[[], bool]) -> bool:
+        """
+        Send a command to the primary interface; False = there is no connection.
+
+        :param is_wanted: whether to send it again, if the connection was read-only.
+        """
+        return self._primary.send(primary.encode_command(command), is_wanted)
+
+    def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
+        """Send a script of others, as :meth:`send_primary` sends commands."""
+        self._event_log.note('the driver sent a script of others')
+        return self._primary.send(data, is_wanted)
+
+    # ---- the program as a whole ---------------------------------------------------------------
+
+    def upload(self) -> None:
+        """Upload the robot program; it replaces ours, never a foreign one."""
+        if refusal := self.upload_refusal():
+            self._warn(f'the robot program is not sent: {refusal}')
+        elif not self._primary.send(
+            primary.encode_program(wrap_in_program(self._sockets.text)),
+            lambda: not self.upload_refusal(),
+        ):
+            self._warn(
+                'the robot program is not sent: there is no connection to the primary '
+                'interface of the robot'
+            )
+        else:
+            self._event_log.note('the driver sent the robot program')
+
+    def upload_refusal(self) -> str:
+        """Return why no program may be sent now; empty if one may."""
+        if self._status.state in (*OUT_OF_REACH, ConnectionState.CONNECTING):
+            return self._status.current.message
+        if self._status.state is ConnectionState.EXECUTING:
+            return 'a goal is running; cancel it first'
+        if self.tracker.foreign_program_runs(self._robot()):
+            return (
+                'another program runs on the robot, maybe that of another driver; let it end, '
+                'or stop it'
+            )
+        if not self._sockets.text:
+            return 'wire_dialect says that the robot has an older one; play that on the pendant'
+        return ''
+
+    def stop(self, reason: str) -> None:
+        """End the robot program, so that its motion cannot resume."""
+        self._warn(f'the robot program is stopped: {reason}')
+        self._event_log.note('the driver ended the robot program')
+        self.tracker.is_ending = self._sockets.connected
+        self.send_primary(primary.PrimaryCommand.STOP_PROGRAM, self._runs_our_program)
+        self._sockets.send_stop()
+
+    def _runs_our_program(self) -> bool:
+        robot = self._robot()
+        return (
+            robot is not None
+            and not has_ended(robot)
+            and not self.tracker.foreign_program_runs(robot)
+        )
+
+    # ---- the TCP of a goal --------------------------------------------------------------------
+
+    def set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
+        """Make the robot program set the TCP for the duration of a goal."""
+        self.tcp_setter.set_temporary(T_flange_tcp)
+
+    def restore_tcp(self, T_flange_tcp: Pose) -> None:
+        """Restore the TCP from before a goal, if the robot is connected."""
+        if (robot := self._robot()) is not None:
+            self.tcp_setter.restore(
+                T_flange_tcp,
+                robot,
+                lambda: (
+                    self.tcp_restore_pending
+                    and not self.tracker.foreign_program_runs(self._robot())
+                ),
+            )
