@@ -93,7 +93,7 @@ def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cel
     cell = single_cell
     newest = subscribe(cell, ['joint_states'])
     cell.spin_until(lambda: newest)
-    cell.node.driver._signals = 'nonsense'
+    cell.node.driver._robot.signals = 'nonsense'
     cell.spin_until(lambda: cell.node._publisher._io_topics._last == 'nonsense')
     newest.clear()
     cell.spin_until(lambda: newest)

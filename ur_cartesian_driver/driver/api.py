@@ -14,36 +14,20 @@ from collections.abc import Callable
 from concurrent.futures import Future
 import contextlib
 from dataclasses import replace
-import itertools
-import threading
 
 from ur_cartesian_driver.driver.appender import Appender, encode_plan
-from ur_cartesian_driver.driver.callbacks import LOG, run_callback
+from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.driver.ipc.channel import (
-    AppendAnswered,
     ArmSetup,
-    CallAnswered,
-    CallRobot,
     Configure,
-    GeometryReceived,
-    LimitsReceived,
     LiveSetup,
-    LogMessage,
-    LoopHeartbeat,
-    MotionEnded,
-    MotionProgress,
     Notification,
     OwnerHeartbeat,
     pack,
     Request,
     ResendProgram,
-    ServoProgress,
     SetLiveTarget,
-    SignalsChanged,
     StartMotion,
-    StatusChanged,
-    TemporaryTcpRestored,
-    TemporaryTcpSet,
 )
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.live_session import (
@@ -55,20 +39,14 @@ from ur_cartesian_driver.driver.live_session import (
 from ur_cartesian_driver.driver.loop_connection import LoopConnection
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
 from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
+from ur_cartesian_driver.driver.reported_robot import ReportedRobot
 from ur_cartesian_driver.driver.robot_services import RobotServices
-from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
+from ur_cartesian_driver.driver.running_motions import RunningMotions
 from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJob
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.execution.goal.timeouts import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robot_models import (
-    DhTable,
-    JOINT_NAMES,
-    JointLimits,
-    robot_model,
-)
 from ur_cartesian_driver.motion.errors import (
-    ErrorCode,
     GoalRefused,
     InvalidGoal,
     LocalProtocolError,
@@ -100,7 +78,6 @@ from ur_cartesian_driver.robot.connection_status import (
     LinkGaps,
     timestamped,
 )
-from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 NO_STATE = 'The robot does not report its state.'
@@ -145,8 +122,7 @@ class Driver(RobotServices, InteractiveMotions):
         self.config = config
         self.options = options if options is not None else PlanningOptions()
         self.frames = frames if frames is not None else Frames(self.options.tf_prefix)
-        self._has_warned_of_cell = False
-        self._arm = Arm(robot_model(config.ur_type))
+        self._robot = ReportedRobot(config, self.options)
         self._loop = LoopConnection(
             config,
             auto_heartbeat=auto_heartbeat,
@@ -154,21 +130,8 @@ class Driver(RobotServices, InteractiveMotions):
             on_lost=self._on_loop_lost,
             reconfigure=self._reconfigure,
         )
-        #: Guards the motions and calls that run, as well as sending.
-        self._lock = self._loop.lock
         self._send = self._loop.send
-        #: Numbers of motions and calls.
-        self._numbers = itertools.count(1)
-        self._active_motions: dict[int, ActiveMotion] = {}
-        self._calls: dict[int, Future[ServiceAnswer]] = {}
-        self._status = ConnectionStatus()
-        self._ready = threading.Event()
-        self._signals: Signals | None = None
-        self._gaps = LinkGaps()
-        self._status_listeners: list[Callable[[ConnectionStatus], None]] = []
-        self._servo_listeners: list[Callable[[ServoReport], None]] = []
-        #: The TCP that a goal has set, until the one before is restored.
-        self._temporary_tcp: TemporaryTcpSet | None = None
+        self._running = RunningMotions(self._loop)
         #: Whether a loop that replaces another one may upload the robot program.
         self._may_upload = True
 
@@ -200,8 +163,8 @@ class Driver(RobotServices, InteractiveMotions):
         if not self._loop.close():
             return
         # The status first: it refuses new motions, which would never end.
-        self._set_status(ConnectionStatus(message='The driver is closed; open it.'))
-        self._abort_all('The driver was closed.')
+        self._robot.set_status(ConnectionStatus(message='The driver is closed; open it.'))
+        self._running.abort('The driver was closed.')
 
     def heartbeat(self) -> None:
         """Tell the robot loop that the owner is alive; needed within every ``node_timeout``."""
@@ -212,7 +175,7 @@ class Driver(RobotServices, InteractiveMotions):
     @property
     def status(self) -> ConnectionStatus:
         """How far the connection is."""
-        return self._status
+        return self._robot.status
 
     @property
     def state(self) -> RobotState | None:
@@ -230,8 +193,8 @@ class Driver(RobotServices, InteractiveMotions):
         state = self.state
         if state is None:
             return None
-        temporary_tcp = self._current_temporary_tcp()
-        state = predict_stop(state, self._arm, self.config.stop_deceleration)
+        temporary_tcp = self._running.temporary_tcp(self._robot.temporary_tcp)
+        state = predict_stop(state, self.arm, self.config.stop_deceleration)
         if temporary_tcp is None or not same_tcp(
             state.T_flange_tcp, temporary_tcp.T_flange_temporary
         ):
@@ -245,26 +208,26 @@ class Driver(RobotServices, InteractiveMotions):
     @property
     def signals(self) -> Signals | None:
         """Inputs, outputs and tool; None before the first report and when the robot is lost."""
-        return self._signals
+        return self._robot.signals
 
     @property
     def gaps(self) -> LinkGaps:
         """The longest recent pauses of the connection."""
-        return self._gaps
+        return self._robot.gaps
 
     @property
     def arm(self) -> Arm:
         """The arm's kinematics: calibrated once the robot has reported them, else nominal."""
-        return self._arm
+        return self._robot.arm
 
     def add_status_listener(self, callback: Callable[[ConnectionStatus], None]) -> None:
         """Call back with each new status, and at once with the present one."""
-        self._status_listeners.append(callback)
-        callback(self._status)
+        self._robot.status_listeners.append(callback)
+        callback(self.status)
 
     def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
         """Call back with each report of the servo."""
-        self._servo_listeners.append(callback)
+        self._robot.servo_listeners.append(callback)
 
     def wait_ready(self, timeout: float) -> None:
         """
@@ -272,8 +235,8 @@ class Driver(RobotServices, InteractiveMotions):
 
         :raises RobotNotReady: not within ``timeout`` [s]; the text says what is needed.
         """
-        if not self._ready.wait(timeout):
-            raise RobotNotReady(self._status.not_ready())
+        if not self._robot.ready.wait(timeout):
+            raise RobotNotReady(self.status.not_ready())
 
     # ---- motion -------------------------------------------------------------------------------
 
@@ -354,8 +317,7 @@ class Driver(RobotServices, InteractiveMotions):
         :returns: whether a motion ran; then plans made before its end have to be made again.
         :raises RobotNotReady: it cannot be preempted now and goes on, or it did not end.
         """
-        with self._lock:
-            motions = [active.motion for active in self._active_motions.values()]
+        motions = self._running.handles
         if motions:
             self.check_can_preempt()
         for motion in motions:
@@ -384,8 +346,8 @@ class Driver(RobotServices, InteractiveMotions):
 
     def stop(self) -> None:
         """Cancel the running motion and return at once; nothing happens if none runs."""
-        for active in list(self._active_motions.values()):
-            active.motion.cancel()
+        for motion in self._running.handles:
+            motion.cancel()
 
     # ---- services -----------------------------------------------------------------------------
 
@@ -401,23 +363,13 @@ class Driver(RobotServices, InteractiveMotions):
         """
         if not isinstance(call, ServiceCall):
             raise LocalProtocolError(f'{call!r:.60} is no service call.')
-        future: Future[ServiceAnswer] = Future()
-        future.set_running_or_notify_cancel()
-        number = next(self._numbers)
-        data = pack(CallRobot(number=number, call=call))
-        with self._lock:
-            if self._loop.is_open:
-                self._calls[number] = future
-                self._loop.send_packed(data)
-                return future
-        future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
-        return future
+        return self._running.call(call)
 
     # ---- starting motions ---------------------------------------------------------------------
 
     def _require(self, state: RobotState | None) -> RobotState:
         if state is None:
-            raise RobotNotReady(self._status.message or NO_STATE)
+            raise RobotNotReady(self.status.message or NO_STATE)
         return state
 
     def _goal_of(self, path: Path, state: RobotState) -> Goal:
@@ -447,7 +399,7 @@ class Driver(RobotServices, InteractiveMotions):
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
         """Return the planning options, with what the connected robot supports."""
-        status = self._status
+        status = self.status
         return replace(
             self.options,
             calibration_known=status.calibration_known,
@@ -478,7 +430,7 @@ class Driver(RobotServices, InteractiveMotions):
         :raises RobotNotReady: the robot is not ready, or another motion runs.
         :raises LocalProtocolError: something of the motion cannot be sent to another process.
         """
-        number = next(self._numbers)
+        number = next(self._running.numbers)
         request = StartMotion(
             motion=number,
             points=points,
@@ -491,20 +443,11 @@ class Driver(RobotServices, InteractiveMotions):
             else '',
         )
         data = pack(request)
-        with self._lock:
-            if self._active_motions:
-                raise RobotNotReady('A motion is running; wait for its end or cancel it.')
-            if reason := self._status.not_ready():
-                raise RobotNotReady(reason)
-            active = ActiveMotion(number, plan, on_progress, self._send)
-            motion = active.motion
-            if part is not None:
-                motion.appender = self._make_appender(motion, part)
-            self._active_motions[number] = active
-            # Sent under the lock: another thread may find the motion and cancel it, and the
-            # cancel has to arrive after the start.
-            self._loop.send_packed(data)
-        return motion
+        active = ActiveMotion(number, plan, on_progress, self._send)
+        if part is not None:
+            active.motion.appender = self._make_appender(active.motion, part)
+        self._running.start(active, data, self.status.not_ready())
+        return active.motion
 
     def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
         """Return what plans and offers the points that are appended to a goal."""
@@ -535,141 +478,29 @@ class Driver(RobotServices, InteractiveMotions):
 
     def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
         state = self.state
-        if state is not None and number in self._active_motions:
+        if state is not None and self._running.runs(number):
             T_base_tcp, age = plain_target(T_base_tcp, age)
             check_target(T_base_tcp, state, self.options)
             self._send(SetLiveTarget(motion=number, T_base_tcp=T_base_tcp, age=age))
-
-    def _current_temporary_tcp(self) -> TemporaryTcpSet | None:
-        """Return the TCP of the running motion, or one that is not restored yet."""
-        with self._lock:
-            active = next(iter(self._active_motions.values()), None)
-            return self._temporary_tcp if active is None else active.temporary_tcp
 
     # ---- from the robot loop ------------------------------------------------------------------
 
     def _on_loop_lost(self) -> None:
         # A program that somebody stopped stays stopped.
-        self._may_upload = self._status.program_running
-        self._set_status(ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST)))
-        self._abort_all(LOOP_LOST)
+        self._may_upload = self.status.program_running
+        self._robot.set_status(
+            ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST))
+        )
+        self._running.abort(LOOP_LOST)
 
     def _reconfigure(self) -> Configure:
-        self._abort_calls(LOOP_LOST)  # calls made since the loop was lost
+        self._running.abort_calls(LOOP_LOST)  # calls made since the loop was lost
         return Configure(
-            config=self.config, may_upload=self._may_upload, temporary_tcp=self._temporary_tcp
+            config=self.config,
+            may_upload=self._may_upload,
+            temporary_tcp=self._robot.temporary_tcp,
         )
 
     def _handle(self, notification: Notification | Request) -> None:
-        match notification:
-            case MotionProgress(motion=number, progress=progress):
-                if number in self._active_motions:
-                    self._active_motions[number].report(progress)
-            case AppendAnswered(motion=number, answer=answer):
-                self._handle_append_answer(number, answer)
-            case MotionEnded(motion=number, outcome=outcome):
-                with self._lock:
-                    active = self._active_motions.pop(number, None)
-                if active is not None:
-                    active.end(outcome)
-            case CallAnswered(number=number, answer=answer):
-                with self._lock:
-                    call = self._calls.pop(number, None)
-                if call is not None:
-                    call.set_result(answer)
-            case ServoProgress(report=report):
-                for listener in list(self._servo_listeners):
-                    run_callback(listener, report)
-            case StatusChanged(status=status):
-                self._set_status(status)
-            case SignalsChanged(signals=signals):
-                self._signals = signals
-            case LoopHeartbeat(gaps=gaps):
-                self._gaps = gaps
-            case GeometryReceived(geometry=geometry):
-                self._update_geometry(geometry)
-            case LimitsReceived(limits=limits):
-                self._update_limits(limits)
-            case TemporaryTcpSet():
-                self._temporary_tcp = notification
-            case TemporaryTcpRestored():
-                self._temporary_tcp = None
-            case LogMessage(level=level, text=text):
-                LOG.log(level, text)
-
-    def _handle_append_answer(self, number: int, answer: AnswerAppend) -> None:
-        active = self._active_motions.get(number)
-        if active is not None and active.motion.appender is not None:
-            active.motion.appender.answer(answer)
-
-    def _update_limits(self, limits: JointLimits) -> None:
-        """Plan within the limits that the robot reports, where they are tighter, from now on."""
-        model = robot_model(self.config.ur_type).limited_to(limits)
-        self._arm = Arm(model, self._arm.geometry)
-        for k in sorted(model.reported_ranges):
-            LOG.info('%s turns within %s', JOINT_NAMES[k], model.range_text(k))
-        for k in sorted(model.reported_speeds):
-            speed, source = model.max_joint_speed[k], model.speed_source(k)
-            LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
-
-    def _update_geometry(self, geometry: DhTable) -> None:
-        """Plan with the robot's calibrated kinematics from now on; warn if it is far off."""
-        model = self._arm.model
-        self._arm = Arm(model, geometry)
-        deviation = self._arm.max_flange_distance(Arm(model))
-        limit = self.config.max_calibration_difference
-        if 0.0 < limit < deviation:
-            LOG.warning(
-                'the calibration of the robot moves the flange by up to %.1f mm from where the '
-                'model %s has it; max_calibration_difference is %.1f mm: check ur_type, and '
-                'whether the arm was repaired and calibrated again',
-                1e3 * deviation,
-                model.name,
-                1e3 * limit,
-            )
-
-    def _set_status(self, status: ConnectionStatus) -> None:
-        self._status = status
-        if status.state is ConnectionState.DISCONNECTED:
-            self._signals, self._gaps = None, LinkGaps()
-        if status.state is ConnectionState.READY:
-            self._warn_of_unchecked_cell()
-            self._ready.set()
-        else:
-            self._ready.clear()
-        for listener in list(self._status_listeners):
-            run_callback(listener, status)
-
-    def _warn_of_unchecked_cell(self) -> None:
-        """Say once what of the cell the pre-flight cannot know."""
-        unknown = [
-            text
-            for text, is_unknown in (
-                (
-                    'workspace_planes is empty, so no table, wall or ceiling is checked',
-                    not self.options.workspace_planes,
-                ),
-                (
-                    'tool_radius is 0, so the tool is not checked',
-                    self.options.tool_radius == 0.0,
-                ),
-            )
-            if is_unknown
-        ]
-        if unknown and not self._has_warned_of_cell:
-            LOG.warning('%s; goals may lead the arm into what is there', ', and '.join(unknown))
-        self._has_warned_of_cell = True
-
-    def _abort_all(self, text: str) -> None:
-        """End all motions and calls of a robot loop that is gone."""
-        self._abort_calls(text)
-        with self._lock:
-            active_motions, self._active_motions = self._active_motions, {}
-        for active in active_motions.values():
-            active.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
-
-    def _abort_calls(self, text: str) -> None:
-        with self._lock:
-            calls, self._calls = self._calls, {}
-        for call in calls.values():
-            call.set_result(ServiceAnswer(ok=False, text=text))
+        self._running.take(notification)
+        self._robot.take(notification)

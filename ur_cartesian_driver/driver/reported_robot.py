@@ -1,0 +1,142 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot as its loop reports it to the owner: status, arm, signals, temporary TCP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+
+from ur_cartesian_driver.driver.callbacks import LOG, run_callback
+from ur_cartesian_driver.driver.ipc.channel import (
+    GeometryReceived,
+    LimitsReceived,
+    LogMessage,
+    LoopHeartbeat,
+    Notification,
+    Request,
+    ServoProgress,
+    SignalsChanged,
+    StatusChanged,
+    TemporaryTcpRestored,
+    TemporaryTcpSet,
+)
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import (
+    DhTable,
+    JOINT_NAMES,
+    JointLimits,
+    robot_model,
+)
+from ur_cartesian_driver.motion.state.io_signals import Signals
+from ur_cartesian_driver.motion.state.servo_report import ServoReport
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGaps
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+
+class ReportedRobot:
+    """
+    The newest reports of a robot loop; written by the driver's reader thread, read by all.
+
+    :raises ValueError: ``ur_type`` is unknown.
+    """
+
+    def __init__(self, config: DriverConfig, options: PlanningOptions) -> None:
+        """Begin disconnected, with the nominal arm."""
+        self._config, self._options = config, options
+        #: Nominal until the robot has reported its calibration.
+        self.arm = Arm(robot_model(config.ur_type))
+        self.status = ConnectionStatus()
+        self.ready = threading.Event()
+        #: None before the first report and when the robot is lost.
+        self.signals: Signals | None = None
+        self.gaps = LinkGaps()
+        self.status_listeners: list[Callable[[ConnectionStatus], None]] = []
+        self.servo_listeners: list[Callable[[ServoReport], None]] = []
+        #: The TCP that a goal has set, until the one before is restored.
+        self.temporary_tcp: TemporaryTcpSet | None = None
+        self._has_warned_of_cell = False
+
+    def take(self, notification: Notification | Request) -> None:
+        """Take a report; notifications about motions and calls are ignored."""
+        match notification:
+            case ServoProgress(report=report):
+                for listener in list(self.servo_listeners):
+                    run_callback(listener, report)
+            case StatusChanged(status=status):
+                self.set_status(status)
+            case SignalsChanged(signals=signals):
+                self.signals = signals
+            case LoopHeartbeat(gaps=gaps):
+                self.gaps = gaps
+            case GeometryReceived(geometry=geometry):
+                self._update_geometry(geometry)
+            case LimitsReceived(limits=limits):
+                self._update_limits(limits)
+            case TemporaryTcpSet():
+                self.temporary_tcp = notification
+            case TemporaryTcpRestored():
+                self.temporary_tcp = None
+            case LogMessage(level=level, text=text):
+                LOG.log(level, text)
+
+    def set_status(self, status: ConnectionStatus) -> None:
+        """Change the status and tell the listeners."""
+        self.status = status
+        if status.state is ConnectionState.DISCONNECTED:
+            self.signals, self.gaps = None, LinkGaps()
+        if status.state is ConnectionState.READY:
+            self._warn_of_unchecked_cell()
+            self.ready.set()
+        else:
+            self.ready.clear()
+        for listener in list(self.status_listeners):
+            run_callback(listener, status)
+
+    def _update_limits(self, limits: JointLimits) -> None:
+        """Plan within the reported limits, where they are tighter, from now on."""
+        model = robot_model(self._config.ur_type).limited_to(limits)
+        self.arm = Arm(model, self.arm.geometry)
+        for k in sorted(model.reported_ranges):
+            LOG.info('%s turns within %s', JOINT_NAMES[k], model.range_text(k))
+        for k in sorted(model.reported_speeds):
+            speed, source = model.max_joint_speed[k], model.speed_source(k)
+            LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
+
+    def _update_geometry(self, geometry: DhTable) -> None:
+        """Plan with the calibrated kinematics from now on; warn if it is far off."""
+        model = self.arm.model
+        self.arm = Arm(model, geometry)
+        deviation = self.arm.max_flange_distance(Arm(model))
+        limit = self._config.max_calibration_difference
+        if 0.0 < limit < deviation:
+            LOG.warning(
+                'the calibration of the robot moves the flange by up to %.1f mm from where the '
+                'model %s has it; max_calibration_difference is %.1f mm: check ur_type, and '
+                'whether the arm was repaired and calibrated again',
+                1e3 * deviation,
+                model.name,
+                1e3 * limit,
+            )
+
+    def _warn_of_unchecked_cell(self) -> None:
+        """Warn once of those parts of the cell that no check knows."""
+        unknown = [
+            text
+            for text, is_unknown in (
+                (
+                    'workspace_planes is empty, so no table, wall or ceiling is checked',
+                    not self._options.workspace_planes,
+                ),
+                (
+                    'tool_radius is 0, so the tool is not checked',
+                    self._options.tool_radius == 0.0,
+                ),
+            )
+            if is_unknown
+        ]
+        if unknown and not self._has_warned_of_cell:
+            LOG.warning('%s; goals may lead the arm into what is there', ', and '.join(unknown))
+        self._has_warned_of_cell = True

@@ -1,0 +1,129 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The motion and the service calls that a robot loop carries out for its owner."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+import itertools
+
+from ur_cartesian_driver.driver.ipc.channel import (
+    AppendAnswered,
+    CallAnswered,
+    CallRobot,
+    MotionEnded,
+    MotionProgress,
+    Notification,
+    pack,
+    Request,
+    TemporaryTcpSet,
+)
+from ur_cartesian_driver.driver.loop_connection import LoopConnection
+from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle
+from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
+
+
+class RunningMotions:
+    """
+    Motions and calls by their numbers; thread-safe.
+
+    There is one motion at a time. Each motion ends with one outcome and each call with one
+    answer, whatever becomes of the loop.
+    """
+
+    def __init__(self, loop: LoopConnection) -> None:
+        """Begin with none."""
+        self._loop = loop
+        self.numbers = itertools.count(1)
+        self._motions: dict[int, ActiveMotion] = {}
+        self._calls: dict[int, Future[ServiceAnswer]] = {}
+
+    def start(self, active: ActiveMotion, request: bytes, not_ready: str) -> None:
+        """
+        Send the request that starts a motion.
+
+        :param request: packed.
+        :param not_ready: why the robot takes no motion; '' = it does.
+        :raises RobotNotReady: for that reason, or because another motion runs.
+        """
+        with self._loop.lock:
+            if self._motions:
+                raise RobotNotReady('A motion is running; wait for its end or cancel it.')
+            if not_ready:
+                raise RobotNotReady(not_ready)
+            self._motions[active.motion.number] = active
+            # Sent under the lock: another thread may find the motion and cancel it, and the
+            # cancel has to arrive after the start.
+            self._loop.send_packed(request)
+
+    def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
+        """Start a call; the future always gets an answer, never an error."""
+        future: Future[ServiceAnswer] = Future()
+        future.set_running_or_notify_cancel()
+        number = next(self.numbers)
+        data = pack(CallRobot(number=number, call=call))
+        with self._loop.lock:
+            if self._loop.is_open:
+                self._calls[number] = future
+                self._loop.send_packed(data)
+                return future
+        future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
+        return future
+
+    @property
+    def handles(self) -> list[MotionHandle]:
+        """The motion that runs, or none."""
+        with self._loop.lock:
+            return [active.motion for active in self._motions.values()]
+
+    def runs(self, number: int) -> bool:
+        """Tell whether a motion runs."""
+        return number in self._motions
+
+    def temporary_tcp(self, unrestored: TemporaryTcpSet | None) -> TemporaryTcpSet | None:
+        """
+        Return the TCP of the running motion.
+
+        :param unrestored: returned where no motion runs.
+        """
+        with self._loop.lock:
+            active = next(iter(self._motions.values()), None)
+            return unrestored if active is None else active.temporary_tcp
+
+    def take(self, notification: Notification | Request) -> None:
+        """Take a notification about a motion or a call; all others are ignored."""
+        match notification:
+            case MotionProgress(motion=number, progress=progress):
+                if number in self._motions:
+                    self._motions[number].report(progress)
+            case AppendAnswered(motion=number, answer=answer):
+                active = self._motions.get(number)
+                if active is not None and active.motion.appender is not None:
+                    active.motion.appender.answer(answer)
+            case MotionEnded(motion=number, outcome=outcome):
+                with self._loop.lock:
+                    active = self._motions.pop(number, None)
+                if active is not None:
+                    active.end(outcome)
+            case CallAnswered(number=number, answer=answer):
+                with self._loop.lock:
+                    call = self._calls.pop(number, None)
+                if call is not None:
+                    call.set_result(answer)
+
+    def abort(self, text: str) -> None:
+        """End all motions and calls of a robot loop that is gone."""
+        self.abort_calls(text)
+        with self._loop.lock:
+            motions, self._motions = self._motions, {}
+        for active in motions.values():
+            active.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
+
+    def abort_calls(self, text: str) -> None:
+        """Answer all calls of a robot loop that is gone."""
+        with self._loop.lock:
+            calls, self._calls = self._calls, {}
+        for call in calls.values():
+            call.set_result(ServiceAnswer(ok=False, text=text))
