@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the fixtures of a simulated robot have in common: ours, and that of the simulator alone.
+The common part of two fixtures of a simulated robot: ours, and the stand-alone simulator's.
 
 pytest plugins import this module in every project of the environment, so it imports the simulator
 only when one is started.

@@ -80,7 +80,7 @@ class Variant:
     #: How far the goal is from where it says: of its frame along the axes of the base [m], and
     #: about the base's z through the frame's origin [rad].
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    #: By name, in what it differs from the other variants.
+    #: Its differences from the other variants, by name.
     coordinates: Mapping[str, Coordinate] = field(default_factory=dict)
 
 
@@ -100,7 +100,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepResult:
-    """What planning a variant came to."""
+    """The result of planning a variant."""
 
     variant: Variant
     #: Empty = the goal passes; else the sentence that refuses it.
@@ -243,7 +243,7 @@ def _failed(variant: Variant, error: Exception) -> SweepResult:
 
 
 def plan_variant(variant: Variant) -> SweepResult:
-    """Plan one variant; this is what the executor runs."""
+    """Plan one variant, in a process of the executor."""
     try:
         state = state_at_rest(variant.arm, variant.start, variant.T_flange_tcp)
         goal = variant.goal

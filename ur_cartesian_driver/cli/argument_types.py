@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the arguments of commands say: one function for each kind, for ``type=`` of argparse."""
+"""Read the arguments of commands: one function for each kind, for ``type=`` of argparse."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ def exit_status(findings: list[Finding]) -> int:
 
 
 def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dict[str, Any]:
-    """Return what is sent in: no address, no serial number, no names of programs."""
+    """Return the part that is sent in: no address, no serial number, no names of programs."""
     return {
         'format': 1,
         'driver': ElementTree.parse(share_path() / 'package.xml').findtext('version'),
@@ -156,7 +156,7 @@ def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dic
 
 
 def _without_nan(value: Any) -> Any:
-    """Return a value with null for what the robot does not have: JSON knows no NaN."""
+    """Return a value with null for numbers that the robot lacks: JSON knows no NaN."""
     if isinstance(value, dict):
         return {name: _without_nan(part) for name, part in value.items()}
     if isinstance(value, list | tuple):

@@ -33,7 +33,7 @@ class CommandParser(argparse.ArgumentParser):
     def __init__(
         self, *args: Any, add_arguments: Callable[[CommandParser], None], **fields: Any
     ) -> None:
-        """Take the function that adds the arguments and sets what is run."""
+        """Take the function that adds the arguments and sets the action."""
         super().__init__(*args, **fields)
         self._add_arguments: Callable[[CommandParser], None] | None = add_arguments
 
@@ -514,7 +514,7 @@ def _add_export(command: CommandParser) -> None:
     )
 
 
-#: By name: what the command does, and its arguments.
+#: Description and arguments of each command, by name.
 COMMANDS: dict[str, tuple[str, Callable[[CommandParser], None]]] = {
     'demo': ('run simulator, driver and client, a process each, with one goal', _add_demo),
     'sim': ('run a simulated controller on the ports of a real one', _add_sim),

@@ -86,7 +86,7 @@ def send(arguments: argparse.Namespace) -> int:
 
 
 def append(arguments: argparse.Namespace) -> int:
-    """Append points to the goal that runs, or replace its tail; print what the driver says."""
+    """Append points to the goal that runs, or replace its tail; print the driver's answer."""
     from ur_cartesian_driver.ros import client
 
     if not arguments.file and not arguments.last:
@@ -120,9 +120,9 @@ def _named_file(arguments: argparse.Namespace) -> Path:
 
 def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tuple[Any, Any]:
     """
-    Return what is left of a goal, as a message and in our own terms.
+    Return the rest of a goal, as a message and in our own terms.
 
-    :raises InvalidGoal: it cannot be taken up again.
+    :raises InvalidGoal: it cannot be resumed.
     """
     from ur_cartesian_driver.ros import client
 
@@ -131,7 +131,7 @@ def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tupl
 
 
 def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
-    """Note where a goal was stopped, and say how it is taken up again."""
+    """Note where a goal was stopped, and print how to resume it."""
     from ur_cartesian_driver.ros.messages.action_messages import outcome_of
 
     outcome = outcome_of(result)

@@ -10,14 +10,14 @@ import threading
 
 from tqdm import tqdm
 
-#: What is done sooner shows nothing [s].
+#: Shorter work shows nothing [s].
 DELAY = 1.0
 _PERIOD = 0.2
 
 
 @contextmanager
 def counted(what: str, total: int) -> Iterator[Callable[[], object]]:
-    """Show a bar; what is yielded is called for each part that is done."""
+    """Show a bar; the yielded function is called after each part."""
     with tqdm(
         desc=what, total=total, delay=DELAY, disable=None, leave=False, mininterval=0.1
     ) as bar:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where the goal of a file was stopped, in a file beside it, for ``ur-cartesian send --resume``.
+The place where a file's goal was stopped, kept beside it for ``ur-cartesian send --resume``.
 
 ``seam.yaml`` has ``seam.yaml.stopped``: the place, and a hash of the goal to which it belongs.
 That of an example of the package, or of a folder that cannot be written, is in the working

@@ -134,7 +134,7 @@ class Lesson:
 
 
 def _keys() -> Iterator[str]:
-    """Yield what is typed, line by line; the end of the input means q."""
+    """Yield the typed lines; the end of the input means q."""
     for line in sys.stdin:
         yield line.strip().lower()
 

@@ -114,7 +114,7 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Prepare a driver; nothing is connected before :meth:`open`.
 
-        :param frames: the frames that paths may name; None = those of every robot.
+        :param frames: the frames that paths can name; None = the standard frames.
         :param auto_heartbeat: send heartbeats from a thread; an owner that can hang (a ROS
             executor) calls :meth:`heartbeat` itself.
         :raises ValueError: ``ur_type`` is unknown.
@@ -174,7 +174,7 @@ class Driver(RobotServices, InteractiveMotions):
 
     @property
     def status(self) -> ConnectionStatus:
-        """How far the connection is."""
+        """The state of the connection, and the next step towards a goal."""
         return self._robot.status
 
     @property
@@ -233,7 +233,7 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Wait until a goal can run; the driver connects, and reconnects, by itself.
 
-        :raises RobotNotReady: not within ``timeout`` [s]; the text says what is needed.
+        :raises RobotNotReady: not within ``timeout`` [s]; the text names the next step.
         """
         if not self._robot.ready.wait(timeout):
             raise RobotNotReady(self.status.not_ready())
@@ -398,7 +398,7 @@ class Driver(RobotServices, InteractiveMotions):
         return goal
 
     def _options_for(self, state: RobotState) -> PlanningOptions:
-        """Return the planning options, with what the connected robot supports."""
+        """Return the planning options, with the features of the connected robot."""
         status = self.status
         return replace(
             self.options,

@@ -109,7 +109,7 @@ class Appender:
 
     @property
     def points(self) -> int:
-        """How many points the goal has."""
+        """The number of points of the goal."""
         return self._goal.points
 
     def append(self, new_points: AppendedPoints) -> AppendResult:
@@ -184,7 +184,7 @@ class Appender:
 
     def _forget_passed(self, new_points: AppendedPoints) -> AppendableGoal:
         """
-        Return the goal without what the arm has passed.
+        Return the goal without the points that the arm has passed.
 
         :raises GoalRefused: that is what is to be replaced, or there is no such point or time.
         """
@@ -192,7 +192,7 @@ class Appender:
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # What is under way to the arm is final too.
+                # Records under way to the arm are final too.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal

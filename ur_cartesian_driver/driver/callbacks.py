@@ -14,7 +14,7 @@ T = TypeVar('T')
 
 
 def run_callback(callback: Callable[[T], None], argument: T) -> None:
-    """Call user code; what it raises must not end the thread of the driver."""
+    """Call user code; its exceptions must not end the thread of the driver."""
     try:
         callback(argument)
     except Exception as error:

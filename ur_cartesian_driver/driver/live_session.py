@@ -3,7 +3,7 @@
 """
 Live sessions and freedrive, as methods of a driver.
 
-Both are motions like that of a goal: there is one at a time, it is cancelled in the same way, and
+Both are motions as a goal's: there is one at a time, it is cancelled in the same way, and
 it has one outcome. Only where it goes is decided while it runs.
 """
 
@@ -157,7 +157,7 @@ class InteractiveMotions(ABC):
         """
         Return the newest state.
 
-        :raises RobotNotReady: there is none, or the robot program cannot do what is asked.
+        :raises RobotNotReady: there is none, or the robot program lacks the function.
         """
         if not self.config.dialect.supports_servo:
             raise RobotNotReady(

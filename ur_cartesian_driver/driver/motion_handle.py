@@ -81,11 +81,12 @@ class MotionHandle:
         :param io_commands: their waypoints are numbered from the start of the goal.
         :param last: nothing follows, the arm comes to rest at the last point; without points: at
             the ending that was planned, a spline behind its last point.
-        :param replace_from_point: the first point whose place the new ones take, and that of all
+        :param replace_from_point: the first point that the new ones replace, together with all
             points behind it (SPLINE and SERVO).
         :param replace_from_time: or the time from which on they do, as those of points [s]; the
             motion goes on from there to the first of them.
-        :raises AlreadySent: what is to be replaced is final; the error names what can be.
+        :raises AlreadySent: the tail to replace is final; the error says from where on points can
+            still be replaced.
         :raises GoalRefused: none of the points was taken, and the goal goes on; the text says why.
         """
         if self.appender is None:
@@ -176,7 +177,7 @@ class ActiveMotion:
         self._plan: Plan | None = plan
         self._plan_report: tuple[str, ...] | None = None
         self._ended: Outcome | None = None
-        #: What the owner holds.
+        #: The handle that the owner holds.
         self.motion = MotionHandle(number, self._outcome, send, self.make_report)
         if plan.offset_band is not None:
             self.motion.offset_timeout = plan.offset_band.timeout

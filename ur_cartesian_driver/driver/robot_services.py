@@ -53,7 +53,7 @@ class RobotServices(ABC):
         return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
 
     def set_payload(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> ServiceAnswer:
-        """Set mass [kg] and centre of gravity [m] (in the flange) of what the flange carries."""
+        """Set mass [kg] and centre of gravity [m] (in the flange) of the load on the flange."""
         return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:

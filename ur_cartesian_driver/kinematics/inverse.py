@@ -141,7 +141,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     Return a clause that says why no solution lies within the limits; empty if one does.
 
-    For a calibrated arm, lengths are those of its ideal arm.
+    For a calibrated arm, lengths are its ideal arm's.
     """
     found = solutions(arm, T_base_flange)
     if found:

@@ -122,7 +122,7 @@ class RobotModel:
     max_reach: float
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
-    #: Joints whose range, and whose speed, is not the model's but what the controller reports.
+    #: Joints whose range, and whose speed, the controller reports otherwise than the model.
     reported_ranges: frozenset[int] = frozenset()
     reported_speeds: frozenset[int] = frozenset()
 

@@ -68,7 +68,7 @@ def live_page(
     """
     Serve a page that follows a robot, until the end of the context.
 
-    :param state: where the robot is now.
+    :param state: returns the robot's present state.
     :param plan: what it is expected to do.
     :param host: the address that is listened on: everybody who reaches it sees the robot.
     :param port: the first one that is tried; a free one is found from there on.

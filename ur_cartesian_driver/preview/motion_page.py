@@ -98,7 +98,7 @@ window.addEventListener('hashchange', () => location.reload());
 
 
 class _Colouring(NamedTuple):
-    """What a colour of the path says: a colour for each edge, and a legend."""
+    """The colours of a path: one for each edge, and a legend."""
 
     name: str
     colours: Colours
@@ -235,7 +235,7 @@ def _legends(colourings: Iterable[_Colouring]) -> str:
     return f'<nav>{links}</nav>{"".join(lines)}'
 
 
-# -- what the scene shows -------------------------------------------------------------------------
+# -- parts of the scene ---------------------------------------------------------------------------
 
 
 def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:

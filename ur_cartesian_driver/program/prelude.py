@@ -21,7 +21,7 @@ class PreludeFunction:
 
     @property
     def counts(self) -> str:
-        """How many arguments it takes, as part of a sentence."""
+        """The number of its arguments, as part of a sentence."""
         between = '' if self.required == self.allowed else f'{self.required} to '
         return f'{between}{self.allowed or "no"} argument{"s" * (self.allowed != 1)}'
 

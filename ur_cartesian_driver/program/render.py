@@ -292,7 +292,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'POINT_TIMEOUT = {settings.point_timeout}'
     # PolyScope X can read twice as often in a step as its predecessors.
     yield f'DISCARDED_PER_STEP = {20 if settings.version[0] >= 10 else 10}'
-    # Floats, because what is divided by them has fractions.
+    # Floats, because quotients by them have fractions.
     yield f'MULT_JOINTSTATE = {float(FIXED_POINT)}'
     yield f'MULT_TIME = {float(FIXED_POINT)}'
     yield f'REVERSE_FIELDS = {reverse.MESSAGE_FIELDS}'

@@ -43,9 +43,9 @@ class ApiCommand:
     """
     The request of one command.
 
-    :param body: what is sent as JSON; ``{}`` stands for the argument. Empty = nothing is sent.
+    :param body: the JSON of the request; ``{}`` stands for the argument. Empty = nothing is sent.
     :param value: the field of the answer that holds the value; empty = there is none.
-    :param words: what the dashboard says instead of some values.
+    :param words: the dashboard's words for some values.
     :param since: the first software that has it.
     """
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a driver, and the sentences that say what is needed before a goal can run."""
+"""The status of a driver, and the sentences that name the next step towards running a goal."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionStatus:
-    """How far the connection is, and what is needed before a goal can run."""
+    """Progress of the connection, and the next step towards running a goal."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED
-    #: What is needed, in a sentence; empty when nothing is.
+    #: The next step, a sentence; empty when a goal can run.
     message: str = ''
     #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
@@ -105,9 +105,9 @@ def required_action(
     foreign_program: bool = False,
 ) -> str:
     """
-    Return the sentence that says what is needed before a goal can run; empty when nothing is.
+    Return the next step towards running a goal, a sentence; empty when one can run.
 
-    :param robot: what the robot reported last; None = nothing yet.
+    :param robot: its newest state; None = none yet.
     :param stale: that the states of the robot are too old, as a sentence; empty = they are not.
     :param tcp_restore_pending: the TCP of the last goal has to be restored.
     :param program_is_ending: our program was told to end but is still connected.

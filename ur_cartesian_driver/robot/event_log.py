@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What happened lately at one robot, to explain why something ended.
+The recent events at one robot, to explain why a goal or a connection ended.
 
 "The connection dropped" helps nobody: it drops because a program has ended, which ended because of
 a stop, which has a code. Each of these arrives on another connection at another moment. So they
@@ -68,7 +68,7 @@ class EventLog:
         self._entries.append(EventLogEntry(self._clock(), text, is_robot_error))
 
     def note_report(self, robot: RobotState) -> None:
-        """Take what the robot reports now."""
+        """Take the robot's newest report."""
         self._last_state, self._last_report = robot, self._clock()
 
     @property

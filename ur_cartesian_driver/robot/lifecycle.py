@@ -36,7 +36,7 @@ class ConnectionState(IntEnum):
 
 
 class ConnectionEvent(Enum):
-    """What changes the state of the connection."""
+    """Events that change the state of the connection."""
 
     ROBOT_ANSWERED = auto()
     ROBOT_ACCEPTED = auto()

@@ -143,7 +143,7 @@ class RobotLink:
 
     @property
     def status(self) -> ConnectionStatus:
-        """How far the connection is."""
+        """The state of the connection, and the next step towards a goal."""
         return self._status.current
 
     async def run(self) -> None:
@@ -405,7 +405,7 @@ class RobotLink:
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
 
     def _takes_goals(self) -> bool:
-        """Tell whether the robot program reads what is sent, and the states show what follows."""
+        """Tell whether the robot program reads messages, and its states are fresh."""
         return self.control.tracker.reads(self.robot) and not self._stale.age
 
     def _required_action(self, state: ConnectionState) -> str:
@@ -427,7 +427,7 @@ class RobotLink:
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
-    """Return the models that report this type; a UR7e reports that of a UR5."""
+    """Return the models that report this type; a UR7e reports itself as a UR5."""
     names = [
         name
         for name, model in MODELS.items()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How to reach a robot, and how it reaches us."""
+"""The addresses, ports and timings of the connections to a robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MIN_RTDE_FREQUENCY = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
-    """How to reach the robot; the defaults fit a real one."""
+    """The connections to one robot; the defaults fit a real one."""
 
     robot_ip: str = '127.0.0.1'
     #: Model that is expected, for example ``ur5e``; a robot that reports another is refused.
@@ -68,7 +68,7 @@ class LinkSettings:
     allow_scripts: bool = False
     #: File with URScript functions that goals call; empty = none.
     script_prelude: str = ''
-    #: Its functions, read once: what is planned is what the robot gets.
+    #: Its functions, read once, so that planner and robot have the same.
     prelude: Prelude = field(init=False, default=NO_PRELUDE)
     #: Whether a person may guide the arm by hand (freedrive).
     allow_freedrive: bool = False
@@ -117,7 +117,7 @@ class LinkSettings:
 
     @property
     def dialect(self) -> Dialect:
-        """What the robot program understands."""
+        """The messages that the robot program understands."""
         return DIALECTS[self.wire_dialect]
 
     def _check_numbers(self) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The status of a link: its state, what is needed next, and the last error."""
+"""The status of a link: its state, the next step, and the last error."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class LinkStatus:
         """
         Begin disconnected.
 
-        :param required_action: what is needed in a state, as a sentence.
+        :param required_action: returns the next step in a state, a sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
         self._attempts = AttemptLog(self._log_info, self._log_info)
@@ -53,7 +53,7 @@ class LinkStatus:
         self.update(state=next_state(self.state, event), **changes)
 
     def update(self, **changes: Any) -> None:
-        """Change fields of the status, and work out what is needed now."""
+        """Change fields of the status, and derive the next step."""
         status = replace(self.current, **changes)
         if status.state not in OUT_OF_REACH:
             status = replace(status, message=self._required_action(status.state))
@@ -68,7 +68,7 @@ class LinkStatus:
         self._on_log(logging.ERROR, text)
 
     def _log_change(self, before: ConnectionStatus, now: ConnectionStatus) -> None:
-        """Log what is needed, for those who do not see the status."""
+        """Log the next step, for those who do not see the status."""
         if now.state not in ATTEMPTING and before.state in ATTEMPTING:
             self._attempts.succeeded()
         if now.message and now.message != before.message:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Read the URScript of the parameter ``script_prelude``, and refuse what is no prelude."""
+"""Read the URScript of the parameter ``script_prelude``, and refuse anything but functions."""
 
 from __future__ import annotations
 

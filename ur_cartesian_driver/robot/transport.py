@@ -182,7 +182,7 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's own words: those of asyncio repeat the address, or count attempts."""
+    """Return the system's own words: asyncio's repeat the address, or count attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # a name that is not known
@@ -289,7 +289,7 @@ class TcpListener:
         """
         Describe the port.
 
-        :param name: what the parameter of the port is called, for texts.
+        :param name: of the parameter of the port, for texts.
         :param on_refused: a client was rejected, and why.
         :param is_taken: tells whether the connected client must not be replaced.
         """
@@ -368,7 +368,7 @@ class TcpListener:
             self._on_open(connection)
 
     def warn_limited(self, text: str) -> None:
-        """Log what is wrong with a client, within the limit of lines."""
+        """Log a fault of a client, within the limit of lines."""
         self._warnings.add(f'{self.name}: {text}', asyncio.get_running_loop().time())
 
     def _reject(self, connection: TcpConnection, text: str) -> None:

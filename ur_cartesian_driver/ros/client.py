@@ -101,10 +101,10 @@ def resumed_goal(
     goal: FollowCartesianTrajectory.Goal, place: PathPlace, *, overlap: float, approach: float
 ) -> tuple[FollowCartesianTrajectory.Goal, ResumedGoal]:
     """
-    Return what is left of a goal that was stopped at a place, as a message and in our own terms.
+    Return the rest of a goal that was stopped at a place, as a message and in our own terms.
 
     :param overlap: as ``approach`` a length [m], see :func:`~ur_cartesian_driver.path.resume`.
-    :raises InvalidGoal: it cannot be taken up again.
+    :raises InvalidGoal: it cannot be resumed.
     """
     left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
     return goal_message(fields_of_goal(left.goal)), left
@@ -169,7 +169,7 @@ class GoalClient:
         self.close()
 
     def close(self) -> None:
-        """Destroy what the client has made; may be called twice."""
+        """Destroy the client's ROS objects; a second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -402,7 +402,7 @@ class GoalClient:
         """
         Wait until the status of the driver is READY.
 
-        :raises TimeoutError: it takes longer than ``timeout`` [s]; the text says what is needed.
+        :raises TimeoutError: it takes longer than ``timeout`` [s]; the text names the next step.
         """
         latest: list[DriverStatus] = []
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

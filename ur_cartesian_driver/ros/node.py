@@ -256,7 +256,7 @@ def _share_freed_memory() -> None:
 
 def _give_freed_memory_back() -> None:
     """
-    Give memory back that lies between what is used (glibc, malloc_trim(3)).
+    Return unused heap pages to the system (glibc, malloc_trim(3)).
 
     What remains of a goal keeps the next one from using its memory again. This takes one to five
     milliseconds.

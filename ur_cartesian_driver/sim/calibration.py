@@ -72,7 +72,7 @@ def read_calibration(path: Path, model: RobotModel) -> DhTable:
 
 def random_calibration(model: RobotModel, seed: int) -> DhTable:
     """
-    Return the table of an arm whose axes deviate like those of real arms; see above.
+    Return the table of an arm whose axes deviate as on real arms; see above.
 
     :raises ValueError: the seed is negative.
     """
@@ -141,7 +141,7 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
         following = axes.directions[i]
         normal, d, a = _common_normal(origin, z, axes.points[i], following)
         alpha = _angle(normal, z, following)
-        # Of the two directions of the normal, that of the model.
+        # Of the two directions of the normal, the model's.
         nominal_a, nominal_alpha = model.geometry.a[i - 1], model.geometry.alpha[i - 1]
         if (a * nominal_a if nominal_a else alpha * nominal_alpha) < 0.0:
             normal, a, alpha = -normal, -a, -alpha

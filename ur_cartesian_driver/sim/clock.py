@@ -27,7 +27,7 @@ _MAX_SAMPLES = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """How late the last cycles began [s]: median, 99th percentile, worst."""
+    """Lateness of the last cycles [s]: median, 99th percentile, worst."""
 
     p50: float
     p99: float

@@ -77,7 +77,7 @@ class CycleFaults(Protocol):
     active: bool
 
     def step(self) -> None:
-        """Apply what is due in this cycle."""
+        """Apply all that is due in this cycle."""
 
 
 class Controller:
@@ -104,7 +104,7 @@ class Controller:
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         self.motion.turn_ratio = config.turn_ratio
-        #: What the tool touches, and how the arm gives way.
+        #: The bodies that the tool touches, and the compliance of the arm.
         self.contact = ContactMotion(self.motion, config.contact_bodies)
         #: The measured motion: equal to the targets, unless it is disturbed.
         self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
@@ -165,7 +165,7 @@ class Controller:
     @property
     def timestamp(self) -> float:
         """
-        What clients read of the clock [s].
+        The clock as clients read it [s].
 
         It contains the time in which this computer was too busy: clients that compare it with
         their own clock would take states for old ones.
@@ -184,7 +184,7 @@ class Controller:
 
     @property
     def speed_scaling(self) -> float:
-        """What slows the motion beside the speed slider, 0..1; 0 at rest and in pauses."""
+        """The slowing factor beside the speed slider, 0..1; 0 at rest and in pauses."""
         if self.at_rest or not self.speed_slider:
             return 0.0
         return min(1.0, self.motion.scaling / self.speed_slider)
@@ -212,7 +212,7 @@ class Controller:
 
     @property
     def target(self) -> MotionGenerator | ArmState:
-        """Where the arm should be, with what force mode adds to the program."""
+        """The commanded place of the arm: the program's, and the displacement by force mode."""
         return self.contact.target or self.motion
 
     @property
@@ -222,7 +222,7 @@ class Controller:
 
     @property
     def tool_accelerometer(self) -> Vector3:
-        """What a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
+        """The reading of a sensor in the flange, gravity included, in its axes [m/s^2]."""
         motion = self.motion
         frames = self.arm.frames(motion.q)
         acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration

@@ -48,7 +48,7 @@ T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
-#: From the port of a script interface to that of its read-only twin: 30001 and 30011.
+#: From the port of a script interface to its read-only twin's: 30001 and 30011.
 READ_ONLY_DISTANCE = 10
 #: The first version without a dashboard.
 POLYSCOPE_X = 10

@@ -75,7 +75,7 @@ class SimulatorConfig:
     turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
-    #: Limits of the joints; None = those of the model. Where they are tighter, the arm keeps them,
+    #: Limits of the joints; None = the model's. Where they are tighter, the arm keeps them,
     #: and the configuration on the primary interface contains them.
     joint_limits: JointLimits | None = None
     #: How far the arm fails to follow its targets, and the controller to keep up; None = not at
@@ -92,14 +92,14 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
-    #: What the robot's clock does when this computer was too busy for its cycles: 'skip' their
+    #: Behaviour of the robot's clock when this computer was too busy for its cycles: 'skip' their
     #: time, so that it keeps real time as on a real robot; 'wait', so that motions take as long as
     #: they should by the robot's clock, as tests want it.
     when_late: Literal['skip', 'wait'] = 'skip'
     #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
-    #: What the tool can touch, as :class:`ContactBody` or in words: 'plane 0 0 0.1 0 0 1'.
+    #: Bodies that the tool can touch, as :class:`ContactBody` or in words: 'plane 0 0 0.1 0 0 1'.
     contacts: Sequence[ContactBody | str] = ()
     #: Digital inputs that are on from the start, such as 'standard 3'.
     inputs: Sequence[str] = ()

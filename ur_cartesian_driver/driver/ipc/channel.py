@@ -96,7 +96,7 @@ class ArmSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSetup:
-    """What a live session needs beside its job."""
+    """The settings of a live session, beside its job."""
 
     settings: LiveSettings
     #: Where the arm stands [rad].
@@ -229,7 +229,7 @@ class ServoProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionEnded:
-    """How a motion ended."""
+    """The end of a motion."""
 
     motion: int
     outcome: Outcome
@@ -237,7 +237,7 @@ class MotionEnded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CallAnswered:
-    """How a call ended."""
+    """The end of a call."""
 
     number: int
     answer: ServiceAnswer
@@ -259,7 +259,7 @@ class LoopHeartbeat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogMessage:
-    """A line for the owner's log; the levels are those of ``logging``."""
+    """A line for the owner's log, with a level of ``logging``."""
 
     level: int
     text: str
@@ -327,7 +327,7 @@ def pack(message: Request | Notification) -> bytes:
         stream.seek(0)
         stream.write(LENGTH.pack(size))
         return stream.getvalue()
-    except Exception as error:  # pickling calls methods of what it finds
+    except Exception as error:  # pickling calls methods of all that it finds
         raise LocalProtocolError(
             f'{type(message).__name__} cannot be sent to the robot process: {error}.'
         ) from error
@@ -343,7 +343,7 @@ def unpack(body: bytes) -> Request | Notification:
     try:
         refusal = pickle.load(stream)
         message: Request | Notification = pickle.load(stream)
-    except Exception as error:  # unpickling calls what the bytes name
+    except Exception as error:  # unpickling calls whatever the bytes name
         raise Unreadable(f'{type(error).__name__}: {error}', refusal) from error
     return message
 

@@ -12,7 +12,7 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriverConfig(LinkSettings):
-    """How to reach the robot, and how to run the loop that does; the defaults fit a real robot."""
+    """The connections to a robot, and the loop that holds them; defaults fit a real robot."""
 
     #: Port of the dashboard on the robot; PolyScope X has none, ...
     dashboard_port: int = 29999

@@ -29,7 +29,7 @@ CODES_WITH_CAUSE = frozenset(
 #: The end waits that long for it [s].
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 CAUSE_TIMEOUT = 0.05
-#: What the robot reported so long before a motion began may have led to its end [s]: a program
+#: Reports from so long before the begin of a motion can explain its end [s]: a program
 #: fails some cycles before its sockets close.
 CAUSE_LEAD = 0.1
 
@@ -45,7 +45,7 @@ class EndReporter:
         self._outputs = outputs
         #: An end that waits for its cause, or for its outputs.
         self._pending: MotionEnded | None = None
-        #: What the robot reported before is no cause of the end [s].
+        #: Earlier reports do not explain the end [s].
         self._since = -inf
 
     def begin(self) -> None:
@@ -74,7 +74,7 @@ class EndReporter:
             self.report_pending()
 
     def report_pending(self) -> None:
-        """Report the end that waits for its cause, with what is known by now."""
+        """Report the end that waits for its cause, with the causes known by now."""
         ended, self._pending = self._pending, None
         if ended is not None:
             self._report_now(ended)

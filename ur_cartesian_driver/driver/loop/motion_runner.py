@@ -117,7 +117,7 @@ class MotionRunner:
         self._points = PointBuffer()
         #: The inputs of a motion that gets set-points, or offsets of its path.
         self._inputs: RegisterConnection | None = None
-        #: What is offered to the machine at this moment.
+        #: Points that the machine considers at this moment.
         self._pending_append: AppendToMotion | None = None
         self._recorder = Recorder(
             config.record_directory,
@@ -230,7 +230,7 @@ class MotionRunner:
     # ---- events and commands ------------------------------------------------------------------
 
     def handle_event(self, event: Event) -> None:
-        """Give an event to the machine, and carry out what it commands."""
+        """Pass an event to the machine, and carry out its commands."""
         if self._machine is not None:
             self._step(self._machine, event)
         elif isinstance(event, StateReceived):

@@ -41,7 +41,7 @@ class OutputSecurer:
         #: Which write is the newest; the others end.
         self._newest = 0
         self._is_pending = False
-        #: Values are written one after the other: what is safe must not be restored afterwards.
+        #: Values are written one after the other: a late restore must not undo a safe value.
         self._lock = asyncio.Lock()
         #: Why outputs of the motion are not safe.
         self.failure = ''

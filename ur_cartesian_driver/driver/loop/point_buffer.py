@@ -20,7 +20,7 @@ class PointBuffer:
         return len(self._data) // POINT_SIZE
 
     def put(self, behind: int, data: bytes) -> None:
-        """Put records behind the first so many, in the place of what is there."""
+        """Replace all records behind the first so many."""
         del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 

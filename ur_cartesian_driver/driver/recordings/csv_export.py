@@ -19,7 +19,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYP
 _POSE = ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')
 _TWIST = ('x [m/s]', 'y [m/s]', 'z [m/s]', 'rx [rad/s]', 'ry [rad/s]', 'rz [rad/s]')
 _WRENCH = ('fx [N]', 'fy [N]', 'fz [N]', 'tx [Nm]', 'ty [Nm]', 'tz [Nm]')
-#: What the titles of columns with several numbers add to the name, by the end of the name.
+#: Suffixes of the titles of columns with several numbers, by the end of the name.
 _PARTS = {
     'pose': _POSE,
     'twist': _TWIST,

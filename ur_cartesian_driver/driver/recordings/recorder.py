@@ -77,7 +77,7 @@ def motion_metadata(
     """
     Return the metadata of a motion that begins now.
 
-    :param robot: what is known of the robot.
+    :param robot: its model, software and calibration.
     :param parameters: those of the driver, a dataclass.
     :param plan_metadata_json: the result of :func:`plan_metadata`.
     :param mode: the kind of a motion without a plan.

@@ -28,7 +28,7 @@ _RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz
 
 
 def recording_name(metadata: dict[str, Any]) -> str:
-    """Return the name of a recording, from when and what it is: they sort by time."""
+    """Return the name of a recording, from its time and kind; names sort by time."""
     begun = datetime.fromisoformat(metadata['created'])
     return (
         f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
@@ -156,7 +156,7 @@ def _new(path: Path) -> Path:
     raise FileExistsError(f'there are too many recordings named {path.stem} already')
 
 
-# ---- what is there already ------------------------------------------------------------------
+# ---- files that exist ------------------------------------------------------------------
 
 
 def enforce_quota(

@@ -53,7 +53,7 @@ class BodyLayout:
         """
         Compile the layout.
 
-        :param what: what the body is, for error texts.
+        :param what: the name of the body, for error texts.
         :param padding: zero bytes behind the values [bytes]; a body that is read may lack them.
         """
         self._what = what

@@ -275,7 +275,7 @@ def decode_frame(data: bytes) -> PrimaryFrame:
 
 
 class PrimaryDecoder:
-    """Decodes what the controller sends."""
+    """Decodes the controller's stream."""
 
     def __init__(self) -> None:
         """Start empty."""

@@ -153,7 +153,7 @@ def decode_packet(data: bytes) -> RealtimeData:
 
 
 class RealtimeDecoder:
-    """Decodes what the controller sends."""
+    """Decodes the controller's stream."""
 
     def __init__(self) -> None:
         """Start empty."""

@@ -110,7 +110,7 @@ class OffsetInput(IntEnum):
 class OffsetOutput(IntEnum):
     """Double registers that the robot program writes in such a trajectory."""
 
-    #: Along, across, normal [m]; what the controller applies, in the base [m].
+    #: Along, across, normal [m]; the offset that the controller applies, in the base [m].
     VALUE = 25
     SHIFT = 28
 
@@ -139,7 +139,7 @@ class ExternalError(IntEnum):
     HALT = 1
 
 
-#: Grows when the robot program learns what the driver relies on.
+#: Grows when the robot program learns a feature that the driver relies on.
 PROGRAM_VERSION = 1
 
 Register: TypeAlias = (

@@ -80,7 +80,7 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """How long a TCP stays set; only our own robot program knows it."""
+    """The lifetime of a TCP; only our own robot program knows it."""
 
     #: Until another TCP is set.
     PERMANENT = 0
@@ -91,7 +91,7 @@ class TcpPersistence(IntEnum):
 
 
 class SafeOutputsAction(IntEnum):
-    """What the robot program does with safe outputs; when it has, it reports the token."""
+    """The use of safe outputs by the robot program, which then reports the token."""
 
     #: Forget them.
     DISARM = 0

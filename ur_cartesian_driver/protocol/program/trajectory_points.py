@@ -94,7 +94,7 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
 
 def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of many primitives and outputs: those of :func:`encode_point`, but faster.
+    Return the bytes of many primitives and outputs: as :func:`encode_point`, but faster.
 
     :raises LocalProtocolError: names the point (from 0), the field and the bound.
     """
@@ -109,7 +109,7 @@ def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST
 
 def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of the segments of a plan: those of :func:`encode_points`, from columns.
+    Return the bytes of the segments of a plan: as :func:`encode_points`, from columns.
 
     :raises LocalProtocolError: names the record (from 0), the field and the bound.
     """

@@ -111,7 +111,7 @@ class RtdeServerCodec:
 
     def feed(self, data: bytes) -> list[InputReceived | RtdeTextMessage]:
         """
-        Take bytes from the client (none at all = its end) and return what it wrote.
+        Take bytes from the client (none at all = its end) and return the values it wrote.
 
         :raises RemoteProtocolError: the client violated the protocol; close the connection.
         """

@@ -39,7 +39,7 @@ RECORDED = (
 )  # fmt: skip
 #: How long a program may take to move the arm, and to end [s].
 START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
-#: What is recorded before and after the motion [s].
+#: Time recorded before and after the motion [s].
 MARGIN = 0.3
 #: The tool is back where it was [m].
 NEAR = 1e-4

@@ -84,7 +84,7 @@ class MotionSamples:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
     """
-    A motion and what it settles.
+    A motion, and the question that it settles.
 
     :param check: its name in the report and in doc/robot_program.md.
     :param motion: what moves, how far and how fast; a sentence for the person who is asked.

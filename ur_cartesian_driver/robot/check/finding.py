@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a check of a robot has found."""
+"""Findings of a check of a robot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class Verdict(Enum):
-    """What a finding means for this driver."""
+    """The meaning of a finding for this driver."""
 
     OK = 'ok'
     #: Worth knowing: less works, or the robot differs from what was expected.
@@ -39,7 +39,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotAddress:
-    """Where a robot listens."""
+    """Address and ports of a robot."""
 
     host: str
     rtde_port: int = 30004

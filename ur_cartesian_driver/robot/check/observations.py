@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What can be observed of a robot without moving it or changing anything.
+Observations of a robot that neither move it nor change anything.
 
 Two things leave a trace for a moment: RTDE inputs are requested and released without a write, and
 a secondary program writes one line to the robot's log.
@@ -43,7 +43,7 @@ OTHER_PORTS = {'secondary': 30002, 'real-time': 30003, 'interpreter': 30020}
 
 async def observe(address: RobotAddress, seconds: float) -> AsyncIterator[Finding]:
     """
-    Yield what the robot tells.
+    Yield the findings about a robot.
 
     :param seconds: how long the stream of RTDE is recorded [s].
     """

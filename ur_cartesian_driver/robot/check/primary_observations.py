@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the primary interface tells: model, limits, calibration, and whether it takes scripts."""
+"""Observe the primary interface: model, limits, calibration, and whether it takes scripts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CONFIGURATION_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 3.0
 
 
 class PrimaryProbe:
-    """A connection to the primary interface, with what the robot has said on it."""
+    """A connection to the primary interface, with all messages received on it."""
 
     def __init__(self) -> None:
         """Prepare; :meth:`open` connects."""
@@ -110,7 +110,7 @@ async def observe_primary(
     address: RobotAddress, version: ControllerVersion | None, state: Mapping[str, Any]
 ) -> AsyncIterator[Finding]:
     """
-    Yield what the primary interface shows.
+    Yield the findings of the primary interface.
 
     :param version: software of the robot; None = unknown.
     :param state: newest RTDE outputs by name; empty = none.

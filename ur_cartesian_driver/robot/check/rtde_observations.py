@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What RTDE tells about a robot: software, outputs, stream, state at rest, free inputs."""
+"""Observe RTDE: software, outputs, stream, state at rest, free inputs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ur_cartesian_driver.robot.rtde.state_recipe import REQUIRED_FIELDS
 
 #: Software that the robot program needs: sums of lists came with it.
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
-#: Outputs beside those of the driver's own recipe.
+#: Outputs beside the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
 #: Inputs that the driver writes, by what for.
 INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {

@@ -62,7 +62,7 @@ class ProgramSockets:
         #: It uses the buffered servo, whose keepalives are a third message.
         self.servo = False
         #: The program is paused and reads nothing. Keepalives pause too: a START must not queue
-        #: behind those of an hour.
+        #: behind an hour's keepalives.
         self.is_paused = False
         #: The robot reports that no program runs: the client that holds the sockets is dead, for
         #: instance behind a cut cable, and another one may replace it.

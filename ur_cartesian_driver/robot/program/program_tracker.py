@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Whose program runs on the robot, and whether it reads what it is sent."""
+"""Whose program runs on the robot, and whether it reads messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ IDENTITY_TIMEOUT = 0.5
 
 
 class ProgramTracker:
-    """Compares what the robot reports with the sockets that its program holds."""
+    """Compares the robot's reports with the sockets that its program holds."""
 
     def __init__(self, sockets: ProgramSockets) -> None:
         """Begin with no program."""
@@ -58,7 +58,7 @@ class ProgramTracker:
         return self.is_own
 
     def observe(self, robot: RobotState) -> None:
-        """Take what the robot reports; hang up on a program that has ended without a word."""
+        """Take a report; hang up on a program that has ended without a word."""
         sockets = self._sockets
         sockets.ended = ended = has_ended(robot)
         if not (sockets.connected and ended):
@@ -92,7 +92,7 @@ class ProgramTracker:
         )
 
     def reads(self, robot: RobotState | None) -> bool:
-        """Tell whether the program would act now on what it is sent."""
+        """Tell whether the program would act on a message now."""
         return (
             robot is not None
             and self._sockets.connected

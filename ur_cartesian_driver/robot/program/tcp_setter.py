@@ -65,7 +65,7 @@ class TemporaryTcpSetter:
             self._primary.send(primary.encode_program(program), is_wanted)
 
     def program_lost(self) -> None:
-        """Forget what the robot program remembered: it is gone."""
+        """Forget the TCP that the robot program remembered: the program is gone."""
         self._program_remembers = False
 
     def _send(self, T_flange_tcp: Pose, persistence: TcpPersistence) -> None:

@@ -7,7 +7,7 @@ Inputs belong to the client that requested them, so they are held only while the
 controller frees the inputs of a client (maybe of the goal before) when it finds the connection
 closed; until then the request is repeated for a short while.
 
-What the program reports in registers arrives on the same connection, so the packets of other goals
+The program reports in registers arrives on the same connection, so the packets of other goals
 stay as they are.
 """
 
@@ -47,7 +47,7 @@ OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegisterExchange:
-    """What is reported and written on a connection, by the names of RTDE, and who takes it."""
+    """The outputs and inputs of a connection, by the names of RTDE, and their taker."""
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -138,7 +138,7 @@ class _Attempt(RtdeConnection):
 
 
 def servo_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
-    """Return what is exchanged with the buffered servo."""
+    """Return the registers of the buffered servo."""
     effective_speed = EffectiveSpeed()
     return RegisterExchange(
         outputs=SERVO_FIELDS,
@@ -150,7 +150,7 @@ def servo_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
 
 
 def offset_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
-    """Return what is exchanged with a trajectory whose path may give way."""
+    """Return the registers of a trajectory with path offsets."""
 
     def take(values: Sequence[Any]) -> None:
         sequence, *numbers = values

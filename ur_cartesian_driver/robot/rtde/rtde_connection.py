@@ -19,7 +19,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
-#: How long the robot may take to agree on what it streams [s].
+#: Longest time for the handshake about the streamed fields [s].
 ANSWER_TIMEOUT = 2.0
 #: A robot that streams nothing for that long is lost [s].
 SILENCE_TIMEOUT = 1.0
@@ -124,7 +124,7 @@ class RtdeConnection:
         self._send_request(self._client.data_to_send())
 
     def _send_request(self, data: bytes) -> None:
-        """Send what the handshake asks next, if anything."""
+        """Send the next request of the handshake, if any."""
         if data:
             self._last_request = asyncio.get_running_loop().time()
             self._connection.send(data)

@@ -93,7 +93,7 @@ class SignalStream:
 
 
 def signals_from_rtde(values: Mapping[str, Any]) -> Signals:
-    """Return the snapshot of one data package, given by those of the names above that it has."""
+    """Return the snapshot of one data package, which has some of the names above."""
     types, tool_types = values.get('analog_io_types', 0), values.get('tool_analog_input_types', 0)
 
     def pair(name: str, domains: int) -> tuple[AnalogChannel, AnalogChannel]:

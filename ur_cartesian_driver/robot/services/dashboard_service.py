@@ -38,7 +38,7 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: How long the robot may take to do what it is asked for [s]: powering up takes a while.
+#: Longest time for a command to take effect [s]: powering up takes a while.
 POWER_TIMEOUT = 30.0
 EFFECT_TIMEOUT = 5.0
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Wait until a robot reports something, and describe what it reports."""
+"""Wait until a robot reports a condition, and describe its modes."""
 
 from __future__ import annotations
 

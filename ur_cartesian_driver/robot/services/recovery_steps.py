@@ -111,8 +111,8 @@ class RecoverySituation:
     """
     Input of :func:`next_step`.
 
-    :param message: of the status: what is needed.
-    :param robot: what the robot reported last; None = nothing.
+    :param message: of the status: the next step.
+    :param robot: its newest state; None = none.
     :param program_connected: our program holds its sockets.
     :param headless: we upload the program; else a program on the robot requests it.
     :param remote_control: whether clients may control the robot; None = it cannot be known.

@@ -58,7 +58,7 @@ class RobotApiConnection:
         """
         Give a command and return the answer.
 
-        :raises OSError: the Robot API does not answer, or does not do what it accepted.
+        :raises OSError: the Robot API does not answer, or ignores a request that it accepted.
         :raises ProtocolError: it answers nonsense, or does not have the command.
         """
         api_command = find_command(command, self._version)

@@ -40,7 +40,7 @@ RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputWrite:
     """
-    What is written, and how its effect is recognised.
+    Values to write, and the condition by which their effect is recognised.
 
     :param inputs: values by the names of RTDE inputs.
     :param outputs: names of the RTDE outputs that show the effect.
@@ -86,7 +86,7 @@ def joint_write(calls: Sequence[SetOutputCall]) -> InputWrite:
 
 
 def value_before(call: SetOutputCall, values: Mapping[str, Any]) -> SetOutputCall:
-    """Return the call that sets an output to what the RTDE outputs of its write report."""
+    """Return the call that sets an output to the values that RTDE reports after its write."""
     if not call.is_analog:
         _, first_bit = _DIGITAL[call.kind]
         bit = values['actual_digital_output_bits'] >> (first_bit + call.pin) & 1

@@ -57,7 +57,7 @@ class ScriptRunner:
         self._is_running = False
 
     async def run(self, call: RunScriptCall) -> ServiceAnswer:
-        """Run a script, and tell what the robot says of it."""
+        """Run a script, and answer with the robot's reaction."""
         try:
             kind = await _kind(call.script)
         except CompileError as error:

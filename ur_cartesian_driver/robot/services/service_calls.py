@@ -107,7 +107,7 @@ class SetTcpCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPayloadCall:
-    """Set mass [kg] and centre of gravity [m] (in the flange frame) of what the flange carries."""
+    """Set mass [kg] and centre of gravity [m] (in the flange frame) of the load on the flange."""
 
     mass: float
     cog: Vector3 = (0.0, 0.0, 0.0)

@@ -90,7 +90,7 @@ class GoalServer:
 
     @property
     def frames(self) -> Frames:
-        """The frames in which goals are given, those of tf2 included."""
+        """The frames of goals, also from tf2."""
         return self._context.frames
 
     @property

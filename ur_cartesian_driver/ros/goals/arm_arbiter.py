@@ -50,7 +50,7 @@ class ArmArbiter:
 
     @property
     def release_count(self) -> int:
-        """How often the arm was released: it may have moved each time."""
+        """The number of releases of the arm: it may have moved at each."""
         return self._release_count
 
     @property

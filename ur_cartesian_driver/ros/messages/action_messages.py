@@ -32,7 +32,7 @@ MAX_REPORT_LINES = 10_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FeedbackFrame:
-    """What all feedback messages of a goal share."""
+    """The constant part of a goal's feedback messages."""
 
     frame_id: str
     controlled_frame: str
@@ -123,7 +123,7 @@ def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
 
 
 def _report(lines: Sequence[str]) -> list[str]:
-    """Return the first and the last lines of a report: nobody reads those of 100,000 segments."""
+    """Return the first and the last lines of a report: nobody reads 100,000 segments."""
     left_out = len(lines) - MAX_REPORT_LINES
     if left_out <= 0:
         return list(lines)

@@ -50,7 +50,7 @@ _AXES = (
 
 def plan_markers(plan: Plan, base: str, stamp: Time) -> MarkerArray:
     """
-    Return a plan as markers, which replace those of the plan before.
+    Return a plan as markers, which replace the markers of the plan before.
 
     Namespace ``path``: the path of the TCP, each piece in the colour of its motion; ``points``:
     the points of the goal; ``ends``: the axes of the TCP at the start and at the end.

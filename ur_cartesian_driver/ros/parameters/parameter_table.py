@@ -36,7 +36,7 @@ class ParameterError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ParameterDeclaration:
-    """One parameter: what it means, and which values it takes."""
+    """One parameter: its meaning and its values."""
 
     name: str
     description: str

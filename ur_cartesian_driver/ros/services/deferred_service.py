@@ -48,7 +48,7 @@ class DeferredService:
             callback_group=group or MutuallyExclusiveCallbackGroup(),
         )
         self._send_now = service.send_response
-        # The executor passes what the callback returned, and the request's header, to this method.
+        # The executor passes the callback's return value and the request's header to this method.
         service.send_response = self._send_when_done
 
     def _send_when_done(self, future: Future[Any], header: Any) -> None:

@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
-#: Time to wait for a transform [s]: that of this moment is published in the next.
+#: Time to wait for a transform [s]: the one for this moment is published in the next.
 LOOKUP_TIMEOUT = 0.5
 
 
@@ -49,7 +49,7 @@ class TransformLookup:
         """
         Use a buffer.
 
-        :param errors: what the buffer raises when it has no transform.
+        :param errors: the exceptions of a buffer that has no transform.
         :param now: the node's clock [ns].
         :param max_age: largest age of the newest transform of a frame [s].
         """

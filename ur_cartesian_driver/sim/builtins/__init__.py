@@ -66,7 +66,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
 
 
 def controller_builtins(controller: Controller) -> Builtins:
-    """Return all functions of a primary program, those of the language included."""
+    """Return all functions of a primary program, with the language's own."""
     found = dict(core_builtins())
     for group in BUILTIN_GROUPS:
         found |= group(controller).functions()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What all groups of functions have in common."""
+"""The common base of groups of functions."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
 
 
 def _reached(q: Vector6 | None, function: str) -> Vector6:
-    """Return the solution, or raise what the robot says when there is none."""
+    """Return the solution, or raise the robot's error when there is none."""
     if q is None:
         raise RuntimeException(
             'The robot cannot reach the requested pose. Script function '

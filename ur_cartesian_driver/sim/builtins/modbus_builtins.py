@@ -109,7 +109,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write a register, or those of a signal that has several."""
+        """Write one register, or all of a signal that has several."""
         signal = self._signal(signal_name)
         given = register_value if type(register_value) is list else [register_value]
         if len(given) != signal.registers_to_write:

@@ -116,7 +116,7 @@ class MotionBuiltins(BuiltinGroup):
         yield from self._run(lambda: self._motion.movec(via, to, a_, v_, radius, mode_), to)
 
     def optimovej(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
-        """Move in joint space with limited jerk, at fractions of what the joints can do."""
+        """Move in joint space with limited jerk, at fractions of the joints' limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._joints(goal, 'optimovej')
         yield from self._run(
@@ -124,7 +124,7 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
-        """Move straight in space with limited jerk, at fractions of what the joints can do."""
+        """Move straight in space with limited jerk, at fractions of the joints' limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
         yield from self._run(lambda: self._motion.optimovel(target, a_, v_, radius), target)

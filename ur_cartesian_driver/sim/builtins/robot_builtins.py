@@ -113,7 +113,7 @@ def _list_of(
 
 
 class RobotBuiltins(BuiltinGroup):
-    """What the robot measures [rad, m, s and their derivatives], and its payload."""
+    """The robot's measurements [rad, m, s and their derivatives], and its payload."""
 
     get_target_joint_positions = _list_of(lambda c: c.target.q)
     get_joint_positions = get_target_joint_positions  # the old name

@@ -38,7 +38,7 @@ MAX_ANSWER = 1024 * 1024
 
 
 class RpcBuiltins(BuiltinGroup):
-    """The factory; a program calls the methods of what it returns."""
+    """The factory; a program calls methods of the object that it returns."""
 
     def rpc_factory(self, type: Value, url: Value) -> RemoteObject:
         """Return the procedures of a server; nothing is sent before the first call."""

@@ -132,7 +132,7 @@ class SocketBuiltins(BuiltinGroup):
         interpret_escape: Value = False,
         timeout: Value = 2,
     ) -> Generator[None, None, str]:
-        """Read what is there, or what stands between a prefix and a suffix; '' for a timeout."""
+        """Read all received text, or the part between a prefix and a suffix; '' for a timeout."""
         before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
         data = yield from self._wait(socket_name, timeout, _between(before, after))
         return '' if data is None else data.decode('latin-1')

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The simulated controller as a command: its options, and what it prints.
+The simulated controller as a command: its options and its output.
 
 ``ur-cartesian sim`` is one command of many; :func:`main` is ``ur-controller-sim``, the command of
 the simulator when it is installed alone.

@@ -129,7 +129,7 @@ _DEVIATION: dict[str, Reader] = {
     'amount': _number('an amount'),
 }
 
-#: The first word of a fault: what it makes, and how the following words are read into its fields.
+#: The first word of a fault: its class, and how the following words are read into its fields.
 _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
     {
         **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What can go wrong with the simulated robot: each fault is a value that says what happens and when.
+The faults of the simulated robot: each is a value with its effect and its time.
 
 `fault_parser` reads faults from text; `injector` lets them happen.
 """
@@ -80,7 +80,7 @@ class LastingInterfaceFault(InterfaceFault):
 
 
 class FaultEvent(Enum):
-    """What another client, or a person at the robot, does to it."""
+    """An act of another client, or of a person at the robot."""
 
     PROTECTIVE_STOP = 'protective_stop'
     EMERGENCY_STOP = 'emergency_stop'

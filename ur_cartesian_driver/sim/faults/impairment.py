@@ -18,7 +18,7 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Impairment:
-    """What is wrong with all connections of an interface."""
+    """The faults of all connections of an interface."""
 
     #: Messages of the robot are lost.
     drops_outgoing: bool = False
@@ -94,7 +94,7 @@ class ImpairedConnection:
         """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
-        #: What holds back the bytes from the client, and those of the robot.
+        #: The delays of the client's bytes, and of the robot's.
         self.incoming, self.outgoing = DelayLine(now), DelayLine(now)
 
     @property

@@ -137,7 +137,7 @@ class FaultInjector:
         self._apply_running(self._controller.time)
 
     def step(self) -> None:
-        """Let happen what is due in this cycle."""
+        """Trigger the faults due in this cycle."""
         now = self._controller.time
         self._measure_path()
         due = [pending for pending in self._pending if self._is_due(pending, now)]
@@ -154,7 +154,7 @@ class FaultInjector:
     # When
 
     def _measure_path(self) -> None:
-        """Add what the TCP has moved; a change of the active TCP is no motion."""
+        """Add the motion of the TCP; a change of the active TCP is none."""
         vx, vy, vz, _, _, _ = self._controller.motion.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 

@@ -62,9 +62,9 @@ _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
 class DashboardHandlers:
     """
-    What the commands read and change: a controller, and its pendant.
+    The object that the commands act on: a controller, and its pendant.
 
-    A method carries out a command; it returns None, or another reply than that of success.
+    A method carries out a command; it returns None, or a reply other than success.
     """
 
     def __init__(self, controller: Controller) -> None:

@@ -5,7 +5,7 @@ One client of an interface that takes scripts: primary, secondary, real-time.
 
 All three take programs and commands. What they send differs; apart from the greeting, it goes to
 all clients. Whether a client may send is decided when it connects, and not again. Each has a
-read-only twin, which sends the same and ignores what it is sent.
+read-only twin, which sends the same and ignores its input.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class ScriptSession(ClientSession):
         self._uploads = UploadDecoder()
 
     def feed(self, data: bytes) -> bytes:
-        """Execute what is complete; answers go to all clients."""
+        """Execute complete programs; answers go to all clients."""
         for item in self._uploads.feed(data):
             may_send = self._may_send and self._controller.takes_scripts
             execute_command(self._controller, item, may_send=may_send)
@@ -47,9 +47,9 @@ class ReadOnlySession(ClientSession):
 
     def __init__(self, greeting: bytes) -> None:
         """
-        Ignore what the client sends.
+        Ignore the client's messages.
 
-        :param greeting: what the interface begins with.
+        :param greeting: the first bytes of the interface.
         """
         self._greeting = greeting
 

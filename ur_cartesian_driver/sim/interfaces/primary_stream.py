@@ -58,7 +58,7 @@ NO_TIMESTAMP = 2**64 - 1
 STATE_RATE = 10.0
 #: Joint acceleration limit that is reported [rad/s^2], as by a recorded UR5e.
 _JOINT_ACCELERATION = 40.0
-#: By the type of the robot; those of others are not known.
+#: By the type of the robot; others are not known.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: Limit of an endless joint on the wire, which has no infinity [rad].
@@ -81,7 +81,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """What all clients get: messages at once, states at their rate and at a new safety mode."""
+    """Stream to all clients: messages at once, states at their rate and at a new safety mode."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""
@@ -142,7 +142,7 @@ def _mode(controller: Controller) -> RobotModeData:
 
 
 def _outputs(controller: Controller, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return fields whose values are those of RTDE outputs, so that the interfaces agree."""
+    """Return fields that take their values from RTDE outputs, so that the interfaces agree."""
     return {
         field: COMPUTED[name](controller) if name in COMPUTED else FIXED[name]
         for field, name in names.items()

@@ -65,7 +65,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """An answer that is due when the robot has done what it was asked for."""
+    """An answer that is due when the robot has carried out the request."""
 
     is_done: Callable[[Controller], bool]
     message: str
@@ -225,7 +225,7 @@ def _openapi(controller: Controller, _: Body) -> Fields:
     return {'openapi': '3.1.0', 'info': {'title': 'Robot API', 'version': number}}
 
 
-#: Method and path below BASE_PATH: the first software that has it, and what it does.
+#: Method and path below BASE_PATH: the first software that has it, and its effect.
 _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
     {
         ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How each RTDE output is computed in the simulated controller.
+The values of the RTDE outputs in the simulated controller.
 
 Actual values equal the targets, unless the arm gives way, is imperfect, or a fault makes them
 differ. Links weigh nothing; only the payload does. Outputs that would need more (temperatures,

@@ -39,7 +39,7 @@ class ClientSession(ABC):
     """One client's conversation."""
 
     def open(self) -> bytes:
-        """Return what is sent unasked at the start: by default nothing, the client begins."""
+        """Return the bytes sent unasked at the start: by default none, the client begins."""
         return b''
 
     @abstractmethod
@@ -52,7 +52,7 @@ class ClientSession(ABC):
         """
 
     def close(self) -> None:  # noqa: B027  # most sessions hold nothing
-        """Give back what the client held: by default nothing."""
+        """Release the client's resources: by default none."""
 
 
 S = TypeVar('S', bound=ClientSession)
@@ -87,7 +87,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._transport_reading(self._impaired.incoming.size < MAX_UNREAD_BYTES)
 
     def poll(self) -> None:
-        """Let the session answer what it could not answer at once."""
+        """Make the session answer requests that it could not answer at once."""
         self._handle_incoming(b'')
 
     def _transport_reading(self, wanted: bool) -> None:

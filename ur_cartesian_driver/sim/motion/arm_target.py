@@ -70,7 +70,7 @@ class ArmTarget:
 
     @property
     def tcp_is_active(self) -> bool:
-        """Whether the TCP is that of the running motion."""
+        """Whether the TCP belongs to the running motion."""
         return self._active_tcp is self._T_flange_tcp
 
     @property

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the tool of a simulated arm can touch: planes and boxes that push back as springs do."""
+"""Bodies in reach of a simulated arm's tool: planes and boxes that push back as springs."""
 
 from __future__ import annotations
 

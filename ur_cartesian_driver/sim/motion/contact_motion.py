@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How an arm gives way: to what its tool touches, and in the force mode of its controller.
+The compliance of an arm: to bodies that its tool touches, and in force mode.
 
 Neither law is published; these are ours, and simple. Where an axis is not compliant, the arm is a
 spring between its target and the tool. In force mode the tool moves along each compliant axis at a
@@ -59,14 +59,14 @@ class ForceMode:
     #: Axes of the task frame.
     q_base_task: Quaternion
     compliant: tuple[bool, ...]
-    #: What the tool applies along compliant axes [N, Nm].
+    #: Forces of the tool along compliant axes [N, Nm].
     wrench: Vector6
     #: Speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
     limits: Vector6
 
 
 class ArmState(NamedTuple):
-    """Where an arm is, and how it moves."""
+    """Place and motion of an arm."""
 
     q: Vector6
     qd: Vector6
@@ -78,7 +78,7 @@ class ContactMotion:
     """
     The deviation of the tool from its target, and the force on it; `step` once per cycle.
 
-    :param bodies: what it can touch.
+    :param bodies: the bodies that it can touch.
     """
 
     def __init__(self, motion: MotionGenerator, bodies: Sequence[ContactBody]) -> None:
@@ -89,13 +89,13 @@ class ContactMotion:
         self.force_mode: ForceMode | None = None
         #: Scale of the compliance, as a program sets it.
         self.gain_scaling = 1.0
-        #: What the environment applies to the TCP, in base axes [N, Nm].
+        #: Forces of the environment on the TCP, in base axes [N, Nm].
         self.wrench: Vector6 = ZERO6
         #: Deviation from the target and its rate, in base axes [m, rad]; None = none.
         self.deviation: Vector6 | None = None
         self.twist: Vector6 | None = None
         #: The target with what force mode adds to it: joints [rad], their speeds [rad/s], the TCP
-        #: and its twist; None = that of the program.
+        #: and its twist; None = the program's.
         self.target: ArmState | None = None
         #: Why the arm has to stop.
         self.fault: MotionFault | None = None
@@ -161,7 +161,7 @@ class ContactMotion:
             )
 
     def _contact(self, deviation: Vector6) -> Vector6:
-        """Return what the bodies apply to the TCP."""
+        """Return the force of the bodies on the TCP."""
         force: Vector3 = (0.0, 0.0, 0.0)
         if self.bodies:
             dx, dy, dz, *_ = deviation
@@ -185,7 +185,7 @@ class ContactMotion:
         to_task, to_base = conjugate(mode.q_base_task), mode.q_base_task
         yielded, bent = turned(to_task, self._yielded), turned(to_task, self._bent)
         applied = turned(to_task, self.measured)
-        # What is bent along a compliant axis when force mode begins stays as it is.
+        # A deflection along a compliant axis when force mode begins stays as it is.
         # Along the others the tool comes back to the path of the program, if the frame turns.
         kept = 1.0 - self._share
         yielded = vector6(
@@ -216,7 +216,7 @@ class ContactMotion:
         self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
 
     def _yielding_target(self, rate: float) -> ArmState | None:
-        """Return the target with what the tool has given way; None where the arm cannot be."""
+        """Return the target displaced by compliance; None where the arm cannot be."""
         motion, before = self._motion, self.target
         target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
         pose = Pose(

@@ -67,7 +67,7 @@ _BASE_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 class ControllerPathOffset:
     """
-    What a program adds to the target of its motion.
+    The offset that a program adds to the target of its motion.
 
     :param motion_target: the target without an offset.
     """
@@ -83,7 +83,7 @@ class ControllerPathOffset:
         self._frame, self._wanted, self._applied = BASE, ZERO6, ZERO6
         #: The axes of the frame MOTION in the base; None before the first motion.
         self._axes: Axes | None = None
-        #: By how much the joints differ from those of the motion, and how fast [rad, rad/s].
+        #: Displacement of the joints from the motion, and its rate [rad, rad/s].
         self._change, self._change_rate = ZERO6, ZERO6
 
     @property
@@ -124,7 +124,7 @@ class ControllerPathOffset:
         self.end_displacement()
 
     def end_displacement(self) -> None:
-        """Let the motion go on from where the arm is; what is wanted may be applied again."""
+        """Continue the motion from the arm's place; the wanted offset can be applied again."""
         target = self.target
         if target is not None:
             self._motion.take_over(target)

@@ -38,7 +38,7 @@ _BACK_OFF = 50
 
 
 class CycleStep(NamedTuple):
-    """Where a motion has got to, and the time of its own that it took [s]."""
+    """The progress of a motion, and the time of its own that it took [s]."""
 
     q: Vector6
     pose: Pose

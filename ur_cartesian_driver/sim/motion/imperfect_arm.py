@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
-#: What is left of friction and ringing when nothing more is computed [rad], [rad/s].
+#: Remainder of friction and ringing at which the computation ends [rad], [rad/s].
 _RESIDUE = 1e-8
 #: After how many cycles the noise repeats, and by how many the quantities are apart in it.
 _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
@@ -29,7 +29,7 @@ _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imperfections:
     """
-    How far an arm and its controller are from what they should be; the defaults are an e-Series.
+    The imperfections of an arm and its controller; the defaults are an e-Series.
 
     "Recorded" are figures of recordings of real arms; the rest is assumed.
     """
@@ -88,7 +88,7 @@ def typical_imperfections(model: RobotModel, seed: int = 1) -> Imperfections:
 
 
 class Motion(Protocol):
-    """Where an arm is and how it moves, in base axes."""
+    """Place and motion of an arm, in base axes."""
 
     @property
     def q(self) -> Vector6:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the joints can do: inverse kinematics, speed and position limits, singularities."""
+"""The abilities of the joints: inverse kinematics, speed and position limits, singularities."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ class MotionGenerator:
 
     @property
     def warnings(self) -> list[MotionWarning]:
-        """What the controller has not reported yet."""
+        """Reports that the controller has not sent yet."""
         return self._reports.warnings
 
     # -- path moves --------------------------------------------------------------------------
@@ -222,13 +222,13 @@ class MotionGenerator:
         )
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
-        """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
+        """Like movej with limited jerk; a, v fractions in (0, 1] of the joints' limits."""
         check_fractions('optimovej', a, v)
         move_path = self._joint_path('optimovej', q)
         return self._start_path('optimovej', move_path, self._fastest(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
-        """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
+        """Like movel with limited jerk; a, v fractions in (0, 1] of the joints' limits."""
         check_fractions('optimovel', a, v)
         return self._start_path('optimovel', _linear_path(T_base_tcp), self._fastest(a, v), r)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which thread of a program moves the arm.
+Ownership of the arm among the threads of a program.
 
 One thread owns the motion: from its first motion call until it ends, or until the arm stands and
 the thread is in no motion call. Meanwhile a motion call of any other thread, a stop included, ends
@@ -36,7 +36,7 @@ class FreedriveState(Enum):
 
 
 class MotionOwnership:
-    """Which thread moves the arm."""
+    """The thread that moves the arm."""
 
     def __init__(self, motion: MotionGenerator) -> None:
         """Begin without an owner."""

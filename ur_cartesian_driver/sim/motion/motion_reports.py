@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the motion generator reports: error codes as the controller writes them."""
+"""Reports of the motion generator: error codes as the controller writes them."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class RunningMotion:
         self._target = target
         self.motion: Motion | None = None
         self.move: Move | None = None
-        #: The speed scaling of the last cycle: what was asked for, and what the arm could follow.
+        #: The speed scaling of the last cycle: requested, and followed by the arm.
         self.scale = self.rate = 1.0
 
     @property

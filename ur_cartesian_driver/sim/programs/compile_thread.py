@@ -4,8 +4,8 @@
 Compiles programs beside the controller's cycle.
 
 Compiling takes some 7 us a byte, so a large program would keep the controller from its cycles for
-seconds. A thread does it, one program after the other. What is done with a compiled program is
-done in the event loop, between two cycles.
+seconds. A thread does it, one program after the other. Compiled programs are
+used in the event loop, between two cycles.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class CompileThread:
 
     def close(self) -> None:
         """
-        End the thread after what it is compiling, without waiting; nothing follows from that.
+        End the thread after the program that it compiles, without waiting.
 
         To be called in the event loop.
         """

@@ -124,7 +124,7 @@ class InterpreterMode:
         Execute statements until one, or another thread, ends the mode.
 
         :param clear_queue: discard the statements that have been waiting.
-        :param clear_on_end: delete what the statements have defined when the mode ends.
+        :param clear_on_end: delete the statements' definitions when the mode ends.
         :raises RuntimeException: not in the main thread, or inside a statement.
         """
         interpreter = self._programs.interpreter

@@ -68,7 +68,7 @@ class UploadDecoder:
         self._skipping = False
 
     def feed(self, data: bytes) -> list[UploadedItem]:
-        """Return what is complete now; of what is too long, once that it is."""
+        """Return complete programs; report one that is too long once."""
         *lines, self._rest = (self._rest + data).split(b'\n')
         found = [item for line in lines if (item := self._line(line)) is not None]
         if self._size + len(self._rest) > MAX_UPLOAD_SIZE:
@@ -113,5 +113,5 @@ def _block_balance(line: str) -> int:
     try:
         words = [token.text for token in scan(line) if token.kind is TokenKind.KEYWORD]
     except CompileError:
-        return 0  # the compiler will say what is wrong
+        return 0  # the compiler will report the fault
     return sum(word in _BLOCKS for word in words) - words.count('end')

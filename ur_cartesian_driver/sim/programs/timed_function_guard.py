@@ -34,7 +34,7 @@ def _without_time(name: str, function: Any) -> Any:
             raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
         next(function(*arguments, **named))
 
-    # The signature stays that of the function; what counts as a generator must not.
+    # The function's signature stays; its mark as a generator must not.
     act_or_refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
         function
     )

@@ -32,7 +32,7 @@ class ScriptSockets(Protocol):
         """Return the state; CLOSED if the name is unknown or the peer has closed."""
 
     def received(self, name: str) -> bytearray:
-        """Return what has arrived and is unread; the reader deletes what it takes."""
+        """Return the unread bytes; the reader deletes those it takes."""
 
     def send(self, name: str, data: bytes) -> bool:
         """Send without waiting; tell whether the socket took it."""
@@ -61,7 +61,7 @@ class MemorySocket:
         self.incoming += data
 
     def take(self) -> bytes:
-        """Return and forget what the program has sent."""
+        """Return and forget the bytes sent by the program."""
         data = bytes(self.outgoing)
         self.outgoing.clear()
         return data
@@ -72,7 +72,7 @@ class MemorySocket:
 
 
 class MemorySockets:
-    """Connections to peers in this process: port -> what is called with each new connection."""
+    """Connections to peers in this process: port -> function called with each new connection."""
 
     def __init__(self) -> None:
         """Begin without listeners."""
@@ -97,7 +97,7 @@ class MemorySockets:
         return self._sockets[name].state if name in self._sockets else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
-        """Return what the peer has sent."""
+        """Return the bytes sent by the peer."""
         return self._sockets[name].incoming if name in self._sockets else bytearray()
 
     def send(self, name: str, data: bytes) -> bool:

@@ -91,7 +91,7 @@ class _ScriptConnection:
                 self._on_data(self._port, data)
 
     def send(self, data: bytes) -> bool:
-        """Send; keep what the kernel does not take. False if too much is kept already."""
+        """Send; keep bytes that the kernel does not take. False if too many are kept already."""
         if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
             return False
         self._outgoing += data

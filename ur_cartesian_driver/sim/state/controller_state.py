@@ -33,7 +33,7 @@ class Popup:
 
 @dataclass(slots=True, kw_only=True)
 class Pendant:
-    """What dashboard clients set on the pendant, for all of them."""
+    """Settings of the pendant by dashboard clients, for all of them."""
 
     user_role: str = 'PROGRAMMER'
     #: NONE: no client controls it.

@@ -6,7 +6,7 @@ Power and safety of the simulated arm, as two tables.
 Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each step takes time; a
 command only sets the goal. Power goes off at once.
 
-The safety system is a second state machine. The controller carries out what it demands: a
+The safety system is a second state machine. The controller carries out its demands: a
 protective stop brakes the arm on its path and pauses the program, an emergency stop does the same
 and then cuts the power (a category 1 stop), a violation or fault cuts the power at once.
 """

@@ -40,7 +40,7 @@ _TOKEN = re.compile(
 
 
 class TokenKind(Enum):
-    """What a token is."""
+    """The kinds of tokens."""
 
     NAME = 'name'
     KEYWORD = 'keyword'

@@ -16,7 +16,7 @@ from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
 
 class PathStart(NamedTuple):
-    """Where a path begins: joint positions [rad], and T_base_tcp."""
+    """The begin of a path: joint positions [rad], and T_base_tcp."""
 
     q: Vector6
     pose: Pose

@@ -162,7 +162,7 @@ class CircularMovePath:
 
     Unconstrained, the orientation takes the shortest rotation from start to end, whatever it is
     at ``via``, and counts in the length as on a line. Fixed, it stays as it is relative to the
-    tangent, and the end's orientation is ignored; the length is that of the arc.
+    tangent, and the end's orientation is ignored; the length is the arc's.
 
     :raises MotionError: the three points do not lie on a circle.
     """

@@ -101,7 +101,7 @@ class PathSection:
 @dataclass(frozen=True, slots=True)
 class LastMove:
     """
-    The last move, and what the next one needs to be blended into it.
+    The last move, and the values needed to blend the next one into it.
 
     :param entry: time of its profile at which its blend begins; its end without a blend.
     """
@@ -182,7 +182,7 @@ def start_from_rest(
     """
     Return the motion along one path, from rest to rest.
 
-    :param spare: what the move before has left of the last cycle [s].
+    :param spare: time of the last cycle that the move before has left [s].
     """
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
@@ -204,7 +204,7 @@ def append_move_path(
     The blend begins at the blend radius, or where the arm is if the call comes late, and ends as
     far behind the waypoint. There is no blend if the arm already stands, or if the new path does
     not leave the blend radius: then the arm stops at the waypoint. (Both moves share the speed
-    through the blend, and a short one would be driven at that of the other.)
+    through the blend, and a short one would be driven at the other's speed.)
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -240,7 +240,7 @@ def _blend_head(
     """
     Return how much of the new path the blend covers; None = no blend.
 
-    :param tail: what is left of the last path at the entry; ``speed``: there.
+    :param tail: the rest of the last path at the entry; ``speed``: there.
     """
     if speed <= _MIN_SPEED or tail <= _MIN_SPEED:
         return None

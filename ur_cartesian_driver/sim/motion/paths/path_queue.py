@@ -35,7 +35,7 @@ _TOUCHING = 1e-9
 
 
 class _Overlap(NamedTuple):
-    """What was before a waypoint that is skipped if another move follows at once."""
+    """The state before a waypoint that is skipped if another move follows at once."""
 
     before: PathMotion | None
     after_movep: bool
@@ -53,7 +53,7 @@ class PathQueue:
         #: Whether the last path move is a movep.
         self._after_movep = False
         self._overlap: _Overlap | None = None
-        #: What the move that has just ended has left of its cycle [s]: a move that follows at once
+        #: Time that the last move left of its cycle [s]: a move that follows at once
         #: begins that much earlier, so that moves are not rounded to cycles.
         self._spare = 0.0
 
