@@ -66,7 +66,7 @@ class ErrorCode(IntEnum):
 class DriverError(Exception):
     """The root of all errors of this package; the text is one sentence for the user."""
 
-    #: What the action reports for this error.
+    #: The action's code for this error.
     code: ClassVar[ErrorCode]
     #: The report of the goal that failed, where the error was raised from its outcome.
     report: tuple[str, ...] = ()
@@ -96,7 +96,7 @@ class InvalidGoal(GoalRefused):
         Build the sentence.
 
         :param field: where, for example ``trajectory.points[2].pose.orientation``.
-        :param problem: what is wrong there, with value and bound.
+        :param problem: the fault there, with value and bound.
         :param remedy: what to do.
         """
         super().__init__(f'{field} {problem}' + (f'; {remedy}.' if remedy else '.'))
@@ -115,7 +115,7 @@ class AlreadySent(InvalidGoal):
     first_time = 0.0
 
     def __init__(self, first_point: int, first_time: float) -> None:
-        """Take what can be replaced; the time counts as those of points [s]."""
+        """Take the replaceable tail; its time counts as the points' [s]."""
         DriverError.__init__(
             self,
             'What is to be replaced has been sent to the robot; replace from point '
@@ -171,7 +171,7 @@ class CollisionPredicted(GoalRefused):
 
 
 class RobotNotReady(GoalRefused):
-    """The robot cannot take a goal now; the text says what it needs."""
+    """The robot cannot take a goal now; the text names the next step."""
 
     code = ErrorCode.ROBOT_NOT_READY
 

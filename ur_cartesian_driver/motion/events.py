@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 
 class TrajectoryResult(IntEnum):
-    """How the robot program reports the end of a trajectory; the numbers on the wire."""
+    """The robot program's report of the end of a trajectory; the numbers on the wire."""
 
     SUCCESS = 0
     CANCELED = 1
@@ -117,9 +117,9 @@ Event: TypeAlias = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
     """
-    How far a running motion is.
+    The progress of a running motion.
 
-    Poses, twists and accelerations are those of the controlled frame, in the robot's base.
+    Poses, twists and accelerations of the controlled frame, in the robot's base.
     """
 
     #: Index of the waypoint that the tool moves to.
@@ -170,7 +170,7 @@ class PathPlace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a goal ended: a code, a sentence, and the report."""
+    """The end of a goal: a code, a sentence, and the report."""
 
     code: ErrorCode
     text: str

@@ -51,7 +51,7 @@ def unknown_speed_remark(goal: Goal, blends: Sequence[int], free: Sequence[int])
     Return the remark on what a demand does not hold for.
 
     :param blends: the points with blends.
-    :param free: those of joint and OPTIMIZED motions.
+    :param free: the points of joint and OPTIMIZED motions.
     """
     parts = [
         f'in the blends at {name_points(blends)}, where the robot chooses its speed'

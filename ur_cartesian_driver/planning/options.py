@@ -46,7 +46,7 @@ _POSITIVE = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanningOptions:
     """
-    The parameters of planning; the defaults are those of ``config/driver.yaml``.
+    The parameters of planning, with the defaults of ``config/driver.yaml``.
 
     :raises ValueError: an option is not in its range.
     """

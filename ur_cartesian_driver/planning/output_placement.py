@@ -5,7 +5,7 @@ Outputs during a motion: place the commands of a goal as records behind the righ
 
 The robot program reads a record when the motion before it returns, at its stop or where its blend
 begins, and switches the output when the tool reaches the trigger pose. So the time of a command
-(that of its point plus its offset) becomes a trigger pose on the planned path, and the record
+(of its point, plus its offset) becomes a trigger pose on the planned path, and the record
 stands behind the last motion that has returned by then. A slower robot switches at the same poses.
 """
 
@@ -59,8 +59,8 @@ def place_outputs(
     """
     Return the segments with the outputs that are switched during the motion, in order of time.
 
-    :param reference: the path of the TCP; its times are those of the segments.
-    :param commands: their waypoints are numbered as those of the segments.
+    :param reference: the path of the TCP, with the times of the segments.
+    :param commands: their waypoints are numbered as the segments are.
     :param blend_halves: the time in the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal to a plan: choose the primitives, and refuse what the arm cannot do.
+From a goal to a plan: choose the primitives, and refuse goals that the arm cannot execute.
 
 :func:`plan` checks a goal as far as that needs no robot
 (:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses it for the TCP with which
@@ -203,7 +203,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
 def _planned_rows(
     paths: JointPathPlanner, geometries: SegmentGeometries, timings: SegmentTimings
 ) -> PlannedRows:
-    """Return the primitive of each segment and what is expected of it."""
+    """Return the primitive of each segment and its expected path and time."""
     curves, begin = geometries.path.curves, geometries.begin
     moves = segment_primitives(paths, geometries, timings)
     return PlannedRows(

@@ -6,7 +6,7 @@ The states from which goals are planned: an arm at rest, and a moving one after 
 A goal that preempts another one is checked from where the arm comes to rest.
 
 The robot program stops the arm along its joints (``stopj``): the leading joint brakes evenly and
-the others in proportion, so each travels half of what it would have travelled in the time of
+the others in proportion, so each travels half the way it would have travelled in the time of
 the stop. The prediction assumes that the stop begins now. The arm moves on while the goal is
 checked, for an unknown time; so a goal that passes is planned again when the arm is at rest.
 """

@@ -3,7 +3,7 @@
 """
 Polynomials between two states, in rows: of the tool, of its turn, and of the joints.
 
-Coefficients are (n, 6 powers, k quantities), those of the time since the piece began.
+Coefficients are (n, 6 powers, k quantities), of the time since the piece began.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
-#: One number, or those of a batch.
+#: One number, or the numbers of a batch.
 N = TypeVar('N', float, NDArray[np.float64])
 
 _SMALL_ANGLE = 1e-9

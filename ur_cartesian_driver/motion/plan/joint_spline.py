@@ -4,7 +4,7 @@
 Joint positions over time, as the polynomials that the robot evaluates too.
 
 Each piece is fixed by positions, velocities and accelerations at its two ends (quintic), or by
-positions and velocities (cubic). So what is planned, sent, streamed as set-points and drawn is one
+positions and velocities (cubic). So the planned, sent, streamed as set-points and drawn is one
 curve.
 """
 

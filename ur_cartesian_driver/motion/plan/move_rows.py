@@ -134,7 +134,7 @@ def has_optimized(primitives: Sequence[Primitive]) -> bool:
 
 
 def stops(primitives: Sequence[Primitive]) -> dict[int, Stop]:
-    """Return by row what is done where the arm stands."""
+    """Return the actions where the arm stands, by row."""
     if isinstance(primitives, SplineRows | MoveRows):
         return {}
     return {row: each for row, each in enumerate(primitives) if isinstance(each, Stop)}

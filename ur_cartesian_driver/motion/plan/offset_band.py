@@ -3,7 +3,7 @@
 """
 The band in which a path may give way, and the frame of the path.
 
-The frame is that of the controller's own path offsets (``path_offset_set``, type MOTION): *along*
+The controller's own path offsets have the same frame (``path_offset_set``, type MOTION): *along*
 is the tangent of the path, *across* = along x the z axis of the tool, *normal* = along x across.
 For a tool whose z axis points into the work, normal points out of it.
 """
@@ -24,7 +24,7 @@ OFFSET_AXES = ('along', 'across', 'normal')
 
 
 class AppliedOffset(NamedTuple):
-    """How far the tool is off the path of the goal, because the path has given way."""
+    """The displacement of the tool from the path of the goal by path offsets."""
 
     #: In the base [m].
     shift: Vector3 = ZERO3
@@ -42,14 +42,14 @@ class OffsetFeedback:
 
     #: The last sequence number that it has read.
     last_sequence: int
-    #: Along, across, normal; and what the controller applies, in the base [m].
+    #: Along, across, normal; and the offset that the controller applies, in the base [m].
     offset: Vector3
     shift: Vector3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OffsetBand:
-    """How far a path may give way, and where."""
+    """The limits of path offsets, and their place."""
 
     #: Along, across, normal [m].
     limits: Vector3

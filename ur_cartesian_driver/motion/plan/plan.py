@@ -95,7 +95,7 @@ _NO_BLEND = BlendEntry(0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedSegment:
-    """One primitive and what is expected of it."""
+    """One primitive and its expected path and time."""
 
     primitive: Primitive
     #: Index of the waypoint at its end.
@@ -160,7 +160,7 @@ class PlannedRows(Rows[PlannedSegment]):
     #: (n, 6)
     joints: NDArray[np.float64]
     primitives: Sequence[Primitive]
-    #: Lines of the report, and what the outputs add to some of them.
+    #: Lines of the report, and the outputs' additions to some of them.
     report_lines: Sequence[str]
     notes: Mapping[int, str] = field(default_factory=dict)
     #: By row, those that follow it.
@@ -188,7 +188,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def records(self) -> NDArray[np.intp]:
-        """How many records each has on the wire (n,): its primitive and its outputs."""
+        """The number of records of each on the wire (n,): its primitive and its outputs."""
         counts = np.ones(len(self), dtype=np.intp)
         for row, outputs in self.outputs.items():
             counts[row] += len(outputs)
@@ -246,9 +246,9 @@ class Plan:
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: Where the path may give way; None = nowhere.
     offset_band: OffsetBand | None = None
-    #: Those of a joint goal; None where the goal is Cartesian.
+    #: The joints of a joint goal; None where the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
-    #: What is ignored, slowed or changed, and remarks on the whole goal.
+    #: Ignored, slowed or changed requests, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
     #: Finds where the tool is slower than asked: long goals have many such stretches.
     find_slow_stretches: Callable[[], tuple[SlowStretch, ...]] = field(default=tuple)

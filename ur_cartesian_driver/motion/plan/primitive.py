@@ -28,7 +28,7 @@ DEFAULT_ACCELERATION = 1.4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Move:
-    """What all motions to a target have."""
+    """The common part of all motions to a target."""
 
     target: Target
     velocity: float = DEFAULT_VELOCITY
@@ -188,7 +188,7 @@ class AwaitInput:
 
     @property
     def condition(self) -> str:
-        """What is waited for, as part of a sentence."""
+        """The awaited condition, as part of a sentence."""
         name = f'{self.input.name.lower().replace("_", " ")} input {self.pin}'
         if not self.input.is_analog:
             return f'{name} {"off" if self.below else "on"}'
@@ -224,7 +224,7 @@ class CallFunction:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressLaw:
     """
-    How the controller's force mode presses when it begins next.
+    The law of the controller's force mode when it begins next.
 
     :param wrench: that the tool applies along compliant axes [N, Nm].
     :param limits: speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
@@ -245,7 +245,7 @@ class BeginPress:
     Force mode begins, or only the watch for contact where no axis is compliant.
 
     :param T_base_task: the frame of the axes.
-    :param follows_tool: the frame is that of the TCP, in each cycle.
+    :param follows_tool: the frame is the TCP's, in each cycle.
     """
 
     T_base_task: Pose
@@ -258,7 +258,7 @@ class EndPress:
     """Force mode ends; the trajectory too where a contact was required and did not come."""
 
 
-#: What the robot program does while the arm stands; it counts each as a motion.
+#: An action of the robot program while the arm stands; it counts each as a motion.
 Stop: TypeAlias = (
     Wait | AwaitInput | ChangePayload | CallFunction | PressLaw | BeginPress | EndPress
 )

@@ -3,7 +3,7 @@
 """
 Stretches of a plan on which the tool is slower than the goal asks, and what would cure it.
 
-The speed that a goal asks for is that of its points (``velocity``, a twist, or the driver's
+The speed that a goal asks for is given by its points (``velocity``, a twist, or the driver's
 parameter), and with times the mean that they leave: length over time of each segment.
 """
 

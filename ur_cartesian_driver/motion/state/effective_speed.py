@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast the motion of the robot program runs, from what the controller reports about it.
+The speed scaling of the robot program's motion, from the controller's reports.
 
 The controller reports two factors. ``target_speed_fraction`` is the speed slider;
 ``speed_scaling`` is what slows the arm beside it, 1 in an undisturbed motion at any slider and 0

@@ -44,7 +44,7 @@ def shift_reference_point(state: RobotState, T_tcp_frame: Pose) -> RobotState:
     """
     Return the state as if a frame behind the TCP were the active TCP.
 
-    The wrench stays that of the TCP.
+    The wrench stays at the TCP.
     """
     if T_tcp_frame == IDENTITY:
         return state

@@ -115,7 +115,7 @@ class RobotState:
     This is the only table of these fields: what is read by RTDE, the shared memory and the
     ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come after
     the others, what the driver computes comes last. A field of the same name in DriverStatus.msg
-    shows it; the simulator computes what it sends.
+    shows it; the simulator computes its outputs.
     """
 
     #: The controller's clock [s].

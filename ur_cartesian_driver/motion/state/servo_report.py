@@ -14,7 +14,7 @@ UNKNOWN6: Vector6 = (nan,) * 6
 
 
 class ServoActivity(IntEnum):
-    """What the streaming is doing; the numbers of ``ServoState``."""
+    """The phase of the streaming; the numbers of ``ServoState``."""
 
     IDLE = 0
     FILLING = 1
@@ -51,7 +51,7 @@ class ServoFeedback:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoReport:
-    """How the streaming of set-points is going: what ``ServoState`` tells."""
+    """The progress of the streamed set-points, as ``ServoState`` tells it."""
 
     #: The controller's clock [s].
     timestamp: float

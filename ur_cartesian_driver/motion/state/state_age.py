@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How old the states of the robot are when they are read, and whether that is too old.
+The age of the robot's states when they are read, and its bound.
 
 A link that carries less than the robot sends does not break: packets queue up, arrive as regularly
 as before, and are older each time. The same happens to a process that is not given enough time.

@@ -183,7 +183,7 @@ class _PartPlanner:
         self._before, self._appended, self._arm, self._options = appendable, appended, arm, options
         self._T_flange_tcp = appendable.T_flange_tcp or appendable.T_flange_active
         self._segments = appended.segments or (Segment(),) * len(appended.waypoints)
-        #: The number of points with those of this part.
+        #: The number of points, including this part's.
         self._points = appendable.points + len(appended.waypoints)
 
     # -- motions of the robot --------------------------------------------------------------------
@@ -454,7 +454,7 @@ class _PartPlanner:
         if closing is not None:
             stop, path = closing
             pieces, reference = (*pieces, stop), _join_paths(reference, path)
-            # It leads to no point: what is due on it is due after the last one.
+            # It leads to no point: outputs due on it are due after the last one.
             segments.append(replace(stop, waypoint=stop.waypoint + 1))
         ends = _end_times(segments, start_time)
         due_commands = [

@@ -32,7 +32,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
 class Replacement(IntEnum):
-    """What appended points replace; values as in ``AppendPoints``."""
+    """The tail that appended points replace; values as in ``AppendPoints``."""
 
     APPEND = 0
     REPLACE_FROM_POINT = 1
@@ -114,8 +114,8 @@ class AppendableGoal:
     replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
     #: Commands that may not have switched yet, with the time at which they are due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
-    #: Of a spline: what is planned and not passed, in the order in which it was planned; each part
-    #: holds until the next one begins. And all commands on it.
+    #: Of a spline: the pieces planned and not passed, in the order of planning; each holds until
+    #: the next one begins. And all commands on it.
     parts: tuple[PlannedPart, ...] = ()
     commands: tuple[tuple[float, IOCommand], ...] = ()
 

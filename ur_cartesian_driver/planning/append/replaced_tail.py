@@ -26,7 +26,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 #: Pieces are not cut into shorter ones [s]: a cycle of the slowest controllers.
 MIN_PIECE_TIME = 0.008
-#: Passed pieces are kept for so long [s]: what is known of the arm may be old.
+#: Passed pieces are kept for so long [s]: the newest state of the arm can be old.
 HISTORY_TIME = 0.5
 # Time between the rows of the path of pieces that are sent again [s].
 _ROW_PERIOD = 0.004
@@ -87,7 +87,7 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
 
 def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
-    Return a goal without what is planned from a time on [s]; the same one if that is nothing.
+    Return a goal without the part planned from a time on [s]; the same one if there is none.
 
     :raises AlreadySent: the plan of that time is not known any more.
     """

@@ -4,7 +4,7 @@
 Choose the rotations of a goal whose tool may turn about an axis of its own.
 
 The result is the goal with the chosen orientations and without a free axis; it is planned and
-checked like any other. So what is searched here only has to be good, not exact: the search knows
+checked like any other. So the search here has to be good, not exact: the search knows
 the nominal arm, samples of the path, and no blends.
 """
 
@@ -417,7 +417,7 @@ class _FreePath:
         return replace(goal, waypoints=replace(goal.waypoints, postures=postures))
 
     def remark(self, goal: GoalTable, turns: Floats) -> str:
-        """Return what the report says about the choice."""
+        """Return the report's lines about the choice."""
         rows = np.flatnonzero(self.is_open)
         points = f'points {rows[0]} to {rows[-1]}' if len(rows) > 1 else f'point {rows[0]}'
         low, high = degrees(turns[rows].min()), degrees(turns[rows].max())

@@ -215,7 +215,7 @@ class RotationLattice:
         return found
 
     def along(self, rotations: Floats) -> Floats:
-        """Return the rotation (n,) at each sample, evenly between those of the layers."""
+        """Return the rotation (n,) at each sample, interpolated between the layers."""
         begins = [layer.begin for layer in self.layers]
         counts = np.diff([*begins, len(self.samples)])
         number = np.repeat(np.arange(len(begins)), counts)

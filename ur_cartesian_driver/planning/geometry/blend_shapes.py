@@ -35,7 +35,7 @@ _MIN_RADIUS = 1e-9
 
 
 def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
-    """Return the ``u`` of the first curve and that of the second at ``s`` of blends."""
+    """Return ``u`` of the first and of the second curve at ``s`` of blends."""
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
 

@@ -191,7 +191,7 @@ class JointLineCurve:
 
     @property
     def travel(self) -> Joints:
-        """How far each joint turns [rad], all >= 0."""
+        """The turn of each joint [rad], all >= 0."""
         return vector6(abs(y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
 
     @property

@@ -60,7 +60,7 @@ def first_least(values: Floats, segments: Ints) -> Integers:
     """
     Return the row of the least value of each segment, the first one if there are several.
 
-    :param segments: (n,) that of each value, not decreasing.
+    :param segments: (n,) the segment of each value, not decreasing.
     """
     begins = group_begins(segments)
     sizes = np.diff(begins, append=len(segments))

@@ -83,7 +83,7 @@ class JointPathPlanner:
     Plans the segments of one goal, one after the other, from the pose of the robot.
 
     :param targets: the poses of all waypoints in base (n, 7).
-    :param remarks: on what is changed or ignored; added to.
+    :param remarks: on changed or ignored fields; added to.
     :param reasons: by waypoint, for a primitive other than the plain one; added to.
     """
 
@@ -169,7 +169,7 @@ class JointPathPlanner:
         return stop
 
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
-        """Add what is solved from where the arm is, and move the arm to its end."""
+        """Add joints solved from the arm's place, and move the arm to their end."""
         self._parts.append(PathSamples.of(joint_path, measures))
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())

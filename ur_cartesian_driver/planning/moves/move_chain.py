@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.plan.plan import BlendEntry
 
 Rows = NDArray[np.intp]
 
-#: To be in time, what is behind a blend is driven at most this much faster than the mean.
+#: To be in time, the part behind a blend is driven at most this much faster than the mean.
 _MAX_CATCH_UP = 2.0
 #: A handover that changes by less is the same (relative).
 _SAME = 1e-10
@@ -63,7 +63,7 @@ class _Columns:
 
 @dataclass(slots=True)
 class Moves(_Columns):
-    """What the controller is told of moves, and their blends; lengths in the unit that leads."""
+    """Per-move parameters on the wire; lengths in m or rad, whichever leads."""
 
     #: From waypoint to waypoint.
     length: Floats
@@ -97,7 +97,7 @@ class Moves(_Columns):
 
 @dataclass(slots=True)
 class Handover(_Columns):
-    """What a move hands over to the next one where the blend between them begins."""
+    """The state that a move hands over to the next one where the blend between them begins."""
 
     #: Rate of ``s`` there [1/s], 0 = no blend.
     rate: Floats
@@ -111,7 +111,7 @@ class Handover(_Columns):
 @dataclass(slots=True)
 class MoveTimes(_Columns):
     """
-    How moves are carried out.
+    The execution of moves by the controller.
 
     Each has a profile from the blend before it to rest at its waypoint, of which the blend after
     it takes the end away: it changes to the cruise, and brakes from there to rest.
@@ -126,7 +126,7 @@ class MoveTimes(_Columns):
     cruise: Floats
     acceleration: Floats
     braking: Floats
-    #: What the blend after it takes away; time until there [s], and speed there.
+    #: The part that the blend after it takes away; time until there [s], and speed there.
     tail: Floats
     between: Floats
     leave: Floats
@@ -271,7 +271,7 @@ class MoveChain:
         for _ in range(_MAX_FITS):
             spent = self.times.durations
             off = spent - wanted
-            # What is passed too early, because it cannot be slower, the next move makes good.
+            # Where a move cannot be slower and is early, the next one makes up for it.
             early = np.where((rate <= lowest) & (off < -_IN_TIME), -off, 0.0)
             if self._first is not None:
                 early[0] = -off[0]
@@ -344,7 +344,7 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     """
     Return the rates at which blends begin and end.
 
-    A rate changes to that of the next cruising speed, within three bounds: neither part gets
+    A rate changes to the next cruising speed, within three bounds: neither part gets
     faster than it accelerates (r'' = 2 r s'^2), and what is left must suffice to brake. A move
     with a time accelerates as from rest to rest, or as the next one does in proportion to their
     lengths.

@@ -89,7 +89,7 @@ def _times(
     """
     Return when each row is expected (n,) [s].
 
-    :param number: (n,) that of its segment; rows in a blend have that of the one behind it.
+    :param number: (n,) of its segment; rows in a blend count to the segment behind it.
     """
     found, span = times.begins[number], np.maximum(path.u_leave - path.u_join, 1e-300)
     between = np.flatnonzero(~on_blend)

@@ -35,7 +35,7 @@ _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _IN_JOINT_SPACE = type_table(JOINT_SPACE_TYPES)
-#: What is left of a segment between blends that touch, or that reach its end [m]: more than the
+#: The rest of a segment between blends that touch, or that reach its end [m]: more than the
 #: rounding of two poses and two radii to micrometres.
 _MIN_BLEND_GAP = 5e-6
 #: Motions that only some others can be blended into; all others stop before them.
@@ -60,7 +60,7 @@ class SegmentDrafts:
     :param targets: poses of all waypoints in base (n, 7).
     :param begin: index of the first waypoint with a motion.
     :param start: pose of the tool in base.
-    :param remarks: on what is ignored or changed; added to.
+    :param remarks: on ignored or changed fields; added to.
     :raises InvalidGoal: the points define no line or arc, or the first blend is too large.
     """
 

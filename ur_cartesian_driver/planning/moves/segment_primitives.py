@@ -58,7 +58,7 @@ _CLASSES = {
     SegmentType.OPTIMIZED_JOINT: OptimoveJ,
     SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
-#: The kind of the primitive's row, by type; that of an arc has no meaning.
+#: The kind of the primitive's row, by type; without meaning for an arc.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
 _HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 

@@ -70,7 +70,7 @@ class SegmentTimings:
     :raises InvalidGoal: a speed is too low for the wire, a blend too small.
     """
 
-    #: What the wire carries; time 0 = speed and acceleration count.
+    #: Values on the wire; time 0 = speed and acceleration count.
     velocities: Floats
     accelerations: Floats
     wire_times: Floats
@@ -85,7 +85,7 @@ class SegmentTimings:
         blend_samples: BlendSamples,
         running: PlannedSegment | None = None,
     ) -> None:
-        """Begin with what is asked for, and change it until all limits are kept."""
+        """Begin with the requested speeds and times, and change them until all limits are kept."""
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
         # How long the samples take at the speed limit of the tool, and at that of an arc [s].
@@ -94,7 +94,7 @@ class SegmentTimings:
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
         self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
         self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
-        #: Where speeds and times come from, with remarks on what the limits changed.
+        #: Where speeds and times come from, with remarks on changes by the limits.
         self.requests = requests = SpeedRequests(geometries, options, model, running)
         n = len(geometries)
         self._time, self._timed, self._rate = requests.time, requests.has_wire_time, requests.rate
@@ -297,7 +297,7 @@ class SegmentTimings:
 
     def _remark_changes(self) -> None:
         """
-        Remark what is slower than asked for, or early.
+        Remark on moves that are slower than requested, or early.
 
         :raises GoalRefused: a time is too short, a speed too low, a blend too small.
         """

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where lines, arcs and PROCESS motions are slower than asked, from their times.
+Find the lines, arcs and PROCESS motions that are slower than requested, from their times.
 
 Only motions that carry the tool along a path count: not joint moves and OPTIMIZED ones, whose tool
 speed nobody asks for, and no turns on the spot. In a blend the planned path gives the speed, by a
@@ -36,7 +36,7 @@ _SAME_TIME = 1e-6
 
 
 def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]:
-    """Return the points with blends, and those of motions whose tool speed nobody asks for."""
+    """Return the points with blends, and the points of motions without a requested tool speed."""
     begin, free = geometries.begin, _IS_FREE[geometries.kinds]
     return (
         [begin + row for row in rows_where(geometries.path.has_blend_after)],
@@ -273,7 +273,7 @@ class _SlowMoves:
         point: int,
         asked: float | None = None,
     ) -> SlowStretch:
-        """Return a stretch from the fraction of one row to that of another one."""
+        """Return a stretch from a fraction of one row to a fraction of another one."""
         first, begin, last, end = place
         base = self._geometries.begin
         return SlowStretch(

@@ -48,7 +48,7 @@ class SpeedLimits:
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # That of an OPTIMIZED move is its time with some joint at its limit everywhere.
+        # For an OPTIMIZED move: its time with some joint at its limit everywhere.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
         #: Length of the leading quantity [m], [rad], or [s] of an OPTIMIZED move.
         self.length: Floats = np.maximum(length, _MIN_LENGTH)

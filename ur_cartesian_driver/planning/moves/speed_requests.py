@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What segments ask of their moves: from times or speeds of the goal, or from the defaults.
+The speeds and times requested of moves: by the goal's times or speeds, or by the defaults.
 
 All numbers are about the leading quantity of a segment, see :mod:`~.speed_limits`.
 """
@@ -72,7 +72,7 @@ def min_duration(length: Floats, speed: Floats, acceleration: Floats, peak: Floa
 
 class SpeedRequests:
     """
-    What segments ask of their moves, in the lengths that the robot counts; columns (n,).
+    The requests to moves, in the lengths that the robot counts; columns (n,).
 
     :param running: the first segment as it was planned, where it has been sent.
     :raises InvalidGoal: nobody knows how fast the robot would run a segment.
@@ -86,7 +86,7 @@ class SpeedRequests:
     allowed_acceleration: Floats
     #: 1 / time on the wire, or speed / length [1/s]. Faster only as their limits allow.
     rate: Floats
-    #: Their times; NaN = none. At least: what the limits allow at rest at both ends.
+    #: Their times; NaN = none. At least the time that the limits allow from rest to rest.
     time: Floats
     min_time: Floats
 
@@ -114,7 +114,7 @@ class SpeedRequests:
         #: robot program that counts in microseconds would run a segment a thousand times too fast,
         #: and a program does not report how it counts.
         self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & (not options.dialect.is_coarse)
-        #: By row, on what the limits change.
+        #: By row, on changes by the limits.
         self.remarks: dict[int, str] = {}
         #: By row, what limits the speed to less than is asked for.
         self.limited: dict[int, str] = {}

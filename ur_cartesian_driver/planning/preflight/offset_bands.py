@@ -272,7 +272,7 @@ class OffsetBandCheck:
         steps = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
         on_path = steps / np.maximum(np.diff(path.time), 1e-6)
         along, *across = (band.speed if limit else 0.0 for limit in band.limits)
-        # What the turning of the frame adds is as fast as an offset at most.
+        # The turning of the frame adds at most the speed of an offset.
         speeds = np.hypot(on_path + along, np.linalg.norm(across)) + band.speed
         row = int(np.argmax(speeds))
         if speeds[row] > bound:
@@ -288,7 +288,7 @@ class OffsetBandCheck:
         arm, T_flange_tcp = self.kinematics.arm, self.kinematics.T_flange_tcp
         speeds = np.zeros_like(q)
         for k in np.flatnonzero(self.band.limits).tolist():
-            # What the turning of the frame adds is as fast at most.
+            # The turning of the frame adds at most the same speed.
             twist = np.zeros_like(q)
             twist[:, :3] = 2.0 * self.band.speed * axes[:, k]
             speeds += np.abs(joint_rates(arm, T_flange_tcp, q, twist, np.zeros_like(q))[0])

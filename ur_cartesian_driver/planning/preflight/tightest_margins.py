@@ -70,7 +70,7 @@ _QUANTITIES = (
 class TightestMargins(Rows[str]):
     """The smallest distances of segments from singularities and joint limits, in words."""
 
-    #: (n,) each: the segment; the number of the singularity, or 3 + that of the joint; the
+    #: (n,) each: the segment; the number of the singularity, or 3 + the number of the joint; the
     #: distance; the fraction of the segment; the distance as a fraction of its scale.
     segments: NDArray[np.int32]
     kinds: NDArray[np.intp]

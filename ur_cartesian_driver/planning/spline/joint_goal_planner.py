@@ -3,7 +3,7 @@
 """
 From a joint goal to a plan: the joint polynomials through its points, checked along the way.
 
-What the robot gets is what the client sent, piece by piece; a SPLINE goal differs only in where
+The robot gets the client's points, piece by piece; a SPLINE goal differs only in where
 its pieces come from. The path of the tool follows from the joints, so that progress, limits of the
 tool and clearance are those of all goals. Joints may pass singularities.
 """
@@ -155,7 +155,7 @@ def plan_joint_goal(
 def _cartesian_goal(
     checked: CheckedJointGoal, state: RobotState, arm: Arm, options: PlanningOptions
 ) -> GoalTable:
-    """Return what the goal means for the tool."""
+    """Return the meaning of the goal for the tool."""
     n = len(checked.times)
     table = GoalTable(
         waypoints=WaypointRows(
@@ -228,7 +228,7 @@ def _check_start(checked: CheckedJointGoal, state: RobotState, options: Planning
 
 def _chosen_velocities(times: Floats, q: Floats) -> Floats:
     """
-    Return velocities by the neighbours, those of parabolas; 0 at both ends.
+    Return velocities of parabolas through the neighbours; 0 at both ends.
 
     They are limited so that a joint moves only one way between two points, and rests for a moment
     where it turns back (F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation).
@@ -244,7 +244,7 @@ def _chosen_velocities(times: Floats, q: Floats) -> Floats:
 
 
 def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
-    """Return samples as dense as those of all goals, of the tool and of the fastest joint."""
+    """Return samples as dense as for all goals, of the tool and of the fastest joint."""
     spline, times = trajectory.spline, trajectory.times
     piece, t = coarse_samples(times)
     q, qd, qdd = evaluate(spline.coefficients[piece], t)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where a spline is slower than asked: than the mean speed that its times leave on each segment.
+Find where a spline is slower than requested: than the mean speed by its times on a segment.
 
-Where the twists of its points are lower, they count. Speeds are those of the joint polynomials.
+Where the twists of its points are lower, they count. Speeds come from the joint polynomials.
 """
 
 from __future__ import annotations

@@ -284,7 +284,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
     n = len(durations)
 
     def lines() -> list[str]:
-        """Make those of the last pieces to the points."""
+        """Connect the last pieces to the points."""
         last = np.flatnonzero(np.diff(polynomials.piece, append=-1))
         count = np.diff(last, prepend=-1)
         done = np.add.reduceat(

@@ -3,7 +3,7 @@
 """
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-A point whose twist is 0 is a stop. NaN is chosen: a velocity as that of the parabola through the
+A point whose twist is 0 is a stop. NaN is chosen: a velocity from the parabola through the
 point and its neighbours, an acceleration as the mean of those of the cubics before and after the
 point.
 """
@@ -106,7 +106,7 @@ def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
 
 def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
     """
-    Return velocities by the neighbours, those of parabolas; 0 at the start.
+    Return velocities of parabolas through the neighbours; 0 at the start.
 
     The angular ones by the rotation vectors from the point to its neighbours: in these coordinates
     the angular velocity at the point is their derivative.
