@@ -34,7 +34,7 @@ program. Then `~/status` says which steps are needed; after the steps in the las
 takes the next goal. Each goal has a `safe_outputs` entry with `restore`: its output is off at the
 end unless the goal succeeds, and off in a pause. The result of a goal that the arm had begun says
 where on its path it was stopped, and the goal can be
-[taken up again](execution.md#take-it-up-again) there. What is decided before the motion (a free
+[resumed](execution.md#resume-it) there. What is decided before the motion (a free
 axis, a demanded speed) changes nothing of this.
 
 Times count from the fault, or from the goal if it is sent later. "As without fault": the fault

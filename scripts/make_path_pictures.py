@@ -76,7 +76,7 @@ def draw_free_axis() -> Figure:
     return figure
 
 
-def draw_taken_up_again() -> Figure:
+def draw_resumed_seam() -> Figure:
     """Draw a seam that was stopped, and the goal that is left of it."""
     seam = ToolPath.load(goal_file('seam'))
     stopped = PathPlace(point=4, fraction=0.5)
@@ -139,7 +139,7 @@ def draw_moveit() -> Figure:
 
 PICTURES: dict[str, Any] = {
     'free_axis': draw_free_axis,
-    'execution_taken_up_again': draw_taken_up_again,
+    'execution_resumed': draw_resumed_seam,
     'moveit': draw_moveit,
 }
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Names that are gone for good stay gone, and no name stands for two things.
+Names follow one pattern, and no name stands for two things.
 
 doc/glossary.md says which word stands for what.
 """
@@ -23,97 +23,9 @@ CHECKOUT = TESTS.parent
 PACKAGE = Path(ur_cartesian_driver.__file__).parent
 GENERATED = ('action', 'msg', 'srv')
 
-#: The names that a feature had, by the words that replaced them.
-GONE = {
-    # goals and plans
-    'TcpKinematics': 'Reach',
-    'SegmentDrafts': 'Draft Drafts',
-    'SegmentGeometries, MovePath': 'Leg',
-    'SegmentTimings': 'Timing',
-    'JointPathPlanner': 'Route',
-    'PathMargins, TightestMargin': 'Survey Surveyed survey Nearest nearest_of nearest_in',
-    'Blend, BlendedPath, BlendPath': 'Corner JointCorner ToolCorner Meeting meetings round_ones',
-    'blend_tolerance, slack': '_rooms',
-    'JointSpeedBound, SpeedCheck': 'Pace _Pace pace paces knows_pace _wrong_pace',
-    'JointPath, solve_joint_path': 'Followed followed',
-    'PathSamples, PoseSamples': 'Samples Places places_on LEAST_PLACES',
-    'SplinePath, JointPolynomials': 'SplineWay way_along JointTrack joint_track plan_pieces',
-    'resolve_frames': 'placed',
-    'RetargetedGoal, retarget_to_tcp': 'Carried',
-    'adapt_to_dialect': 'spoken spoken_radius',
-    'shift_reference_point, rigid_body': 'seen_at lever',
-    'trigger_pose, trigger_direction': 'HAS_PLACE comes_round',
-    'place_outputs, predict_stop': 'with_outputs come_to_rest',
-    'DhTable, IdealArm, misfit_factor': 'Geometry shape_of Shape doubt DOUBTS',
-    'path length, displacement': 'no_way _NO_WAY farthest_way',
-    'execution mode': 'way_of_execution led_by',
-    # append (keep_open)
-    'append, appendable goal': 'OpenGoal open_goal open_goals OPEN_GOAL open_end OpenMotion',
-    'AppendPlan, AppendedPoints': 'Part Addition addition ExtendMotion Continued',
-    'AppendMachine, Appender': 'StreamMachine Continuing continuing continuation',
-    'AppendSettings, AnswerAppend': 'StreamSettings AnswerExtension extension',
-    'keep_open_horizon, keep_open_margin': 'stream_horizon stream_margin closing_deceleration',
-    'committed_records, next_goal': 'firm time_behind',
-    # servo, live targets, freedrive
-    'SetLiveTarget, live_target': 'AimMotion servo_targets servo_to ServoTargets',
-    'OnlineTrajectoryGenerator': 'TargetFollower follower',
-    'LiveSession, LiveLimits, LiveSetup': 'FollowLimits follow_targets LiveOrder live_order',
-    'LiveWorkspace, WorkspaceGuard': 'Surroundings surroundings',
-    'SetpointSource': 'Setpoints _NoSetpoints',
-    'freedrive': 'Guided teach teaches TeachMachine TeachService TeachStream allow_teach',
-    'FreedriveState': 'HandGuided hand_guided is_guided NOBODY',
-    'TargetInhibitor': 'Restraint restraint',
-    # the life of a goal
-    'ArmArbiter, ArmRequest: acquire, preempt': 'Turns Turn seize seize_for_now claim _turn_away',
-    'preempted_by, on_preempt': 'successor predecessor make_way check_can_make_way',
-    'ArmSnapshot': 'Stand',
-    'MotionJob': 'Order order_of standing_order',
-    'GoalMachine, GoalMonitor, GoalSignal': 'TrajectoryMachine Observer',
-    'ToleranceCheck': 'Watch _goal_watch _path_watch _watches_tcp',
-    'RUNNING_OUT, CANCELLING': 'CLOSING _enter_closing _enter_stopping',
-    'AWAITING_POINTS': '_enter_waiting',
-    'COMING_TO_REST, PROGRAM_LOST': 'HALTING ENDING _enter_halting _enter_ending',
-    'temporary TCP, TcpPersistence': 'LendTcp lend_tcp TcpLent TcpLoan TcpHold LENT T_flange_lent',
-    'TemporaryTcpSetter, RestoreTcp': 'GoalTcp ReturnTcp return_tcp tcp_owed owe_tcp',
-    'resumable, ignored stops': 'borne HOLDS _WISHES',
-    'stationary': 'standing_at standing_plan may_stand stand_at',
-    # connection and driver
-    'EventLog, LinkEventLog': 'Chronicle chronicle Evidence evidence Remark Said',
-    'RecoveryRunner, RecoveryStep': 'WayBack way_back what_is_needed',
-    'ServiceDispatcher, ServiceCall': 'CallDesk call_desk DashboardCalls',
-    'LinkInterface': 'robot_view',
-    'LinkTiming, LinkGaps': 'Pulse pulse Gaps',
-    'DEAD_PROGRAM_TIMEOUT': 'GHOST _ghost_since _look_for_ghost',
-    'OwnerHeartbeat, LoopHeartbeat': 'Alive SIGN_OF_LIFE last_sign',
-    'PointBuffer': 'RecordsToSend records_to_send',
-    'ProgramAutoStart': 'FirstStart first_start',
-    'events of a recording': 'read_notes write_note NOTEWORTHY',
-    '_warn_if_name_is_taken': '_look_for_a_twin _twin_timer',
-    'DeferredActionServer, DeferredService': 'DeferringActionServer PromisedService',
-    'TransformLookup, T_static': 'Transforms T_rigid',
-    'explain_..., ..._refusal': 'why_not why_not_ready why_unreachable told_apart',
-    'yield_cpu': 'breathe BREATH',
-    'is_slow_to_make': 'is_slow',
-    # the simulated controller
-    'FaultInjector, FaultTrigger': 'Faults When Travelled Crossing',
-    'ImpairedConnection, ImpairedSockets': 'Hampered hamper FaultySockets',
-    'ControllerIo, ControllerMessages': 'Announcements announcements',
-    'MotionOwnership': 'Ownership',
-    'IkBranchTracker, changes_branch': 'changes_sides',
-    'PathMotion, MotionProfile': 'Track Law check_law Tip tip',
-    'DashboardHandlers': 'Desk desk',
-    'PendantBuiltins': 'PeopleBuiltins',
-    'ScriptInterpreter, ProgramRunner': 'Machine machine_of Programs',
-    'UploadTooLong, UploadedProgram': 'TooLong ProgramText',
-    'is_paused (an interface)': 'deaf was_deaf',
-    # support of the tests
-    'FaultGoal, planner verdict': 'GoalInTrouble agreement',
-    'joint trace, synthetic recording': 'Ways fault_ways made_up_recording',
-}
-
-#: Bounds are MAX_ and MIN_, waiting times ..._TIMEOUT.
-PREFIXES_GONE = ('MOST_', 'LEAST_', 'LARGEST_', 'SMALLEST_')
-SUFFIXES_GONE = ('PATIENCE',)
+#: Bounds are MAX_ and MIN_, waiting times ..._TIMEOUT; so these are other words for the same.
+OTHER_PREFIXES = ('MOST_', 'LEAST_', 'LARGEST_', 'SMALLEST_')
+OTHER_SUFFIXES = ('PATIENCE',)
 
 #: Everyday words, as parts of names of the package: no term of the field.
 WORDS_GONE = {'borne', 'nobody', 'room', 'rooms', 'spoken', 'told', 'way', 'ways'}
@@ -144,15 +56,10 @@ def identifiers(source: str) -> set[str]:
 
 
 @functools.cache
-def names_gone() -> set[str]:
-    return {name for names in GONE.values() for name in names.split()}
-
-
-@functools.cache
-def is_gone(name: str) -> bool:
-    """Tell whether a name is one of those that are gone, or made like those."""
+def breaks_the_pattern(name: str) -> bool:
+    """Tell whether a bound or a waiting time is named otherwise than all others."""
     bare = name.lstrip('_')
-    return name in names_gone() or bare.startswith(PREFIXES_GONE) or bare.endswith(SUFFIXES_GONE)
+    return bare.startswith(OTHER_PREFIXES) or bare.endswith(OTHER_SUFFIXES)
 
 
 @functools.cache
@@ -194,10 +101,9 @@ def module_names(folder: Path) -> Iterator[tuple[str, str]]:
             yield path.stem, str(path.relative_to(folder))
 
 
-def test_names_that_are_gone_are_recognised():
+def test_names_that_break_the_pattern_are_recognised():
     source = 'def seize(MOST_JOBS, *, patience=JOIN_PATIENCE):\n    return x.LeastOne + _LEAST_X\n'
-    assert {name for name in identifiers(source) if is_gone(name)} == {
-        'seize',
+    assert {name for name in identifiers(source) if breaks_the_pattern(name)} == {
         'MOST_JOBS',
         'JOIN_PATIENCE',
         '_LEAST_X',
@@ -206,9 +112,9 @@ def test_names_that_are_gone_are_recognised():
     assert everyday_words('waypoint') == everyday_words('Always') == set()
 
 
-def test_a_name_that_is_gone_stays_gone():
-    found = {str(path): names_where(is_gone, path) for path in all_modules()}
-    assert {path: names for path, names in found.items() if names} == {}, 'GONE has the new words'
+def test_bounds_and_waiting_times_are_named_alike():
+    found = {str(path): names_where(breaks_the_pattern, path) for path in all_modules()}
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 def test_no_name_of_the_package_has_an_everyday_word_in_place_of_a_term():
@@ -226,8 +132,3 @@ def test_no_module_of_the_package_shares_its_name_with_another_one():
 
 def test_no_test_module_shares_its_name_with_another_one():
     assert shared(module_names(TESTS)) == {}
-
-
-def test_a_replacement_is_not_gone_itself():
-    words = set(re.findall(r'\w+', ' '.join(GONE)))
-    assert words & names_gone() == set()

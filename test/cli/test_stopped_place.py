@@ -16,7 +16,7 @@ def test_a_place_is_read_as_it_was_written_until_nothing_is_left(tmp_path):
     assert write_place(goal, PLACE) == tmp_path / 'seam.yaml.stopped'
     assert read_place(goal) == PLACE
     assert write_place(goal, None) is None
-    with pytest.raises(ValueError, match=r'seam\.yaml cannot be taken up again: there is no '):
+    with pytest.raises(ValueError, match=r'seam\.yaml cannot be resumed: there is no '):
         read_place(goal)
 
 

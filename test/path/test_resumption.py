@@ -3,7 +3,7 @@
 """
 The goal that is left of another one: its points, outputs and times, and what is refused.
 
-That put together they are the whole: ``test/acceptance/test_taken_up_again.py``.
+That put together they are the whole: ``test/acceptance/test_resumed_goals.py``.
 """
 
 from dataclasses import replace
@@ -70,7 +70,7 @@ def at(point, fraction):
     return PathPlace(point=point, fraction=fraction)
 
 
-def test_a_line_is_taken_up_before_its_place_and_from_behind_the_path():
+def test_a_line_resumes_before_its_place_and_from_behind_the_path():
     left = resume(goal(), at(1, 0.5), overlap=0.01, approach=0.02)
     assert places(left) == [(0.04, 0.0, -0.02), (0.04, 0.0, 0.0), *CORNERS[1:]]
     assert [segment.type for segment in left.goal.segments[:2]] == [JOINT, LINEAR]
@@ -90,7 +90,7 @@ def test_the_overlap_goes_round_corners_and_ends_at_joint_motions():
 
 
 @pytest.mark.parametrize('stopped', [at(1, 0.9), at(2, 0.03), at(2, 0.21)])
-def test_nothing_is_taken_up_within_a_blend(stopped):
+def test_nothing_resumes_within_a_blend(stopped):
     blended = goal(*(Segment(type=PROCESS, blend_radius=0.02),) * 4)
     begin = resume(blended, stopped, overlap=0.005).begin
     assert begin.point == 1
@@ -297,12 +297,12 @@ def test_a_place_on_the_rest_is_a_place_on_the_whole():
         ),
     ],
 )
-def test_what_cannot_be_taken_up_is_refused_with_a_sentence(of, place, numbers, text):
+def test_what_cannot_be_resumed_is_refused_with_a_sentence(of, place, numbers, text):
     with pytest.raises(InvalidGoal, match=text):
         resume(of, place, **numbers)
 
 
-def test_a_path_is_taken_up_as_a_path():
+def test_a_path_resumes_as_a_path():
     path = Path((0.0, 0.0, 0.5), FLAT).at(speed=0.1).by(dx=0.1).by(dy=0.1)
     left = path.resumed(at(1, 0.5), overlap=0.01, approach=0.02)
     assert [pose.position for pose in left.poses][1] == pytest.approx((0.1, 0.04, 0.5))

@@ -88,7 +88,7 @@ def test_a_signal_ends_the_sender_after_its_goal(senders, number):
     assert not errors
 
 
-def test_a_goal_that_was_stopped_is_taken_up_again(senders, tmp_path):
+def test_a_goal_that_was_stopped_is_resumed(senders, tmp_path):
     process = senders.start()
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=10.0)
@@ -106,7 +106,7 @@ def test_a_goal_that_was_stopped_is_taken_up_again(senders, tmp_path):
     wait_for(lambda: senders.moving or relative.poll() is not None, 30.0)
     relative.send_signal(signal.SIGINT)
     output, _ = relative.communicate(timeout=10.0)
-    assert 'it cannot be taken up again: ' in output, output
+    assert 'it cannot be resumed: ' in output, output
     assert not note.exists()
 
 

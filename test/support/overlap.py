@@ -39,7 +39,7 @@ COMPUTING = (
     'test/acceptance/test_speed_slider_in_virtual_time.py',
     'test/acceptance/test_spline.py',
     'test/acceptance/test_stall.py',
-    'test/acceptance/test_taken_up_again.py',
+    'test/acceptance/test_resumed_goals.py',
     'test/acceptance/test_tolerances_in_virtual_time.py',
     'test/acceptance/test_saved_programs.py',
     'test/acceptance/test_waiting_in_virtual_time.py',

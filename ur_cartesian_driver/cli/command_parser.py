@@ -200,7 +200,7 @@ def _add_send(command: CommandParser) -> None:
         type=float,
         default=5.0,
         metavar='MM',
-        help='how far before that place the path is taken up again (5 mm)',
+        help='how far before that place the path is resumed (5 mm)',
     )
     command.add_argument(
         '--approach',

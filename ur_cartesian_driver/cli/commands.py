@@ -114,7 +114,7 @@ def recover(arguments: argparse.Namespace) -> int:
 
 def _named_file(arguments: argparse.Namespace) -> Path:
     if arguments.file == '-':
-        raise ValueError('a goal from standard input cannot be taken up again: name its file')
+        raise ValueError('a goal from standard input cannot be resumed: name its file')
     return goal_file(arguments.file)
 
 
@@ -144,7 +144,7 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
         try:
             _resumed(read_goal(arguments), place, arguments)
         except InvalidGoal as refusal:
-            print(f'it cannot be taken up again: {refusal}')
+            print(f'it cannot be resumed: {refusal}')
             place = None
     try:
         written = write_place(_named_file(arguments), place)

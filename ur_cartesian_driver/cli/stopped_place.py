@@ -24,7 +24,7 @@ _SUFFIX = '.stopped'
 
 def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
     """
-    Note where a goal was stopped, None = nowhere: nothing is left to take up again.
+    Note where a goal was stopped, None = nowhere: nothing is left to resume.
 
     :returns: the file, None = there is none.
     :raises OSError: it cannot be written.
@@ -51,14 +51,14 @@ def read_place(goal_file: Path) -> PathPlace:
         goal = noted['goal']
     except FileNotFoundError:
         raise ValueError(
-            f'{goal_file} cannot be taken up again: there is no {file}, which "send" writes where '
+            f'{goal_file} cannot be resumed: there is no {file}, which "send" writes where '
             'a goal ends on its way'
         ) from None
     except (yaml.YAMLError, KeyError, TypeError, ValueError):
         raise ValueError(f'{file} does not say where a goal was stopped; remove it') from None
     if goal != _hash(goal_file):
         raise ValueError(
-            f'{goal_file} cannot be taken up again: it is not the goal any more that was stopped; '
+            f'{goal_file} cannot be resumed: it is not the goal any more that was stopped; '
             f'send what is left by hand, or remove {file}'
         )
     return place

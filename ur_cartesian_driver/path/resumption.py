@@ -45,7 +45,7 @@ from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSp
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
-#: How far before the place the path is taken up again, and from how far behind the tool comes [m].
+#: How far before the place the path is resumed, and from how far behind the tool comes [m].
 OVERLAP, APPROACH = 0.005, 0.03
 #: Times of the approach where a goal has times: to above the path [s], and down to it [m/s].
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
@@ -94,7 +94,7 @@ def resume(
     Return the goal that is left of a goal that was stopped at a place.
 
     :param place: as its outcome says.
-    :param overlap: how far before it the path is taken up again [m]; more where that is in a
+    :param overlap: how far before it the path is resumed [m]; more where that is in a
         blend, and never before a joint motion or the first point.
     :param approach: how far from there the tool comes down to the path, backwards along its own z
         axis [m]; 0 = straight to the path.
@@ -189,7 +189,7 @@ class _Resumption:
         return [first, *rest]
 
     def _begin(self, place: PathPlace, overlap: float) -> float:
-        """Return the place at which the path is taken up again."""
+        """Return the place at which the path is resumed."""
         k, u, left = place.point, place.fraction, overlap
         if self._is_new_start(k):
             return float(k)
@@ -551,7 +551,7 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
         if segment.dwell and resolve_execution_mode(goal_table(goal)).traits.is_spline:
             raise InvalidGoal(
                 f'segments[{k}].dwell',
-                'is in a spline, of which no part can be taken up again',
+                'is in a spline, of which no part can be resumed',
                 'split the goal at its rests',
             )
     if not (0 <= place.point < len(goal.waypoints) and 0.0 <= place.fraction <= 1.0):

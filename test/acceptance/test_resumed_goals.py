@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A seam that is interrupted and taken up again is, put together, the whole seam.
+A seam that is interrupted and resumed is, put together, the whole seam.
 
 The seam has lines, PROCESS with a blend, an arc and an output; as a spline it has twists. It is
-stopped at random places (cancelled, by a protective stop, by a lost arc) and taken up again, in
+stopped at random places (cancelled, by a protective stop, by a lost arc) and resumed, in
 virtual time. RTDE says where the tool was and what the output was; its geometry is the tests' own.
 ``INTERRUPTIONS`` is the number of places of each kind.
 """

@@ -7,7 +7,7 @@ from ur_cartesian_driver.path import digital, mm, Path, PathPlace, Pose
 GLUE = digital(2)
 
 
-def taken_up_again(start: Pose) -> Path:
+def resumed_seam(start: Pose) -> Path:
     x, y, z = start.position
     bead = (
         Path(start)
@@ -23,4 +23,4 @@ def taken_up_again(start: Pose) -> Path:
 if __name__ == '__main__':
     from on_robot import run
 
-    run(taken_up_again)
+    run(resumed_seam)
