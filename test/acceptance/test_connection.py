@@ -311,7 +311,7 @@ class Relay:
         self.cut()
 
 
-def test_a_program_that_outlives_rtde_is_resumed(make_driver, ur_sim):
+def test_a_program_that_outlives_rtde_is_used_again(make_driver, ur_sim):
     with contextlib.closing(Relay(ur_sim.ports.rtde)) as relay:
         driver = make_driver(rtde_port=relay.port)
         driver.wait_ready(5.0)
