@@ -15,11 +15,10 @@ path and report. The first reason for a refusal is raised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
-from pkgutil import resolve_name
 from typing import TypeAlias
 
 import numpy as np
@@ -28,6 +27,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
@@ -90,7 +90,7 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 #: How far a CB3 arm may stand beside its target: 0.2 to 0.4 mrad were recorded of a UR10 [m].
 CB3_STATIC_ERROR = 3e-4
 
-#: A planner in the registry of execution modes.
+#: Plans a checked goal.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
 
 
@@ -126,8 +126,7 @@ def _plan_fixed(
     table = add_safe_outputs(apply_default_tolerances(table, options), options)
     retargeted = retarget_to_tcp(table, at_set_point(state, arm), options)
     planner = GoalPlanner(retargeted, state.T_flange_tcp, arm, options, running)
-    plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
-    return plan_goal(planner)
+    return PLANNERS[planner.mode](planner)
 
 
 def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -239,6 +238,14 @@ def plan_spline_goal(planner: GoalPlanner) -> Plan:
         found.find_slow_stretches,
     )
     return _with_offset_band(planned, planner) if goal.path_offset else planned
+
+
+#: The planner of each execution mode.
+PLANNERS: Mapping[ExecutionMode, PlanGoal] = {
+    ExecutionMode.PRIMITIVES: plan_moves,
+    ExecutionMode.SPLINE: plan_spline_goal,
+    ExecutionMode.SERVO: plan_spline_goal,
+}
 
 
 def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:

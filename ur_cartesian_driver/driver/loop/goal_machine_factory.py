@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
-from pkgutil import resolve_name
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import ArmSetup, LiveSetup, StartMotion
@@ -31,17 +30,17 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, Serv
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
 
-#: What the registry of execution modes names as feeder.
+#: Makes the feeder of a motion.
 MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
 
 
 def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     """Return the machine of a motion."""
-    make_feeder: MakeFeeder = resolve_name(request.job.execution.traits.feeder)
     return GoalMachine(
-        make_feeder(request, config),
+        FEEDERS[request.job.execution](request, config),
         feedback_period=1.0 / config.feedback_rate,
         resume_after_stop=config.on_robot_stop == 'continue',
         max_state_age=config.max_state_age,
@@ -97,6 +96,14 @@ def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
         return ServoFeeder(_monitor(request, config), ServoStream(setpoints, settings))
     offsets = OffsetSetpoints(setpoints, job.offset_band, _arm(request.arm))
     return ServoFeeder(_monitor(request, config), ServoStream(offsets, settings), offsets)
+
+
+#: The feeder of each execution mode.
+FEEDERS: Mapping[ExecutionMode, MakeFeeder] = {
+    ExecutionMode.PRIMITIVES: point_feeder,
+    ExecutionMode.SPLINE: point_feeder,
+    ExecutionMode.SERVO: servo_feeder,
+}
 
 
 def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
