@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import ur_cartesian_driver.execution.goal.goal_transitions as states
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal
 import ur_cartesian_driver.execution.servo.servo_stream as servo_stream
 from ur_cartesian_driver.robot import lifecycle
 
@@ -39,7 +40,7 @@ def pages() -> dict[str, str]:
             'A goal on its way through the robot program',
             'ur_cartesian_driver/execution/goal/goal_transitions.py',
             goal(),
-            [signal.name for signal in states.GoalSignal],
+            [signal.name for signal in GoalSignal],
         ),
         'servo.md': page(
             'Streaming of set-points',

@@ -20,13 +20,12 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.execution.goal.goal_transitions import (
-    GoalSignal,
     GoalState,
     MONITORED_STATES,
-    STOP_SIGNALS,
     TRANSITIONS,
 )
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal
 from ur_cartesian_driver.execution.goal.temporary_tcp import SET_TIMEOUT
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, CAUSE_TIMEOUT, STOP_TIMEOUT
 from ur_cartesian_driver.execution.points.append_feeder import FIRST_POINTS_TIMEOUT
@@ -432,10 +431,10 @@ def test_progress_is_reported_at_its_rate():
 @pytest.mark.parametrize('signal', list(GoalSignal))
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
     own = {
-        GoalState.SETTLING: {GoalSignal.SETTLED, GoalSignal.TIMEOUT, GoalSignal.DEVIATION},
-        GoalState.CANCELLING: {GoalSignal.TIMEOUT, GoalSignal.UNANSWERED},
-        GoalState.COMING_TO_REST: {GoalSignal.AT_REST, GoalSignal.TIMEOUT},
-        GoalState.ARMING: {GoalSignal.ARMED, GoalSignal.TIMEOUT},
+        GoalState.SETTLING: {GoalSignal.SETTLED, GoalSignal.NOT_SETTLED, GoalSignal.DEVIATION},
+        GoalState.CANCELLING: {GoalSignal.UNCONFIRMED, GoalSignal.UNANSWERED},
+        GoalState.COMING_TO_REST: {GoalSignal.AT_REST, GoalSignal.UNCONFIRMED},
+        GoalState.ARMING: {GoalSignal.ARMED, GoalSignal.NOT_READY},
         GoalState.RESTORING: {GoalSignal.RESTORED, GoalSignal.TIMEOUT},
         GoalState.MOVING: {
             GoalSignal.VIOLATION,
@@ -448,7 +447,7 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
             GoalSignal.APPENDED,
             GoalSignal.NO_MORE_POINTS,
             GoalSignal.DEVIATION,
-            GoalSignal.TIMEOUT,
+            GoalSignal.ABANDONED,
         },
         GoalState.PROGRAM_LOST: {GoalSignal.TIMEOUT},
     }
@@ -457,8 +456,12 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
         GoalSignal.RESTORED,
         GoalSignal.SETTLED,
         GoalSignal.AT_REST,
+        GoalSignal.NOT_READY,
+        GoalSignal.NOT_SETTLED,
+        GoalSignal.ABANDONED,
         GoalSignal.TIMEOUT,
         GoalSignal.UNANSWERED,
+        GoalSignal.UNCONFIRMED,
         GoalSignal.VIOLATION,
         GoalSignal.DEVIATION,
         GoalSignal.STANDSTILL,
@@ -518,31 +521,29 @@ RUNNING = [s for s in GoalState if s not in (GoalState.RESTORING, GoalState.ENDE
 STOPPED_STATES = [
     pytest.param(
         {'safety_status': SafetyStatus.PROTECTIVE_STOPPED},
-        GoalSignal.PROTECTIVE_STOP,
+        ErrorCode.PROTECTIVE_STOP,
         id='protective stop',
     ),
     pytest.param(
         {'safety_status': SafetyStatus.SAFEGUARD_STOPPED},
-        GoalSignal.PROTECTIVE_STOP,
+        ErrorCode.PROTECTIVE_STOP,
         id='safeguard stop',
     ),
     pytest.param(
         {'safety_status': SafetyStatus.EMERGENCY_STOPPED},
-        GoalSignal.EMERGENCY_STOP,
+        ErrorCode.EMERGENCY_STOP,
         id='emergency stop',
     ),
-    pytest.param({'robot_mode': RobotMode.POWER_OFF}, GoalSignal.PROGRAM_STOPPED, id='power off'),
+    pytest.param({'robot_mode': RobotMode.POWER_OFF}, ErrorCode.PROGRAM_STOPPED, id='power off'),
 ]
 
 
-@pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
+@pytest.mark.parametrize(('changes', 'code'), STOPPED_STATES)
 @pytest.mark.parametrize('state', RUNNING)
-def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
+def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, code):
     machine = brought_to(state)
     commands = machine.step(robot(0.5, **changes), 1.05)
-    assert (
-        outcome(commands + machine.step(Tick(), 1.05 + CAUSE_TIMEOUT)).code is STOP_SIGNALS[signal]
-    )
+    assert outcome(commands + machine.step(Tick(), 1.05 + CAUSE_TIMEOUT)).code is code
     assert machine.state is GoalState.ENDED
 
 

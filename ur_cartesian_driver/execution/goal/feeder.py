@@ -14,13 +14,9 @@ from math import nan
 
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    Fault,
-    GoalState,
-    Meaning,
-    NO_MEANING,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
+from ur_cartesian_driver.execution.goal.outcome_codes import Fault, Meaning, NO_MEANING
 from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3

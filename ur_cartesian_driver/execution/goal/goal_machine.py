@@ -30,16 +30,12 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
 )
 from ur_cartesian_driver.execution.goal.goal_transitions import (
     detect_stop,
-    GoalSignal,
     GoalState,
     INITIAL_STATE,
     INTERRUPTIBLE_STATES,
     is_at_rest,
-    Meaning,
     MONITORED_STATES,
-    NO_MEANING,
     NO_STOP,
-    RESULT_SIGNALS,
     RESUMABLE_STOPS,
     RUNNING_STATES,
     STOP_PROGRAM_AFTER,
@@ -47,6 +43,12 @@ from ur_cartesian_driver.execution.goal.goal_transitions import (
 )
 from ur_cartesian_driver.execution.goal.missed_deadlines import missed_deadline
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
+from ur_cartesian_driver.execution.goal.outcome_codes import (
+    GoalSignal,
+    Meaning,
+    NO_MEANING,
+    RESULT_SIGNALS,
+)
 from ur_cartesian_driver.execution.goal.outcome_text import failure_text, tcp_report
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
@@ -73,9 +75,6 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
-
-#: Codes of a goal whose stop the robot has not confirmed in time.
-_UNCONFIRMED = (ErrorCode.EXECUTION_FAILED, ErrorCode.CONNECTION_LOST)
 
 
 class MotionStatus(NamedTuple):
@@ -359,7 +358,7 @@ class GoalMachine:
         if transition.code is not None:
             if before is GoalState.PROGRAM_LOST:  # this is why the program ended
                 text = f'{text}; before that, {self._text}'
-            if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.TIMEOUT:
+            if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.UNCONFIRMED:
                 self._text = f'{self._text}; {text}'  # which follows from it
             else:
                 self._code, self._text = transition.code, text
@@ -408,7 +407,7 @@ class GoalMachine:
         self._deadline = inf if tolerance < 0.0 else now + tolerance
         self._arrival_due = min(self._deadline, now + DEFAULT_GOAL_TIME_TOLERANCE)
         if late := self._explain_late(tolerance):
-            return self._apply(GoalSignal.TIMEOUT, late, now)
+            return self._apply(GoalSignal.NOT_SETTLED, late, now)
         return []
 
     def _explain_late(self, tolerance: float) -> str:
@@ -461,10 +460,7 @@ class GoalMachine:
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
         if self._is_decided:  # no motion is left that could resume
             return self._finish()
-        unconfirmed = signal is GoalSignal.TIMEOUT and self._code in _UNCONFIRMED
-        if signal in STOP_PROGRAM_AFTER or unconfirmed:
-            # A paused program reads no socket: unless it is stopped, the old motion would resume
-            # when somebody unlocks the arm and plays the program.
+        if signal in STOP_PROGRAM_AFTER:
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
 

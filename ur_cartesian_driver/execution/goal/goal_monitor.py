@@ -13,8 +13,8 @@ from math import inf
 
 import numpy as np
 
-from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSignal
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.joint_tolerance_check import JointToleranceCheck
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed

@@ -5,12 +5,8 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.feeder import Feeder
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    GoalSignal,
-    GoalState,
-    is_at_rest,
-    Meaning,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, is_at_rest
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, STOP_TIMEOUT
@@ -26,9 +22,9 @@ def missed_deadline(
     """
     match state:
         case GoalState.ARMING:
-            return GoalSignal.TIMEOUT, _why_not_armed(feeder, tcp, guard)
+            return GoalSignal.NOT_READY, _why_not_armed(feeder, tcp, guard)
         case GoalState.AWAITING_POINTS:
-            return GoalSignal.TIMEOUT, (
+            return GoalSignal.ABANDONED, (
                 'no more points, and no word that there are none, came within '
                 f'keep_open_timeout = {feeder.append_timeout:g} s'
             )
@@ -39,7 +35,7 @@ def missed_deadline(
     packet = feeder.monitor.latest
     if state is GoalState.CANCELLING and packet is not None and is_at_rest(packet):
         return GoalSignal.UNANSWERED, ''
-    return GoalSignal.TIMEOUT, (
+    return GoalSignal.UNCONFIRMED, (
         f'the robot did not confirm the stop within {STOP_TIMEOUT:g} s, its program was ended'
     )
 
@@ -65,7 +61,7 @@ def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard 
 def _why_not_settled(feeder: Feeder) -> Meaning:
     packet, no_rest = feeder.monitor.latest, 'the arm did not come to rest'
     if packet is None or not is_at_rest(packet):
-        return GoalSignal.TIMEOUT, no_rest
+        return GoalSignal.NOT_SETTLED, no_rest
     if missed := feeder.monitor.missed_end(packet):
         return GoalSignal.DEVIATION, missed
-    return GoalSignal.TIMEOUT, feeder.monitor.goal_violation(packet) or no_rest
+    return GoalSignal.NOT_SETTLED, feeder.monitor.goal_violation(packet) or no_rest

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import GoalSignal, GoalState, Meaning
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.motion.events import Event, ServoReceived

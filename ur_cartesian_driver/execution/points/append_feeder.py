@@ -31,14 +31,9 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SendPoints,
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    GoalSignal,
-    GoalState,
-    is_at_rest,
-    Meaning,
-    NO_MEANING,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, is_at_rest
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.points.send_window import SendWindow
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction

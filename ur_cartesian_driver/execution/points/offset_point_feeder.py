@@ -19,12 +19,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     WriteInputs,
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    GoalSignal,
-    GoalState,
-    Meaning,
-    NO_MEANING,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
@@ -135,7 +131,7 @@ class OffsetPointFeeder(PointFeeder):
             case LinkLost(link=link, reason=reason) if (
                 link == INPUTS_LINK and state is GoalState.ARMING
             ):
-                return GoalSignal.TIMEOUT, (
+                return GoalSignal.NOT_READY, (
                     f'the robot does not take path offsets: {reason}'.rstrip('.')
                 )
         return None

@@ -16,14 +16,9 @@ from math import inf
 from ur_cartesian_driver.execution.goal.appended_records import AppendedRecords
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    GoalSignal,
-    GoalState,
-    is_at_rest,
-    Meaning,
-    NO_MEANING,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, is_at_rest
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import (
     ServoPhase,

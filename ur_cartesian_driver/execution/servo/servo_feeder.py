@@ -35,14 +35,8 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     WriteInputs,
 )
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, START_ANGLE_TOLERANCE
-from ur_cartesian_driver.execution.goal.goal_transitions import (
-    Fault,
-    GoalSignal,
-    GoalState,
-    INTERRUPTIBLE_STATES,
-    Meaning,
-    NO_MEANING,
-)
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, INTERRUPTIBLE_STATES
+from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
 from ur_cartesian_driver.execution.servo.offset_setpoints import OffsetSetpoints
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
@@ -198,7 +192,7 @@ class ServoFeeder(Feeder):
             case LinkLost(link=link, reason=reason) if (
                 link == INPUTS_LINK and state is GoalState.ARMING
             ):
-                return GoalSignal.TIMEOUT, (
+                return GoalSignal.NOT_READY, (
                     f'the robot does not take set-points: {reason}'.rstrip('.')
                 )
         return None

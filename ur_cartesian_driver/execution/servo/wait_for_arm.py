@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.execution.goal.goal_transitions import Fault, GoalSignal
+from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
 
