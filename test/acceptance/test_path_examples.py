@@ -26,7 +26,7 @@ from tracked_files import tracked_files
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState, DriverConfig
-from ur_cartesian_driver.execution.goal import goal_monitor
+from ur_cartesian_driver.execution.monitoring import standstill
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
@@ -125,7 +125,7 @@ def cell(private_ros_graph):
     every_frame = [frame for name in NAMES for frame in getattr(example(name), 'FRAMES', ())]
     monkeypatch = pytest.MonkeyPatch()
     # Timeouts that count in simulated time, which passes quickly.
-    monkeypatch.setattr(goal_monitor, 'STANDSTILL_TIMEOUT', RATE * goal_monitor.STANDSTILL_TIMEOUT)
+    monkeypatch.setattr(standstill, 'STANDSTILL_TIMEOUT', RATE * standstill.STANDSTILL_TIMEOUT)
     patient = partial(ProgramSettings, point_timeout=60.0)
     monkeypatch.setattr(program_sockets, 'ProgramSettings', patient)
     config = SimulatorConfig(

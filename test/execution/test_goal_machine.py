@@ -18,7 +18,6 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.execution.goal.goal_transitions import (
     GoalState,
     MONITORED_STATES,
@@ -28,6 +27,7 @@ from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal
 from ur_cartesian_driver.execution.goal.temporary_tcp import SET_TIMEOUT
 from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, CAUSE_TIMEOUT, STOP_TIMEOUT
+from ur_cartesian_driver.execution.monitoring.standstill import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.execution.points.append_feeder import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (

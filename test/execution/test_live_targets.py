@@ -26,7 +26,7 @@ class Session:
         self.generator = OnlineTrajectoryGenerator(ARM, IDENTITY, HOME, SETTINGS.limits)
         self.now = 100.0
         self.live = LiveTargets(self.generator, SETTINGS)
-        self.live.update(self.now)
+        self.live.age(self.now)
         self.home = self.generator.T_base_tcp
 
     def beside(self, y):
@@ -34,12 +34,12 @@ class Session:
         return Pose((x, y0 + y, z), self.home.quaternion)
 
     def add(self, y, age=0.0):
-        self.live.add(self.beside(y), age, self.now)
+        self.live.set_target(self.beside(y), age, self.now)
 
     def run(self, seconds):
         for _ in range(round(seconds / DT)):
             self.now += DT
-            self.live.update(self.now)
+            self.live.age(self.now)
             self.live.next(DT)
 
     @property
@@ -115,25 +115,25 @@ def test_targets_are_counted_in_the_report(session, count, said):
 def test_it_does_not_end_before_the_arm_rests(session):
     session.run(0.9)
     session.add(0.3)
-    session.live.update(session.now + 2.0)
+    session.live.age(session.now + 2.0)
     session.live.next(DT)
     session.run(0.1)
     for _ in range(100):
         if session.live.done:
             assert session.generator.at_rest
         session.run(DT)
-        session.live.update(session.now + 2.0)
+        session.live.age(session.now + 2.0)
     assert session.live.done
 
 
 def test_what_stops_it_is_reported_once_in_words(session):
     for i in range(30):
         x, y, z = session.home.position
-        session.live.add(
+        session.live.set_target(
             Pose((x - 0.45 - 1e-3 * (i % 3), y, z), session.home.quaternion), 0.0, session.now
         )
         session.run(0.1)
-    assert session.live.blocked
+    assert session.live.generator.blocked
     why = [line for line in session.live.report if line.startswith('the arm was stopped: ')]
     assert len(why) in (1, 2), 'reach, singularity'
 

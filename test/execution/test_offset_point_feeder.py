@@ -153,7 +153,7 @@ def test_a_strange_sequence_number_does_no_harm(last):
 
 def test_an_offset_is_written_with_the_frame_and_the_bounds_and_fades_when_stale():
     cell = Cell().start()
-    cell.feeder.set_path_offset((0.0, 0.003, 0.0), 0.0, cell.now)
+    cell.machine.can.displacing.set_offset((0.0, 0.003, 0.0), 0.0, cell.now)
     cell.move(0.2)
     row = cell.report()
     assert row[1:5] == (0.0, 0.003, 0.0, 1.0)
@@ -162,10 +162,10 @@ def test_an_offset_is_written_with_the_frame_and_the_bounds_and_fades_when_stale
     for _ in range(60):
         row = cell.report()
     assert row[1:4] == (0.0, 0.0, 0.0)
-    cell.feeder.set_path_offset((0.0, 0.003, 0.0), 0.0, cell.now)
+    cell.machine.can.displacing.set_offset((0.0, 0.003, 0.0), 0.0, cell.now)
     for k in range(50):
         cell.move(0.2 + 0.016 * k)
-        cell.feeder.set_path_offset((0.0, 0.003, 0.0), 0.0, cell.now)
+        cell.machine.can.displacing.set_offset((0.0, 0.003, 0.0), 0.0, cell.now)
         row = cell.report()
         assert row[2] == (0.003 if cell.feeder.monitor.time() < 1.0 else 0.0)
 

@@ -19,6 +19,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 from ur_cartesian_driver.motion.plan.offset_band import OffsetBand
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning.preflight.offset_bands import fade_time
 
 #: How many random streams; 10,000 take two minutes.
@@ -77,7 +78,7 @@ class Drive:
     def run(self, seconds, *, dt=STEP, pause=STEP):
         for _ in range(round(seconds / pause)):
             self.time += pause
-            self.setpoints.requests.update(self.time)
+            self.setpoints.requests.age(self.time)
             self.joints.append(self.setpoints.next(dt))
             self.places.append(np.array(ARM.forward(self.joints[-1]).position) - self._start)
 
@@ -130,7 +131,7 @@ def random_stream(seed):
             )
         elif rng.random() < 0.003:
             time += rng.uniform(0.0, 1.0)  # a gap
-        setpoints.requests.update(time)
+        setpoints.requests.age(time)
         step = STEP * rng.choice((1, 1, 1, 2))  # one that catches up stands for two
         values.append(setpoints.next(step)[:3])
         motion += step
@@ -230,7 +231,8 @@ def test_where_the_arm_is_says_how_far_the_path_has_applied_offset():
     drive.offset(0.0, 0.005, 0.0)
     drive.run(0.2)
     for k in (5, 20, 70, 99):
-        given = drive.setpoints.applied_offset(drive.joints[k])
+        q = drive.joints[k]
+        given = drive.setpoints.applied_offset(RobotState(timestamp=0.0, actual_q=q, target_q=q))
         assert given.shift == pytest.approx(tuple(drive.places[k]), abs=1e-9)
         assert given.offset == pytest.approx((0.0, drive.places[k][1], 0.0), abs=1e-9)
 

@@ -8,7 +8,7 @@ import pytest
 import robot_cell
 from robot_cell import CYCLE, run_cell
 
-from ur_cartesian_driver.execution.goal.goal_monitor import STANDSTILL_TIMEOUT
+from ur_cartesian_driver.execution.monitoring.standstill import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Tolerance
 from ur_cartesian_driver.motion.state.robot_state import RuntimeState

@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Composes the machine of a motion: its monitor, the feeder that its mode needs, and settings."""
+"""
+Makes the machine of a motion, with the feeder of its execution mode.
+
+:data:`FEEDERS` has the row of each mode. Live targets and freedrive are motions of the mode SERVO.
+"""
 
 from __future__ import annotations
 
@@ -48,14 +52,14 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
 
 
 def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return what sends points, at once or as they are appended."""
+    """Return the feeder of points that are all known, or are appended, or are displaced."""
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
     if not request.job.keep_open:
         return PointFeeder(monitor)
-    # The last piece on the wire begins within the horizon of the feeder, and ends within that of
-    # the goal. Where nothing can come in time any more, the ending is sent.
+    # The last piece on the wire begins within the horizon of the feeder, and ends within the
+    # horizon of the goal. Where nothing can come in time any more, the ending is sent.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
@@ -68,7 +72,7 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
 
 
 def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return what streams set-points: of a spline, to live targets, or none in freedrive."""
+    """Return the feeder of set-points of a spline, or to live targets, or that of freedrive."""
     job = request.job
     settings = ServoSettings(
         target_lag=config.servo_target_lag,
@@ -91,11 +95,11 @@ def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
             max_lag=min(settings.max_lag, horizon),
         )
         return AppendServoFeeder(_monitor(request, config), settings, config.keep_open_timeout)
-    setpoints = SplineSetpoints(job.spline)
+    setpoints, monitor = SplineSetpoints(job.spline), _monitor(request, config)
     if job.offset_band is None or request.arm is None:
-        return ServoFeeder(_monitor(request, config), ServoStream(setpoints, settings))
+        return ServoFeeder(monitor, ServoStream(setpoints, settings))
     offsets = OffsetSetpoints(setpoints, job.offset_band, _arm(request.arm))
-    return ServoFeeder(_monitor(request, config), ServoStream(offsets, settings), offsets)
+    return ServoFeeder(monitor, ServoStream(offsets, settings), offsets, offsets.requests)
 
 
 #: The feeder of each execution mode.

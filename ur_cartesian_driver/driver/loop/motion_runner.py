@@ -203,12 +203,12 @@ class MotionRunner:
     def set_live_target(self, request: SetLiveTarget) -> None:
         """Give the session that runs another target, if it is for it."""
         if request.motion == self._number and self._machine is not None:
-            self._machine.feeder.set_target(request.T_base_tcp, request.age, _now())
+            self._machine.can.steering.set_target(request.T_base_tcp, request.age, _now())
 
     def set_path_offset(self, request: SetPathOffset) -> None:
         """Give the motion that runs another path offset, if it is for it."""
         if request.motion == self._number and self._machine is not None:
-            self._machine.feeder.set_path_offset(request.offset, request.age, _now())
+            self._machine.can.displacing.set_offset(request.offset, request.age, _now())
 
     def cancel(self, request: CancelMotion) -> None:
         """Stop the motion, if it is the one that runs."""

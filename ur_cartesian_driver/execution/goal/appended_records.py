@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+from math import inf
+
+from ur_cartesian_driver.execution.goal.feeder import how_often, Phrasing, Reporting
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
-from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
+from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, is_at_rest
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
+from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning, NO_MEANING
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 
 #: The answer to points that come after a request with ``last: true``.
@@ -19,18 +23,19 @@ _ACCEPTS_POINTS = frozenset(
 )
 
 
-class AppendedRecords:
-    """Which records of the goal are to be carried out, and how often there were none."""
+class AppendedRecords(Phrasing, Reporting):
+    """Keeps count of the records that will be run, and of the rests because there were none."""
 
     def __init__(self, monitor: GoalMonitor) -> None:
         """Begin with the first points of a goal."""
         self._monitor = monitor
         #: Whether more points may come.
         self.is_open = True
-        #: How many records are carried out whatever comes: all but the ending.
+        #: How many records are run whatever comes: all but the ending.
         self.committed = monitor.job.points - monitor.job.ending_records
         #: How often the motion was brought to rest, and behind which point the last time.
-        self._stop_count = self.last_stop_point = 0
+        self._stop_count = self._last_stop_point = 0
+        self._is_resting = False
 
     def append(
         self, append_job: AppendJob, state: GoalState, *, sent: int = 0, sent_until: float
@@ -38,8 +43,8 @@ class AppendedRecords:
         """
         Take all points of a request, or none.
 
-        :param sent: how many records cannot be replaced any more.
-        :param sent_until: until when the motion cannot [s].
+        :param sent: how many records can no longer be replaced.
+        :param sent_until: the time until which the motion can no longer be replaced [s].
         """
         number, job, before = append_job.number, append_job.job, append_job.records_before
         if not self.is_open:
@@ -67,21 +72,56 @@ class AppendedRecords:
             self.committed -= job.ending_records
         return AnswerAppend(number=number)
 
+    def supply(self, state: GoalState, *, runs_out: bool, has_more: bool) -> Meaning:
+        """
+        Return the signal for running out of points, or for points that came at rest.
+
+        :param runs_out: nothing but the ending is left to send.
+        :param has_more: there is a motion behind the ending.
+        """
+        if state is GoalState.MOVING and runs_out:
+            return GoalSignal.STARVING, ''
+        if state is not GoalState.AWAITING_POINTS:
+            return NO_MEANING
+        if not has_more:
+            return NO_MEANING if self.is_open else (GoalSignal.NO_MORE_POINTS, '')
+        packet = self._monitor.latest
+        # Packets may be late: the next motion begins where one of them shows the arm at rest.
+        if packet is None or not is_at_rest(packet):
+            return NO_MEANING
+        moved = self._monitor.rest_offset(packet)
+        return (GoalSignal.APPENDED, '') if moved is None else (GoalSignal.DEVIATION, moved)
+
     def run_out(self) -> int:
         """Commit the ending, because nothing came in time; return how many records there are."""
         self._stop_count += 1
-        self.last_stop_point = self._monitor.records.points - 1
+        self._last_stop_point = self._monitor.records.points - 1
         self.committed = self._monitor.records.total
         return self.committed
 
+    def rest(self, time: float = inf) -> None:
+        """Take note that the arm rests behind the ending, at a planned time [s]."""
+        self._is_resting = True
+        self._monitor.finish(time)
+
+    def go_on(self) -> None:
+        """Take note that the arm moves again."""
+        self._is_resting = False
+
+    def location(self, *, started: bool) -> str:
+        """Return where the arm waits for points, as a clause; '' while it moves."""
+        if not self._is_resting:
+            return ''
+        return f'at rest behind point {self._last_stop_point}, waiting for more'
+
     @property
-    def report_lines(self) -> tuple[str, ...]:
+    def report(self) -> tuple[str, ...]:
         """How often the arm had to wait for points."""
         if not self._stop_count:
             return ()
-        times = 'once' if self._stop_count == 1 else f'{self._stop_count} times'
+        times = how_often(self._stop_count)
         return (
             f'the motion was brought to rest {times}, the last time behind point '
-            f'{self.last_stop_point}, because no more points came in time; what was appended '
+            f'{self._last_stop_point}, because no more points came in time; what was appended '
             'later is later by as much as that took',
         )

@@ -1,16 +1,23 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What gives the robot the motion of a goal: points, set-points, or a person's hand.
+Feeders send the robot the motion of a goal: points, set-points, or leave to be guided by hand.
 
-A :class:`~.goal_machine.GoalMachine` knows in which state a goal is. It asks its feeder what to
-send in that state, and what the answers of the robot mean; the feeder never changes the state.
+A :class:`~.goal_machine.GoalMachine` knows the state of a goal. It asks its :class:`Feeder` for
+the commands of that state; the feeder never changes the state.
+
+Everything that only some motions can do is a *capability*: a small class of its own, from which a
+feeder inherits, or one of the :attr:`~Feeder.parts` of which it is made. The machine looks all of
+them up once (:class:`Capabilities`). The methods of each class here do what is right for a motion
+that does not have the capability. So a new one is a class, a line of :class:`Capabilities`, the
+place in the machine where it counts, and the feeders that have it; the others do not change.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import nan
+from typing import TypeVar
 
 from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend, GoalCommand
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
@@ -23,125 +30,141 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
+T = TypeVar('T')
+
 
 class Feeder(ABC):
-    """Gives the robot the motion of one goal; the defaults are those of points sent at once."""
+    """Sends the robot the motion of one goal."""
 
-    #: How long a goal waits at rest for more points [s]; 0 = without limit.
-    append_timeout = 0.0
-    #: Time from the start of the goal to that of its motion [s].
-    start_delay = 0.0
+    #: Objects that add capabilities to those of the feeder itself.
+    parts: tuple[object, ...] = ()
 
     def __init__(self, monitor: GoalMonitor) -> None:
-        """
-        Prepare; nothing is sent yet.
-
-        :param monitor: that of the goal.
-        """
+        """Prepare; nothing is sent yet."""
         self.monitor = monitor
 
-    # ---- what to send -------------------------------------------------------------------------
+    @abstractmethod
+    def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
+        """
+        Return the commands that belong to the beginning of a state: START or CANCEL, for example.
+
+        :param packet: the newest packet of the robot.
+        """
+
+    @abstractmethod
+    def feed(self, event: Event, now: float) -> list[GoalCommand]:
+        """
+        Return the next piece of the motion, in answer to a packet of the robot.
+
+        Packets of its state are answered in MOVING, after all that follows from them; packets of
+        its registers in every state, and before anything is concluded from them.
+
+        :param now: time of a steady clock [s].
+        """
+
+    @property
+    @abstractmethod
+    def buffered(self) -> float:
+        """Motion time that the robot has received and not yet run [s]."""
+
+
+class Prepared:
+    """The robot has to be prepared before the motion."""
+
+    #: The motion as users read of it where the robot's inputs belong to another client.
+    motion = ''
 
     def prepare(self) -> list[GoalCommand]:
-        """Return what to send before the motion may begin."""
+        """Return the commands that prepare the robot."""
         return []
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
         """
-        Return why the motion cannot begin yet, as a clause; empty if it can.
+        Return why the motion cannot begin yet, as a clause, or ''.
 
         :param packet: the newest packet of the robot, None before the first.
         """
         return ''
 
-    @abstractmethod
-    def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
+
+class Appendable:
+    """The client appends points while the goal runs, or replaces the tail of its motion."""
+
+    #: How long a goal waits at rest for more points [s]; 0 = without limit.
+    append_timeout = 0.0
+
+    def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
+        """Return the answer to points: all are taken or none; and the commands that follow."""
+        return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
+
+    def supply(self, state: GoalState) -> Meaning:
+        """Return the signal for running out of points, or for points that came at rest."""
+        return NO_MEANING
+
+
+class Steerable:
+    """The motion follows live targets."""
+
+    def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
         """
-        Return what to send because the goal enters a state: START or CANCEL, for example.
-
-        :param packet: the newest packet of the robot.
-        """
-
-    def feed(self) -> list[GoalCommand]:
-        """Return what to send next; called in MOVING, after each packet."""
-        return []
-
-    def append(self, append_job: AppendJob, state: GoalState) -> AnswerAppend:
-        """Take or refuse points that the client appends."""
-        return AnswerAppend(number=append_job.number, refusal='The goal is not open.')
-
-    def set_target(self, T_base_tcp: Pose, age: float, now: float) -> bool:
-        """
-        Take a live target; False = the goal follows none.
+        Take a live target.
 
         :param age: how long ago it was true [s].
         :param now: time of a steady clock [s].
         """
-        return False
 
-    def set_path_offset(self, offset: Vector3, age: float, now: float) -> bool:
+
+class Displaceable:
+    """Offsets displace the path while the arm moves (path_offset)."""
+
+    def set_offset(self, offset: Vector3, age: float, now: float) -> None:
         """
-        Take a path offset; False = the goal permits none.
+        Take an offset.
 
         :param offset: along the path, across it and normal to both [m].
         :param age: how long ago it was true [s].
         :param now: time of a steady clock [s].
         """
-        return False
 
-    # ---- what the robot confirms --------------------------------------------------------------
 
-    def take(self, event: Event, now: float) -> list[GoalCommand]:
+class Displaced:
+    """The tool is beside the path of the goal, because offsets displace it."""
+
+    def applied_offset(self, packet: RobotState) -> AppliedOffset:
+        """Return the offset at the place of the controller's target."""
+        return NO_OFFSET
+
+
+class Ageing:
+    """Something grows old while the motion goes on, or leads to warnings now and then."""
+
+    def age(self, now: float) -> list[GoalCommand]:
         """
-        Take note of an event, and return what answers it at once, in whatever state.
+        Let time pass, and return the warnings that are due.
 
         :param now: time of a steady clock [s].
         """
         return []
 
-    def interpret(self, event: Event, state: GoalState) -> Meaning | None:
-        """Return what an event means to the goal; None leaves that to the machine."""
-        return None
 
-    def supply(self, state: GoalState) -> Meaning:
-        """Return what it means how many points there are to send."""
-        return NO_MEANING
-
-    def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
-        """
-        Return how many motions the robot reports as begun, and how far its target may be behind.
-
-        :returns: the count since START (None = the robot reports none), and by how many motions
-            the controller's target may be behind it.
-        """
-        return (packet.points_begun if self.monitor.job.reports_points_begun else None), 0
-
-    def applied_offset(self, packet: RobotState) -> AppliedOffset:
-        """Return how far the path has given way where the arm is."""
-        return NO_OFFSET
+class Stallable:
+    """The motion waits for an arm that is off its path (on_path_tolerance: STALL)."""
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
-        """
-        Return the fault that ends the goal, after a look at one that may go away by itself.
-
-        Called with every packet while the robot program runs points.
-        """
+        """Return the fault of a motion, unless the motion waits until it goes away."""
         return fault
 
-    def confirms(self, now: float) -> bool:
-        """Tell whether the robot program reads what it gets, so that the arm may stand still."""
-        return False
 
-    def has_arrived(self, packet: RobotState) -> bool:
-        """Tell whether an arm that stands after the last point will not move again by itself."""
-        return True
+class Interpreting:
+    """The robot answers through other events than a motion of points has."""
 
-    # ---- what to report -----------------------------------------------------------------------
+    def interpret(self, event: Event, state: GoalState) -> Meaning | None:
+        """Return the meaning of an event; None leaves that to the machine."""
+        return None
 
-    @property
-    @abstractmethod
-    def buffered(self) -> float:
-        """Motion time that the robot has got and not yet run [s]."""
+
+class Streaming:
+    """The driver streams set-points, and knows by itself how far the robot is."""
 
     @property
     def lag(self) -> float:
@@ -150,25 +173,77 @@ class Feeder(ABC):
 
     @property
     def has_progress(self) -> bool:
-        """Whether the robot has begun what progress reports are about."""
+        """Whether progress reports have anything to report yet."""
         return True
 
-    def extra_reports(self) -> list[GoalCommand]:
-        """Return what is reported with each progress report."""
+    def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
+        """
+        Return how many motions the robot has begun, and how far its target lags behind that.
+
+        :returns: the count since START (None = unknown), and the largest number of motions by
+            which the controller's target is behind it.
+        """
+        return packet.points_begun, 0
+
+    def is_read(self, now: float) -> bool:
+        """Tell whether the robot program has read a set-point lately: then the arm may stand."""
+        return False
+
+    def has_arrived(self, packet: RobotState) -> bool:
+        """Tell whether an arm that stands after the last point will stay there."""
+        return True
+
+    def reports(self) -> list[GoalCommand]:
+        """Return the commands that accompany each progress report."""
         return []
 
+
+class Phrasing:
+    """The outcome is told in other words than that of a goal of points."""
+
     def success_text(self) -> str:
-        """Return the sentence of a goal that has succeeded."""
-        points = self.monitor.records.points
-        what = 'The point was' if points == 1 else f'All {points} points were'
-        return f'{what} executed in {self.monitor.scaled_time:.3f} s.'
+        """Return the sentence of a success, or '' for that of points."""
+        return ''
 
     def location(self, *, started: bool) -> str:
-        """Return where the goal ended, as a clause."""
-        if not started:
-            return 'before anything moved'
-        return self.monitor.script_call()[1] or f'on the way to point {self.monitor.waypoint()}'
+        """Return the place or time at which the goal ended, as a clause; '' for that of points."""
+        return ''
 
-    def report_lines(self) -> tuple[str, ...]:
-        """Return what the outcome reports beyond its sentence."""
+
+class Reporting:
+    """The report of the goal gets further lines."""
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """The lines."""
         return ()
+
+
+class Capabilities:
+    """The capabilities of a feeder; those that it does not have do nothing."""
+
+    def __init__(self, feeder: Feeder) -> None:
+        """Look them up in the feeder and its parts."""
+
+        def all_of(kind: type[T]) -> tuple[T, ...]:
+            return tuple(each for each in (feeder, *feeder.parts) if isinstance(each, kind))
+
+        def one_of(kind: type[T]) -> T:
+            return (*all_of(kind), kind())[0]
+
+        self.preparation = one_of(Prepared)
+        self.appending = one_of(Appendable)
+        self.steering = one_of(Steerable)
+        self.displacing = one_of(Displaceable)
+        self.displacement = one_of(Displaced)
+        self.stalling = one_of(Stallable)
+        self.interpretation = one_of(Interpreting)
+        self.streaming = one_of(Streaming)
+        self.phrasing = one_of(Phrasing)
+        self.ageing = all_of(Ageing)
+        self.reporting = all_of(Reporting)
+
+
+def how_often(count: int) -> str:
+    """Return a count of 1 or more in words, for a report."""
+    return 'once' if count == 1 else f'{count} times'

@@ -1,11 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of a goal machine; the owner of the sockets carries them out."""
+"""Commands of a goal machine, for the owner of the sockets."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.pose import Pose
@@ -15,18 +14,24 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
 
+class GoalCommand:
+    """A command of a goal machine."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SendControl:
+class SendControl(GoalCommand):
     """Send a trajectory action on the reverse socket."""
 
     action: TrajectoryAction
     count: int = 0
-    #: START: the path gives way to offsets that come through registers.
+    #: START: offsets that come through registers displace the path.
     takes_offsets: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SendPoints:
+class SendPoints(GoalCommand):
     """Send the records ``first`` up to, not including, ``end`` on the trajectory socket."""
 
     first: int
@@ -34,22 +39,22 @@ class SendPoints:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetTemporaryTcp:
+class SetTemporaryTcp(GoalCommand):
     """Set the robot's TCP for the time of a goal."""
 
     T_flange_tcp: Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RestoreTcp:
+class RestoreTcp(GoalCommand):
     """Restore the TCP that the robot had before :class:`SetTemporaryTcp`."""
 
     T_flange_tcp: Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SendSafeOutputs:
-    """Tell the robot program about outputs that have to be safe."""
+class SendSafeOutputs(GoalCommand):
+    """Send outputs and their safe values to the robot program, or have it set them."""
 
     action: SafeOutputsAction
     token: int
@@ -57,117 +62,94 @@ class SendSafeOutputs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SecureOutputs:
+class SecureOutputs(GoalCommand):
     """Write the safe values of outputs to the robot: its program is paused or gone."""
 
     outputs: tuple[SafeOutput, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RestoreOutputs:
+class RestoreOutputs(GoalCommand):
     """Write the values to the robot that its outputs had before a pause."""
 
     outputs: tuple[SafeOutput, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StopProgram:
+class StopProgram(GoalCommand):
     """End the robot program, whatever it does: the arm must not go on by itself."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReportProgress:
+class ReportProgress(GoalCommand):
     """Report the progress of the motion."""
 
     progress: Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerAppend:
+class AnswerAppend(GoalCommand):
     """Answer an append: all points are taken, or none."""
 
     number: int
-    #: Why they are not taken; empty = they are.
+    #: Why they are refused, as a sentence; '' = they are taken.
     refusal: str = ''
-    #: They would be taken if they were planned from rest: the ending has been sent.
+    #: Points planned from rest would be taken: the ending has been sent.
     replan_from_rest: bool = False
-    #: A new tail would be taken if it began at this time or later [s].
+    #: A new tail that begins at this time or later would be taken [s].
     earliest_cut: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OpenServo:
+class OpenServo(GoalCommand):
     """Take the RTDE inputs of the buffered servo, and report the robot's outputs for it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OpenOffsets:
+class OpenOffsets(GoalCommand):
     """Take the RTDE inputs of path offsets, and report the robot's outputs for them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CloseOffsets:
-    """Release these inputs."""
+class CloseOffsets(GoalCommand):
+    """Release the RTDE inputs of path offsets."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EnterServo:
-    """Have the robot program read these inputs."""
+class EnterServo(GoalCommand):
+    """Have the robot program read the inputs of the buffered servo."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WriteInputs:
-    """Write the RTDE inputs that were taken, in the order of their recipe in ``registers``."""
+class WriteInputs(GoalCommand):
+    """Write the taken RTDE inputs, in the order of their recipe in ``registers``."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LeaveServo:
+class LeaveServo(GoalCommand):
     """Have the robot program brake and stop reading, and release the inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReportServo:
+class ReportServo(GoalCommand):
     """Report the state of the servo."""
 
     report: ServoReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LogWarning:
+class LogWarning(GoalCommand):
     """Write a warning into the log."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finish:
+class Finish(GoalCommand):
     """The goal has ended."""
 
     outcome: Outcome
-
-
-GoalCommand: TypeAlias = (
-    SendControl
-    | SendPoints
-    | SetTemporaryTcp
-    | RestoreTcp
-    | SendSafeOutputs
-    | SecureOutputs
-    | RestoreOutputs
-    | StopProgram
-    | ReportProgress
-    | AnswerAppend
-    | OpenServo
-    | OpenOffsets
-    | CloseOffsets
-    | EnterServo
-    | WriteInputs
-    | LeaveServo
-    | ReportServo
-    | LogWarning
-    | Finish
-)

@@ -9,8 +9,7 @@ until one of them is :class:`~.goal_commands.Finish`.
 
 Each event becomes a signal, the signal chooses a transition in the table of
 :mod:`~.goal_transitions`, and the state that is entered gives commands. :mod:`~.goal_monitor`
-compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` knows what to send to
-the robot and what its answers mean.
+compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` sends the motion.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from ur_cartesian_driver.execution.goal.feeder import Feeder
+from ur_cartesian_driver.execution.goal.feeder import Capabilities, Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     Finish,
     GoalCommand,
@@ -49,7 +48,6 @@ from ur_cartesian_driver.execution.goal.outcome_codes import (
     NO_MEANING,
     RESULT_SIGNALS,
 )
-from ur_cartesian_driver.execution.goal.outcome_text import failure_text, tcp_report
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.execution.goal.timeouts import (
@@ -63,10 +61,13 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
+    INPUTS_LINK,
     LinkLost,
+    OffsetReceived,
     Outcome,
     OutputsSecured,
     PreemptRequested,
+    ServoReceived,
     StateReceived,
     Tick,
     TrajectoryEnded,
@@ -111,12 +112,12 @@ class GoalMachine:
         """
         self.state = INITIAL_STATE
         self.feeder = feeder
+        #: The capabilities of the feeder, which do nothing where it has none.
+        self.can = Capabilities(feeder)
         #: The TCP that was set for this goal, if any. The owner of the sockets restores it if it
         #: is not ``is_restored`` when the goal ends.
         self.temporary_tcp: TemporaryTcp | None = None
         self._monitor = feeder.monitor
-        #: Its outputs that have to be safe, if any.
-        self._guard: OutputGuard | None = None
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self._max_state_age = max_state_age or inf
         #: When the newest packet was true [s]; None = not known yet.
@@ -144,15 +145,13 @@ class GoalMachine:
         :param packet: the newest packet of the robot.
         """
         self._packet = packet
-        commands = self.feeder.prepare()
-        T_flange_tcp = self.job.T_flange_tcp
-        if self.job.safe_outputs:
-            self._guard = OutputGuard(self.job.safe_outputs, packet, self.job.following_outputs)
-            commands.append(self._guard.arm())
-        if T_flange_tcp is not None:
-            self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, T_flange_tcp)
-            commands.append(SetTemporaryTcp(T_flange_tcp=T_flange_tcp))
-        elif self._guard is None and not self.feeder.explain_not_ready(packet):
+        job = self.job
+        self._guard = OutputGuard(job.safe_outputs, packet, job.following_outputs)
+        commands = [*self.can.preparation.prepare(), *self._guard.arm()]
+        if job.T_flange_tcp is not None:
+            self.temporary_tcp = TemporaryTcp(job.T_flange_active, job.T_flange_tcp)
+            commands.append(SetTemporaryTcp(T_flange_tcp=job.T_flange_tcp))
+        elif not self._guard and not self.can.preparation.explain_not_ready(packet):
             # No time is needed: MOVING has no deadline.
             commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
@@ -171,66 +170,61 @@ class GoalMachine:
             self._packet_time = now - self._packet.state_age
         if self.state is GoalState.ARMING:
             self._deadline = min(self._deadline, now + ARMING_TIMEOUT)
-        commands = self.feeder.take(event, now)
-        if isinstance(event, StateReceived):
-            self._packet_time = now - event.state.state_age
-            self._observe(event.state, now)
-            if self._guard is not None:
-                goes_on = self.state in INTERRUPTIBLE_STATES
-                commands += self._guard.observe(event.state, goes_on=goes_on)
-        elif isinstance(event, OutputsSecured):
-            return commands + self._take_secured(event)
+        commands = [command for each in self.can.ageing for command in each.age(now)]
+        match event:
+            case StateReceived(state=packet):
+                commands += self._observe(packet, now)
+            case ServoReceived() | OffsetReceived():
+                commands += self.feeder.feed(event, now)
+            case OutputsSecured():
+                self._guard.take(event)
+                return commands + ([LogWarning(text=event.failure)] if event.failure else [])
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
         # A CANCEL does not wait for a progress report: the next packet brings one.
         sends_cancel = signal is not None and self.state is GoalState.CANCELLING
         if isinstance(event, StateReceived) and not sends_cancel:
-            commands += self._after_packet(now)
+            commands += self._after_packet(event, now)
         return commands
 
     def motion_status(self) -> MotionStatus:
         """Return how far the motion is, for the recording."""
-        return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.feeder.lag)
+        return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.can.streaming.lag)
 
     def end_time_of(self, records: int) -> float:
         """Return when the first ``records`` records are planned to end [s]."""
         return self._monitor.records.end_time(records)
 
-    def _observe(self, packet: RobotState, now: float) -> None:
-        self._packet = packet
+    def _observe(self, packet: RobotState, now: float) -> list[GoalCommand]:
+        """Take a packet, and return the commands that secure or restore the outputs."""
+        self._packet, self._packet_time = packet, now - packet.state_age
         if self.temporary_tcp is not None:
             self.temporary_tcp.observe(packet, now)
-        begun, behind = self.feeder.motions_begun(packet)
+        begun, behind = self.can.streaming.motions_begun(packet)
         self._monitor.update(
             packet,
             begun,
             behind,
             moving=self.state in RUNNING_STATES,
-            applied_offset=self.feeder.applied_offset(packet),
+            applied_offset=self.can.displacement.applied_offset(packet),
         )
         if self.state is GoalState.SETTLING:  # its time is that of the controller
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
-
-    def _take_secured(self, event: OutputsSecured) -> list[GoalCommand]:
-        assert self._guard is not None
-        self._guard.take(event)
-        return [LogWarning(text=event.failure)] if event.failure else []
+        return self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
 
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
-        answer = self.feeder.append(append_job, self.state)
-        if answer.refusal:
-            return [answer]
-        if self.state is GoalState.MOVING:
-            return [answer, *self.feeder.feed()]
-        return [answer, *self._apply_supply(now)]
+        commands = self.can.appending.append(append_job, self.state)
+        if self.state is GoalState.MOVING:  # the next packet tells whether points run out
+            return commands
+        return commands + self._apply_supply(now)
 
     # ---- from events to signals ---------------------------------------------------------------
 
     def _interpret(self, event: Event, now: float) -> Meaning:
-        """Return what the event means, with a clause for the outcome's text."""
-        meaning = self.feeder.interpret(event, self.state)
+        """Return the signal of an event, with a clause for the outcome's text."""
+        meaning = self.can.interpretation.interpret(event, self.state)
         if meaning is not None:
             return meaning
         match event:
@@ -241,6 +235,8 @@ class GoalMachine:
                     or self._check_outputs()
                     or self._check_packet(packet, now)
                 )
+            case ServoReceived() | OffsetReceived():
+                return NO_MEANING
             case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
                 self._deadline = now + EARLY_CANCELED_TIMEOUT
                 return NO_MEANING
@@ -259,13 +255,16 @@ class GoalMachine:
             case LinkLost(link='program', reason=reason):
                 return GoalSignal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):
+                if link == INPUTS_LINK and self.state is GoalState.ARMING:
+                    refusal = f'the robot does not take {self.can.preparation.motion}: {reason}'
+                    return GoalSignal.NOT_READY, refusal.rstrip('.')
                 return GoalSignal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
             case Tick():
                 return self._check_age(now) or self._check_deadline(now)
         raise TypeError(f'unknown event {event!r}')
 
     def _check_age(self, now: float) -> Meaning | None:
-        """Return that the arm has moved for too long since the newest packet was true."""
+        """Return the signal for an arm that has moved unseen for too long, or None."""
         assert self._packet_time is not None
         age = now - self._packet_time
         if age <= self._max_state_age or self.state not in MONITORED_STATES:
@@ -273,53 +272,46 @@ class GoalMachine:
         return GoalSignal.STALE, explain_age(age, self._max_state_age).rstrip('.')
 
     def _check_outputs(self) -> Meaning | None:
-        """Return that a goal must not go on, because a pause has changed its outputs."""
-        if self._guard is None or self.state not in INTERRUPTIBLE_STATES:
-            return None
+        """Return the signal for outputs that a pause has changed for good, or None."""
         fault = self._guard.fault()
-        return (GoalSignal.DEVIATION, fault) if fault else None
+        if not fault or self.state not in INTERRUPTIBLE_STATES:
+            return None
+        return GoalSignal.DEVIATION, fault
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return what a packet means in the present state, when nothing stops the robot."""
+        """Return the signal of a packet in the present state, when nothing stops the robot."""
         if self.state in RUNNING_STATES:
-            fault = self._monitor.find_fault(packet, may_stand_still=self.feeder.confirms(now))
-            return self.feeder.wait_out(fault, packet) or self.feeder.supply(self.state)
+            fault = self._monitor.find_fault(packet, may_stand=self.can.streaming.is_read(now))
+            fault = self.can.stalling.wait_out(fault, packet)
+            return fault or self.can.appending.supply(self.state)
         if self.state is GoalState.ARMING and self._is_armed(packet):
             return GoalSignal.ARMED, ''
-        if (
-            self.state is GoalState.SETTLING
-            and is_at_rest(packet)
-            and self.feeder.has_arrived(packet)
-        ):
-            return self._arrival(packet, now)
-        if self.state is GoalState.COMING_TO_REST and is_at_rest(packet):
-            return GoalSignal.AT_REST, ''
-        if (
-            self.state is GoalState.RESTORING
-            and self._is_tcp_restored()
-            and self._are_outputs_confirmed()
-        ):
+        if is_at_rest(packet):
+            if self.state is GoalState.SETTLING and self.can.streaming.has_arrived(packet):
+                return self._arrival(packet, now)
+            if self.state is GoalState.COMING_TO_REST:
+                return GoalSignal.AT_REST, ''
+        if self.state is GoalState.RESTORING and self._is_restored():
             return GoalSignal.RESTORED, ''
         signal, text = self._check_deadline(now)
-        return (signal, text) if signal is not None else self.feeder.supply(self.state)
+        return (signal, text) if signal is not None else self.can.appending.supply(self.state)
 
     def _is_armed(self, packet: RobotState) -> bool:
         """Tell whether the robot is ready, with the TCP of the goal where the plan begins."""
         tcp = self.temporary_tcp
         return (
             (tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None))
-            and (self._guard is None or self._guard.is_confirmed(packet))
-            and not self.feeder.explain_not_ready(packet)
+            and self._guard.is_confirmed(packet)
+            and not self.can.preparation.explain_not_ready(packet)
         )
 
-    def _is_tcp_restored(self) -> bool:
-        return self.temporary_tcp is None or self.temporary_tcp.is_restored
-
-    def _are_outputs_confirmed(self) -> bool:
-        return self._guard is None or self._guard.is_confirmed(self._packet)
+    def _is_restored(self) -> bool:
+        """Tell whether the robot has its own TCP, and has confirmed the outputs."""
+        tcp = self.temporary_tcp
+        return (tcp is None or tcp.is_restored) and self._guard.is_confirmed(self._packet)
 
     def _arrival(self, packet: RobotState, now: float) -> Meaning:
-        """Return the meaning of an arm at rest after the program's SUCCESS."""
+        """Return the signal of an arm at rest after the program's SUCCESS."""
         missed = self._monitor.missed_end(packet)
         if missed and now >= self._arrival_due:
             return GoalSignal.DEVIATION, missed
@@ -338,16 +330,16 @@ class GoalMachine:
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
 
     def _check_deadline(self, now: float) -> Meaning:
-        """Return the meaning of a deadline that has passed."""
+        """Return the signal of a deadline that has passed."""
         if now < self._deadline:
             return NO_MEANING
         if self.state not in RUNNING_STATES:
-            return missed_deadline(self.state, self.feeder, self.temporary_tcp, self._guard)
+            return missed_deadline(
+                self.state, self._monitor, self.can, self.temporary_tcp, self._guard
+            )
         # Only an early CANCELED sets a deadline in these states; it counts if nothing has begun.
         self._deadline = inf
-        if self._has_not_begun():
-            return RESULT_SIGNALS[TrajectoryResult.CANCELED]
-        return NO_MEANING
+        return RESULT_SIGNALS[TrajectoryResult.CANCELED] if self._has_not_begun() else NO_MEANING
 
     # ---- from signals to commands -------------------------------------------------------------
 
@@ -364,19 +356,16 @@ class GoalMachine:
                 self._code, self._text = transition.code, text
         if self.state is before:
             return []
-        commands = [] if self._awaits_disarming() else self.feeder.enter(self.state, self._packet)
+        # A motion that left its mode before the outputs are disarmed would set them.
+        disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
+        commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
 
-    def _awaits_disarming(self) -> bool:
-        """Tell whether a motion that leaves its mode now would set the outputs of a success."""
-        return (
-            self.state is GoalState.RESTORING
-            and self._code is ErrorCode.SUCCESSFUL
-            and self._guard is not None
-        )
+    def _succeeds(self) -> bool:
+        return self._code is ErrorCode.SUCCESSFUL
 
     def _apply_supply(self, now: float) -> list[GoalCommand]:
-        signal, text = self.feeder.supply(self.state)
+        signal, text = self.can.appending.supply(self.state)
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
@@ -385,8 +374,7 @@ class GoalMachine:
             case GoalState.MOVING:
                 self._deadline, self._has_moved = inf, True
             case GoalState.AWAITING_POINTS:
-                timeout = self.feeder.append_timeout
-                self._deadline = now + timeout if timeout > 0.0 else inf
+                self._deadline = now + (self.can.appending.append_timeout or inf)
                 return self._apply_supply(now)
             case GoalState.SETTLING:
                 return self._enter_settling(now)
@@ -396,9 +384,9 @@ class GoalMachine:
                 return self._enter_restoring(now)
             case GoalState.PROGRAM_LOST:
                 self._deadline = now + CAUSE_TIMEOUT
-                return [] if self._guard is None else self._guard.secure()
+                return self._guard.secure()
             case GoalState.ENDED:
-                return self._enter_ended(signal)
+                return [*self._secure_unconfirmed(), *self._end(signal)]
         return []
 
     def _enter_settling(self, now: float) -> list[GoalCommand]:
@@ -412,13 +400,13 @@ class GoalMachine:
 
     def _explain_late(self, tolerance: float) -> str:
         """
-        Return how late the last point was reached, as a clause; empty if in time.
+        Return how late the last point was reached, as a clause, or ''.
 
         :param tolerance: allowed delay [s]; negative = any.
         """
         if self.job.due is None or tolerance < 0.0:
             return ''
-        due = self.job.due + self.feeder.start_delay
+        due = self.job.due + self._monitor.start_delay
         late = self._monitor.scaled_time - due
         if late <= tolerance:
             return ''
@@ -430,50 +418,40 @@ class GoalMachine:
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
         """Restore the TCP, see to the outputs; a goal that has neither ends at once."""
         self._is_decided = True
-        if self.temporary_tcp is None and self._guard is None:
+        if self.temporary_tcp is None and not self._guard:
             return self._apply(GoalSignal.RESTORED, '', now)
-        commands: list[GoalCommand] = [*self._final_progress()]
-        if self._guard is not None:
-            self._deadline = now + SAFE_OUTPUTS_TIMEOUT
-            succeeded = self._code is ErrorCode.SUCCESSFUL
-            commands.append(self._guard.release(succeeded=succeeded))
+        self._deadline = now + SAFE_OUTPUTS_TIMEOUT
+        release = self._guard.release(succeeded=self._succeeds())
+        commands = [*self._final_progress(), *release]
         if self.temporary_tcp is not None:
             self._deadline = now + ARMING_TIMEOUT
             commands.append(RestoreTcp(T_flange_tcp=self.temporary_tcp.T_flange_original))
         return commands
 
-    def _enter_ended(self, signal: GoalSignal) -> list[GoalCommand]:
-        return [*self._secure_unconfirmed(), *self._end(signal)]
-
     def _secure_unconfirmed(self) -> list[GoalCommand]:
         """Write the safe outputs, unless the robot program has confirmed that they are."""
-        if (
-            self._guard is None
-            or self._code is ErrorCode.SUCCESSFUL
-            or (self._is_decided and self._guard.is_safe(self._packet))
-        ):
+        if self._succeeds() or (self._is_decided and self._guard.is_safe(self._packet)):
             return []
-        if self._is_decided:  # it was told to
-            return self._guard.secure()
-        return [self._guard.release(succeeded=False), *self._guard.secure()]
+        # In RESTORING the program was told already.
+        release = [] if self._is_decided else self._guard.release(succeeded=False)
+        return [*release, *self._guard.secure()]
 
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
-        if self._is_decided:  # no motion is left that could resume
-            return self._finish()
-        if signal in STOP_PROGRAM_AFTER:
+        # In RESTORING no motion is left that could resume.
+        if signal in STOP_PROGRAM_AFTER and not self._is_decided:
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
 
     # ---- reports ------------------------------------------------------------------------------
 
-    def _after_packet(self, now: float) -> list[GoalCommand]:
+    def _after_packet(self, event: StateReceived, now: float) -> list[GoalCommand]:
         """Return the next points to send, and the progress report if one is due."""
         if self.state is GoalState.ENDED:
             return []
-        commands = self.feeder.feed() if self.state is GoalState.MOVING else []
+        commands = self.feeder.feed(event, now) if self.state is GoalState.MOVING else []
         if now >= self._next_report and self._has_progress():
             self._next_report = now + self._feedback_period
-            commands += [self._progress(), *self.feeder.extra_reports()]
+            commands += [self._progress(), *self.can.streaming.reports()]
         return commands
 
     def _has_progress(self) -> bool:
@@ -481,7 +459,7 @@ class GoalMachine:
         packet, tcp = self._monitor.latest, self.temporary_tcp
         return (
             packet is not None
-            and self.feeder.has_progress
+            and self.can.streaming.has_progress
             and (tcp is None or tcp.is_active(packet))
         )
 
@@ -490,7 +468,7 @@ class GoalMachine:
         return ReportProgress(
             progress=self._monitor.progress(
                 buffered=self.feeder.buffered,
-                lag=self.feeder.lag,
+                lag=self.can.streaming.lag,
                 at_end=waits or self.state is GoalState.SETTLING,
                 waits=waits,
             )
@@ -500,21 +478,32 @@ class GoalMachine:
         return [self._progress()] if self._has_progress() else []
 
     def _finish(self) -> list[GoalCommand]:
-        code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
-        if code is ErrorCode.SUCCESSFUL:
-            text = f'{self._text}.' if self._text else self.feeder.success_text()
-        elif code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
-            text = failure_text(self._text, 'at the last point')
-        else:
-            text = failure_text(self._text, self.feeder.location(started=self._has_moved))
-        stopped = None
-        if code is not ErrorCode.SUCCESSFUL and len(self.job.waypoint):
-            stopped = self._monitor.place()
-        report = (
-            *tcp_report(self.temporary_tcp, self._monitor.latest),
-            *self.feeder.report_lines(),
+        tcp, monitor = self.temporary_tcp, self._monitor
+        has_place = not self._succeeds() and len(self.job.waypoint)
+        outcome = Outcome(
+            code=self._code if self._code is not None else ErrorCode.EXECUTION_FAILED,
+            text=self._success_text() if self._succeeds() else self._failure_text(),
+            report=(
+                *(() if tcp is None else (tcp.report(monitor.latest),)),
+                *(line for each in self.can.reporting for line in each.report),
+            ),
+            stopped=monitor.place() if has_place else None,
         )
-        return [
-            *self._final_progress(),
-            Finish(outcome=Outcome(code=code, text=text, report=report, stopped=stopped)),
-        ]
+        return [*self._final_progress(), Finish(outcome=outcome)]
+
+    def _success_text(self) -> str:
+        if self._text:
+            return f'{self._text}.'
+        return self.can.phrasing.success_text() or self._monitor.success_text()
+
+    def _failure_text(self) -> str:
+        """Return the sentence of a goal that failed: the cause, and the place."""
+        location = 'before anything moved'
+        if self._code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
+            location = 'at the last point'
+        elif own := self.can.phrasing.location(started=self._has_moved):
+            location = own
+        elif self._has_moved:
+            location = self._monitor.location()
+        text = self._text if location in self._text else f'{self._text} ({location})'
+        return text[:1].upper() + text[1:] + '.'

@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What it means for a goal that the time in its present state is up."""
+"""The signal of a goal whose time in its present state is up, and the reason in words."""
 
 from __future__ import annotations
 
-from ur_cartesian_driver.execution.goal.feeder import Feeder
+from ur_cartesian_driver.execution.goal.feeder import Capabilities
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState, is_at_rest
 from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
@@ -13,7 +14,11 @@ from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, STOP_TIM
 
 
 def missed_deadline(
-    state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard | None
+    state: GoalState,
+    monitor: GoalMonitor,
+    can: Capabilities,
+    tcp: TemporaryTcp | None,
+    guard: OutputGuard,
 ) -> Meaning:
     """
     Return the signal, with a clause for the outcome's text.
@@ -22,17 +27,18 @@ def missed_deadline(
     """
     match state:
         case GoalState.ARMING:
-            return GoalSignal.NOT_READY, _why_not_armed(feeder, tcp, guard)
+            clause = can.preparation.explain_not_ready(monitor.latest)
+            return GoalSignal.NOT_READY, clause or _why_not_armed(monitor, tcp, guard)
         case GoalState.AWAITING_POINTS:
             return GoalSignal.ABANDONED, (
                 'no more points, and no word that there are none, came within '
-                f'keep_open_timeout = {feeder.append_timeout:g} s'
+                f'keep_open_timeout = {can.appending.append_timeout:g} s'
             )
         case GoalState.SETTLING:
-            return _why_not_settled(feeder)
+            return _why_not_settled(monitor)
         case GoalState.RESTORING | GoalState.PROGRAM_LOST:
             return GoalSignal.TIMEOUT, ''
-    packet = feeder.monitor.latest
+    packet = monitor.latest
     if state is GoalState.CANCELLING and packet is not None and is_at_rest(packet):
         return GoalSignal.UNANSWERED, ''
     return GoalSignal.UNCONFIRMED, (
@@ -40,28 +46,26 @@ def missed_deadline(
     )
 
 
-def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None, guard: OutputGuard | None) -> str:
-    packet = feeder.monitor.latest
-    if clause := feeder.explain_not_ready(packet):
-        return clause
-    if guard is not None and not guard.is_confirmed(packet):
+def _why_not_armed(monitor: GoalMonitor, tcp: TemporaryTcp | None, guard: OutputGuard) -> str:
+    packet = monitor.latest
+    if not guard.is_confirmed(packet):
         return (
             f'the robot program did not confirm the safe_outputs of the goal within '
             f'{ARMING_TIMEOUT:g} s: it is paused, its command socket is dead, or RTDE carries too '
             'little; nothing was moved'
         )
     if packet is not None and tcp is not None and tcp.is_active(packet):
-        return feeder.monitor.start_offset(packet) or ''
+        return monitor.start_offset(packet) or ''
     return (
         f'the robot did not take the TCP of the goal within {ARMING_TIMEOUT:g} s: its program '
         'is paused, or does not know that command; nothing was moved'
     )
 
 
-def _why_not_settled(feeder: Feeder) -> Meaning:
-    packet, no_rest = feeder.monitor.latest, 'the arm did not come to rest'
+def _why_not_settled(monitor: GoalMonitor) -> Meaning:
+    packet, no_rest = monitor.latest, 'the arm did not come to rest'
     if packet is None or not is_at_rest(packet):
         return GoalSignal.NOT_SETTLED, no_rest
-    if missed := feeder.monitor.missed_end(packet):
+    if missed := monitor.missed_end(packet):
         return GoalSignal.DEVIATION, missed
-    return GoalSignal.NOT_SETTLED, feeder.monitor.goal_violation(packet) or no_rest
+    return GoalSignal.NOT_SETTLED, monitor.goal_violation(packet) or no_rest

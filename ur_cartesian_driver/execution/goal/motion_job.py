@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot process needs of a plan: small, because it is sent to another process."""
+"""The part of a plan that the robot process needs: small, because it travels between processes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any
@@ -35,7 +35,7 @@ from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, ReferencePat
 from ur_cartesian_driver.motion.plan.primitive import (
     AwaitInput,
     CallFunction,
-    OutputRecord,
+    Stop,
     SwitchOutput,
 )
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
@@ -43,7 +43,7 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_D
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionJob:
-    """What a goal machine needs of a plan."""
+    """The part of a plan that a goal machine needs."""
 
     #: How many records there are on the wire: motions and outputs.
     points: int
@@ -55,27 +55,27 @@ class MotionJob:
     #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
-    #: The TCP that the robot had when it was planned, the one that the plan needs (None = the
-    #: same), and the controlled frame relative to that.
+    #: The TCP of the robot at planning, the one that the plan needs (None = the same), and the
+    #: controlled frame relative to that.
     T_flange_active: Pose = IDENTITY
     T_flange_tcp: Pose | None = None
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
-    #: Those of a joint goal, beside the others.
+    #: The tolerances of a joint goal, beside the others.
     joint_tolerances: JointTolerances | None = None
     #: 0 = the default, negative = no limit [s].
     goal_time_tolerance: float = 0.0
-    #: Whether the robot program reports how many points it has begun.
+    #: Whether the count of points that have begun is known.
     reports_points_begun: bool = True
     #: Whether speeds are checked against the plan: not for OPTIMIZED moves, whose speeds the robot
     #: chooses, nor for open goals and set-points.
     has_speed_profile: bool = True
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
-    #: (records,) index of the waypoint that each record leads to or belongs to; empty = record i
-    #: is the motion to waypoint i.
+    #: (records,) index of the waypoint to which each record leads or belongs; empty = record i is
+    #: the motion to waypoint i.
     waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    #: (records,) which of them are motions, which the robot program counts; empty = all.
+    #: (records,) mask of the motions, which the robot program counts; empty = all are.
     is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
     #: Empty = when the reference path arrives at their waypoints.
@@ -89,28 +89,28 @@ class MotionJob:
     replace_horizon: float = 0.0
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
-    #: Whether the robot program does something where the arm stands.
+    #: Whether the robot program does anything at points where the arm stands.
     has_stops: bool = False
-    #: By waypoint: the time-out of its input [s], and that it has not come, as a clause.
+    #: By waypoint: the time-out of its input [s], and the clause of a vain wait.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
-    #: By the number of the record: how long a function of the prelude may take [s], and where the
-    #: program is meanwhile, as a clause.
+    #: By the number of the record: the longest time of a function of the prelude [s], and the
+    #: place of the program meanwhile, as a clause.
     script_calls: Mapping[int, tuple[float, str]] = field(default_factory=dict)
-    #: Where the tool may give way.
+    #: The parts of the path where the tool may give way.
     presses: tuple[PressWindow, ...] = ()
-    #: What outputs become when the motion does not go on as planned.
+    #: The values that outputs take when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
     #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
     stall_timeout: float = 0.0
     #: Analog outputs that the robot program writes again after a pause by itself.
     following_outputs: frozenset[int] = frozenset()
-    #: Where the path may give way; None = nowhere.
+    #: The band in which offsets may displace the path; None = none.
     offset_band: OffsetBand | None = None
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
     def __post_init__(self) -> None:
-        """Fill in what is left empty."""
+        """Fill in the columns that are left empty."""
 
         def fill(name: str, value: NDArray[Any]) -> None:
             if not len(getattr(self, name)):
@@ -124,7 +124,7 @@ class MotionJob:
 
     @property
     def own_program_needs(self) -> str:
-        """What only our robot program can do of this, as part of a sentence; empty = nothing."""
+        """The feature that only our robot program has, as part of a sentence; '' = none."""
         if self.following_outputs:
             return 'outputs that follow the speed (proportional_outputs)'
         if not self.is_motion.all():
@@ -168,26 +168,21 @@ def job_from_plan(
     :param ending_records: see :class:`MotionJob`.
     :param spline: the joints of a part that does not begin at rest.
     """
-    goal = plan.goal
-    rows = plan.rows
-    times, output_delay = (
-        goal.waypoints[-1].time,
-        _longest_delay(rows.outputs.get(len(rows) - 1, ())),
-    )
+    goal, rows, streams = plan.goal, plan.rows, plan.execution.traits.streams_setpoints
+    stalls = goal.on_path_tolerance is OnPathTolerance.STALL
+    last_time, output_delay = goal.waypoints[-1].time, _longest_delay(rows, len(rows) - 1)
     duration = start_time + plan.duration
-    end_times = start_time + np.cumsum(rows.durations)
-    request_times = end_times - _blend_lead_times(rows)
-    records = rows.records
-    first_records = np.cumsum(records) - records
-    is_motion = np.zeros(int(records.sum()), dtype=np.bool_)
+    first_records = np.cumsum(rows.records) - rows.records
+    is_motion = np.zeros(int(rows.records.sum()), dtype=np.bool_)
     is_motion[first_records] = True
+    end_times = start_time + np.cumsum(rows.durations)
     standing = stops(rows.primitives)
     return MotionJob(
         points=len(is_motion),
         reference=plan.reference,
         duration=duration,
         # A goal that was slowed as the client allows (on_too_fast) is not late because of that.
-        due=max(times, duration) + output_delay if times > 0.0 else None,
+        due=max(last_time, duration) + output_delay if last_time > 0.0 else None,
         output_delay=output_delay,
         T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active,
@@ -197,52 +192,59 @@ def job_from_plan(
         goal_tolerance=goal.goal_tolerance,
         joint_tolerances=plan.joint_tolerances,
         goal_time_tolerance=goal.goal_time_tolerance,
-        reports_points_begun=dialect.reports_points_begun,
+        # How far set-points are, the driver knows by itself.
+        reports_points_begun=dialect.reports_points_begun or streams,
+        execution=plan.execution,
         keep_open=goal.keep_open,
         replace_horizon=goal.replace_horizon,
         presses=tuple(_press_windows(plan)),
+        offset_band=plan.offset_band,
         safe_outputs=goal.safe_outputs,
         following_outputs=frozenset(output.pin for output in goal.proportional_outputs),
-        stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT)
-        if goal.on_path_tolerance is OnPathTolerance.STALL
-        else 0.0,
+        stall_timeout=(goal.stall_timeout or DEFAULT_STALL_TIMEOUT) if stalls else 0.0,
         ending_records=ending_records,
         has_stops=bool(standing),
-        input_waits={
-            int(rows.waypoints[row]): (
-                stop.timeout,
-                f'{stop.condition} did not come within {stop.timeout:g} s at point '
-                f'{rows.waypoints[row]}',
-            )
-            for row, stop in standing.items()
-            if isinstance(stop, AwaitInput)
-        },
-        script_calls={
-            int(first_records[row]): (
-                # The delay of outputs that follow it counts as the same motion.
-                stop.timeout + _longest_delay(rows.outputs.get(row, ())),
-                f'in {stop.text} at point {rows.waypoints[row]}',
-            )
-            for row, stop in standing.items()
-            if isinstance(stop, CallFunction)
-        },
-        has_speed_profile=not (
-            goal.keep_open
-            or plan.execution.traits.streams_setpoints
-            or has_optimized(rows.primitives)
-        ),
-        execution=plan.execution,
-        offset_band=plan.offset_band,
-        waypoint=np.repeat(rows.waypoints, records),
+        input_waits=_input_waits(rows, standing),
+        script_calls=_script_calls(rows, standing, first_records),
+        has_speed_profile=not (goal.keep_open or streams or has_optimized(rows.primitives)),
+        waypoint=np.repeat(rows.waypoints, rows.records),
         is_motion=is_motion,
-        end_times=np.repeat(end_times, records),
-        request_times=np.repeat(request_times, records),
-        spline=(spline or plan.joint_spline) if plan.execution.traits.streams_setpoints else None,
+        end_times=np.repeat(end_times, rows.records),
+        request_times=np.repeat(end_times - _blend_lead_times(rows), rows.records),
+        spline=(spline or plan.joint_spline) if streams else None,
     )
 
 
+def _input_waits(rows: PlannedRows, standing: Mapping[int, Stop]) -> dict[int, tuple[float, str]]:
+    """Return ``input_waits`` of the job."""
+    return {
+        int(rows.waypoints[row]): (
+            stop.timeout,
+            f'{stop.condition} did not come within {stop.timeout:g} s at point '
+            f'{rows.waypoints[row]}',
+        )
+        for row, stop in standing.items()
+        if isinstance(stop, AwaitInput)
+    }
+
+
+def _script_calls(
+    rows: PlannedRows, standing: Mapping[int, Stop], first_records: NDArray[np.int_]
+) -> dict[int, tuple[float, str]]:
+    """Return ``script_calls`` of the job."""
+    return {
+        int(first_records[row]): (
+            # The delay of outputs that follow it counts as the same motion.
+            stop.timeout + _longest_delay(rows, row),
+            f'in {stop.text} at point {rows.waypoints[row]}',
+        )
+        for row, stop in standing.items()
+        if isinstance(stop, CallFunction)
+    }
+
+
 def _press_windows(plan: Plan) -> Iterator[PressWindow]:
-    """Yield when the tool gives way on the reference path."""
+    """Yield the times at which the tool may give way on the reference path."""
     reference, goal = plan.reference, plan.goal
     rows = np.searchsorted(reference.point, np.arange(len(goal.waypoints)), side='right') - 1
     times = [*reference.time[rows].tolist(), inf]
@@ -265,8 +267,9 @@ def _press_windows(plan: Plan) -> Iterator[PressWindow]:
         )
 
 
-def _longest_delay(records: Iterable[OutputRecord]) -> float:
-    """Return how long after the end of the motion before them the last one is switched [s]."""
+def _longest_delay(rows: PlannedRows, row: int) -> float:
+    """Return how long after the end of a motion its last output is switched [s]."""
+    records = rows.outputs.get(row, ())
     return max((each.delay for each in records if isinstance(each, SwitchOutput)), default=0.0)
 
 

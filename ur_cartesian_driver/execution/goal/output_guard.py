@@ -5,7 +5,8 @@ The outputs of a goal that have to be safe whenever its motion does not go on as
 
 The robot program gets their values before the motion, and sets them in the thread that stops the
 arm. A program that is paused or gone runs no thread: then the driver writes them to the robot.
-What counts is what the robot confirms: the program by a token, the write by what it changed.
+Only confirmations count: the program confirms by a token, the write by the outputs that it
+changed.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _MOVABLE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 
 
 class OutputGuard:
-    """Knows whether the robot program has the values, and what a pause has changed."""
+    """Tracks whether the robot program has the values, and what a pause has changed."""
 
     def __init__(
         self,
@@ -35,7 +36,7 @@ class OutputGuard:
         following: frozenset[int] = frozenset(),
     ) -> None:
         """
-        Prepare.
+        Prepare; without outputs there is nothing to do at any time.
 
         :param packet: the newest of the robot.
         :param following: analog outputs that the robot program writes again by itself.
@@ -45,39 +46,45 @@ class OutputGuard:
         self._is_held = False
         #: A write was ordered for this pause, or for the end; its result is not known.
         self._is_ordered = False
-        #: What it has changed, with the values before.
+        #: The outputs that the write has changed, with the values before.
         self._changed: tuple[SafeOutput, ...] = ()
         #: The driver has switched outputs on again: that may happen later than the goal ends.
         self._has_restored = False
 
+    def __bool__(self) -> bool:
+        """Tell whether there are such outputs."""
+        return bool(self._outputs)
+
     # ---- the robot program --------------------------------------------------------------------
 
-    def arm(self) -> GoalCommand:
+    def arm(self) -> list[GoalCommand]:
         """Give the values to the robot program."""
         return self._order(SafeOutputsAction.ARM)
 
-    def release(self, *, succeeded: bool) -> GoalCommand:
+    def release(self, *, succeeded: bool) -> list[GoalCommand]:
         """End a goal: the outputs stay as they are, or have to be safe now at the latest."""
         return self._order(SafeOutputsAction.DISARM if succeeded else SafeOutputsAction.SET)
 
     def is_confirmed(self, packet: RobotState | None) -> bool:
         """Tell whether the robot program has carried out the last order."""
-        return packet is not None and packet.safe_outputs_token == self._token
+        return not self or (packet is not None and packet.safe_outputs_token == self._token)
 
     def is_safe(self, packet: RobotState | None) -> bool:
         """Tell whether the outputs are safe for good, after :meth:`release`."""
         return self.is_confirmed(packet) and not self._has_restored
 
-    def _order(self, action: SafeOutputsAction) -> GoalCommand:
-        # The register wraps as the wire does; 0 is what a program that begins has.
+    def _order(self, action: SafeOutputsAction) -> list[GoalCommand]:
+        if not self:
+            return []
+        # The register wraps as the wire does; 0 is the token of a program that begins.
         self._token = self._token % (2**31 - 1) + 1
-        return SendSafeOutputs(action=action, token=self._token, outputs=self._outputs)
+        return [SendSafeOutputs(action=action, token=self._token, outputs=self._outputs)]
 
     # ---- the driver ---------------------------------------------------------------------------
 
     def secure(self) -> list[GoalCommand]:
         """Write the values to the robot, once in a pause and once at the end."""
-        if self._is_ordered:
+        if self._is_ordered or not self:
             return []
         self._is_ordered = True
         return [SecureOutputs(outputs=self._outputs)]
@@ -88,6 +95,8 @@ class OutputGuard:
 
         :param goes_on: whether the goal goes on after a pause.
         """
+        if not self:
+            return []
         is_held = packet.runtime_state in _PAUSED or packet.safety_mode not in _MOVABLE
         was_held, self._is_held = self._is_held, is_held
         if is_held:
@@ -101,7 +110,7 @@ class OutputGuard:
         self._changed = event.changed
 
     def fault(self) -> str:
-        """Return why the goal cannot go on after a pause, as a clause; empty if it can."""
+        """Return why the goal cannot go on after a pause, as a clause, or ''."""
         lost = [output for output in self._changed if not output.restore]
         if self._is_held or not lost:
             return ''
@@ -112,11 +121,10 @@ class OutputGuard:
         )
 
     def _restore(self) -> list[GoalCommand]:
-        """Restore what a pause has changed, if all of it may be."""
-        changed = self._changed
-        if not changed or self.fault():
+        """Restore the outputs that a pause has changed, if all of them may be."""
+        if not self._changed or self.fault():
             return []
-        self._changed = ()
+        changed, self._changed = self._changed, ()
         restored = tuple(
             output
             for output in changed

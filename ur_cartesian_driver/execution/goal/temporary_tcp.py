@@ -3,9 +3,9 @@
 """
 The TCP that is set for the time of a goal that moves another frame, until it is restored.
 
-What the robot reports decides, never what was sent: a paused program reads nothing, one that ended
-may have restored the TCP by itself, and somebody else may have set another one, which must not be
-overwritten.
+Only the TCP that the robot reports counts, never the one that was sent: a paused program reads
+nothing, one that ended may have restored the TCP by itself, and somebody else may have set another
+one, which must not be overwritten.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ur_cartesian_driver.execution.goal.goal_transitions import is_at_rest
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: How much a TCP that the robot reports may differ from the one that was sent [m], [rad]: the
-#: resolution of the wire on each axis.
+#: How much a reported TCP may differ from the one that was sent [m], [rad]: the resolution of the
+#: wire on each axis.
 TCP_RESOLUTION = 2e-6
-#: How long the robot may take from a message that sets a TCP to reporting it [s]; after that the
-#: message counts as lost.
+#: How long the robot may take from a command that sets a TCP to reporting it [s]; after that the
+#: command counts as lost.
 SET_TIMEOUT = 0.5
 #: Shortest and longest pause before the TCP is restored once more [s].
 MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
@@ -32,11 +32,11 @@ def same_tcp(a: Pose, b: Pose) -> bool:
 
 
 class TemporaryTcp:
-    """A TCP that was set for a goal, until the one before it is restored."""
+    """Tracks a TCP that was set for a goal, until the one before it is restored."""
 
     def __init__(self, T_flange_original: Pose, T_flange_temporary: Pose) -> None:
         """
-        Begin; the message that sets the TCP is on its way.
+        Begin; the command that sets the TCP is on its way.
 
         :param T_flange_original: the TCP to restore.
         """
@@ -85,3 +85,17 @@ class TemporaryTcp:
     def retry_now(self) -> None:
         """Try again at once, because something has changed that may let the next try succeed."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
+
+    def report(self, packet: RobotState | None) -> str:
+        """Return the line about the TCP in the report of the goal."""
+        if not self.is_restored:
+            return (
+                'the TCP of the robot was set for the goal, and is not back yet: no goal is taken '
+                'until it is'
+            )
+        if packet is not None and same_tcp(packet.T_flange_tcp, self.T_flange_original):
+            return 'the TCP of the robot was set for the goal, and is what it was before'
+        return (
+            'the TCP of the robot was set for the goal; somebody else has set another one since, '
+            'which is left alone'
+        )

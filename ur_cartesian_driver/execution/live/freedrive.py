@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ur_cartesian_driver.execution.goal.feeder import Phrasing
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.outcome_codes import GoalSignal, Meaning
@@ -18,7 +19,7 @@ from ur_cartesian_driver.protocol.program.registers import ServoMode
 FREEDRIVE_TIMEOUT = 1.0
 
 
-class FreedriveFeeder(ServoFeeder):
+class FreedriveFeeder(ServoFeeder, Phrasing):
     """Keeps the robot program in freedrive until the goal ends."""
 
     stream: FreedriveStream
@@ -33,7 +34,7 @@ class FreedriveFeeder(ServoFeeder):
         return self.stream.is_active
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
-        """Return what an answer of the robot program means."""
+        """Return the meaning of the servo's phase after a packet."""
         if isinstance(event, ServoReceived) and self.stream.failure:
             # A program ends freedrive by itself where it is about to end.
             signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_active else GoalSignal.FAILURE
@@ -55,7 +56,7 @@ class FreedriveStream(ServoStream):
         self._requested_at = 0.0
         #: Whether the robot program has let the arm be guided.
         self.is_active = False
-        #: Why it does not (any more), as a clause.
+        #: Why it does not, or no longer, as a clause; '' = it does.
         self.failure = ''
 
     def begin(self) -> None:
@@ -63,7 +64,7 @@ class FreedriveStream(ServoStream):
         self._begun = True
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
-        """Take a packet; return what to write, None = nothing."""
+        """Take a packet; return the inputs to write, None = nothing."""
         if self._begun and self._requested_at == 0.0:
             self._requested_at = now
         is_teaching = feedback.mode == ServoMode.TEACH

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The targets of a live session, and what happens when they are late, out of order, or stop.
+The targets of a live session: late, out of order, or no longer coming.
 
 The newest target is the one with the newest stamp, in whatever order they arrive. It is followed
 until it is ``max_age`` old; then the arm brakes and waits at rest. A newer one continues. When
@@ -13,11 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
+from ur_cartesian_driver.execution.goal.feeder import Ageing, how_often, Reporting, Steerable
+from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand
 from ur_cartesian_driver.execution.live.online_trajectory import (
     LiveLimits,
     OnlineTrajectoryGenerator,
 )
-from ur_cartesian_driver.execution.offsets.freshness import Freshness
+from ur_cartesian_driver.execution.offsets.freshness import Freshness, RareWarnings
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 
@@ -43,42 +45,43 @@ class LiveSettings:
                 raise ValueError(f'{name} is {getattr(self, name)}; it must be positive')
 
 
-class LiveTargets:
+class LiveTargets(Steerable, Ageing, Reporting):
     """The source of the set-points of a session."""
 
     def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
         """Begin with no target."""
-        self.generator = generator
+        self.generator, self.settings = generator, settings
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
-        self.settings = settings
-        self._freshness = Freshness(settings.max_age)
+        self._freshness, self._warnings = Freshness(settings.max_age), RareWarnings()
         self._last_came = inf
-        self._is_over = False
+        self._is_over = self._was_blocked = False
         # The first wording of each reason.
         self._reasons: dict[str, str] = {}
 
-    def add(self, T_base_tcp: Pose, age: float, now: float) -> None:
-        """
-        Take a target.
-
-        :param age: how long ago it was true [s].
-        """
+    def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
+        """Take a target."""
         self._last_came = now
         if not self._freshness.accept(age, now):
             return
         self._is_over = False
         self.generator.set_target(T_base_tcp)
 
-    def update(self, now: float) -> None:
-        """Drop the newest target if it is too old; end the session after the timeout."""
+    def age(self, now: float) -> list[GoalCommand]:
+        """Drop a target that is too old, end the session after its timeout; warn of a stop."""
         generator = self.generator
+        warnings: list[GoalCommand] = []
+        if generator.blocked and not self._was_blocked:
+            text = f'the arm does not go to the live target: {generator.blocked}'
+            warnings = self._warnings.due(text, now)
+        self._was_blocked = bool(generator.blocked)
         if generator.target is not None and self._freshness.is_stale(now):
             # An arm that rests at its target is not stopped by that.
             self.pauses += not generator.arrived
             generator.clear_target()
         self._last_came = min(self._last_came, now)
         self._is_over = now - self._last_came > self.settings.timeout
+        return warnings
 
     def next(self, dt: float) -> Joints:
         """Return the set-point [rad] that follows ``dt`` [s] of nominal time after the last."""
@@ -96,7 +99,7 @@ class LiveTargets:
 
     @property
     def dropped(self) -> int:
-        """How many were ignored as older than another one, or too old."""
+        """How many targets were ignored as older than another one, or too old."""
         return self._freshness.dropped
 
     @property
@@ -105,29 +108,19 @@ class LiveTargets:
         return self._is_over and self.generator.at_rest
 
     @property
-    def blocked(self) -> str:
-        """Why the arm does not go to the newest target, as a clause; empty: it does."""
-        return self.generator.blocked
-
-    @property
     def report(self) -> tuple[str, ...]:
-        """What became of the targets, as lines of the report."""
+        """How many targets were followed and ignored, and why the arm was stopped."""
+        age = f'older than {self.settings.max_age:g} s'
         lines = [
             '1 target was followed'
             if self.accepted == 1
             else f'{self.accepted} targets were followed'
         ]
         if self.dropped:
-            lines.append(
-                f'{self.dropped} came after a newer one or were older than '
-                f'{self.settings.max_age:g} s, and were ignored'
-            )
+            lines.append(f'{self.dropped} came after a newer one or were {age}, and were ignored')
         if self.pauses:
-            times = 'once' if self.pauses == 1 else f'{self.pauses} times'
-            lines.append(
-                f'the arm was stopped {times} because the newest target was older than '
-                f'{self.settings.max_age:g} s'
-            )
+            times = how_often(self.pauses)
+            lines.append(f'the arm was stopped {times} because the newest target was {age}')
         return (*lines, *(f'the arm was stopped: {reason}' for reason in self._reasons.values()))
 
 

@@ -16,14 +16,22 @@ from math import isnan, nan
 
 from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
+    IDENTITY,
     multiply,
     Pose,
     Quaternion,
     rotate,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector3, Vector6
+from ur_cartesian_driver.motion.geometry.vectors import (
+    subtract,
+    subtract6,
+    Vector3,
+    vector3,
+    Vector6,
+)
 from ur_cartesian_driver.motion.goal.goal import Tolerance
+from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 _AXES = ('x', 'y', 'z')
@@ -44,14 +52,18 @@ class ToleranceQuantity:
 class ToleranceCheck:
     """Compares packets with a tolerance; quantities without a limit cost nothing."""
 
-    def __init__(self, tolerance: Tolerance, T_base_frame: Pose) -> None:
+    def __init__(
+        self, tolerance: Tolerance, T_base_frame: Pose, T_tcp_controlled: Pose = IDENTITY
+    ) -> None:
         """
         Prepare a tolerance.
 
         :param tolerance: zero and negative mean no limit; defaults were filled in before.
         :param T_base_frame: frame of the goal; all but the orientation is compared along its axes.
+        :param T_tcp_controlled: the frame that is compared, relative to the TCP.
         """
         self._q_frame_base = conjugate(T_base_frame.quaternion)
+        self._T_tcp_controlled = None if T_tcp_controlled == IDENTITY else T_tcp_controlled
         self._limited = tuple(
             (quantity, quantity.limits(tolerance))
             for quantity in QUANTITIES
@@ -70,6 +82,9 @@ class ToleranceCheck:
 
         :param desired: planned pose of the TCP in base.
         """
+        if self._T_tcp_controlled is not None:
+            desired = desired @ self._T_tcp_controlled
+            state = shift_reference_point(state, self._T_tcp_controlled)
         return excess_clause(
             (quantity.name, axis, quantity.unit, error, limit)
             for quantity, limits in self._limited
@@ -112,39 +127,29 @@ def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> 
     return rotation_vector_from_quaternion(multiply(actual, desired.quaternion))
 
 
-def _linear_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    return rotate(q_frame_base, subtract(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
+def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
+    """Return one half of twists or accelerations; NaN where the robot reports none."""
+
+    def limits(tolerance: Tolerance) -> Vector3:
+        values: Vector6 = getattr(tolerance, field)
+        return vector3(values[first : first + 3])
+
+    def error(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
+        target: Vector6 = getattr(state, f'target_tcp_{field}') or _UNKNOWN
+        actual: Vector6 = getattr(state, f'actual_tcp_{field}') or _UNKNOWN
+        return rotate(q_frame_base, vector3(subtract6(target, actual)[first : first + 3]))
+
+    return ToleranceQuantity(name, unit, limits, error)
 
 
-def _angular_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    return rotate(q_frame_base, subtract(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
-
-
-def _linear_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    target, actual = _accelerations(state)
-    return rotate(q_frame_base, subtract(target[:3], actual[:3]))
-
-
-def _angular_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    target, actual = _accelerations(state)
-    return rotate(q_frame_base, subtract(target[3:], actual[3:]))
-
-
-def _accelerations(state: RobotState) -> tuple[Vector6, Vector6]:
-    """Return target and actual; planning refuses limits where the robot reports none."""
-    return state.target_tcp_acceleration or _UNKNOWN, state.actual_tcp_acceleration or _UNKNOWN
-
-
-#: All quantities that have a tolerance.
+#: Where the three axes begin in twists and accelerations.
+_LINEAR, _ANGULAR = 0, 3
+#: All quantities that have a tolerance; planning refuses limits of those that are not reported.
 QUANTITIES: tuple[ToleranceQuantity, ...] = (
     ToleranceQuantity('position', 'm', lambda t: t.position, _position),
     ToleranceQuantity('orientation', 'rad', lambda t: t.orientation, _orientation),
-    ToleranceQuantity('linear velocity', 'm/s', lambda t: t.twist[:3], _linear_velocity),
-    ToleranceQuantity('angular velocity', 'rad/s', lambda t: t.twist[3:], _angular_velocity),
-    ToleranceQuantity(
-        'linear acceleration', 'm/s^2', lambda t: t.acceleration[:3], _linear_acceleration
-    ),
-    ToleranceQuantity(
-        'angular acceleration', 'rad/s^2', lambda t: t.acceleration[3:], _angular_acceleration
-    ),
+    _rate('linear velocity', 'm/s', 'twist', _LINEAR),
+    _rate('angular velocity', 'rad/s', 'twist', _ANGULAR),
+    _rate('linear acceleration', 'm/s^2', 'acceleration', _LINEAR),
+    _rate('angular acceleration', 'rad/s^2', 'acceleration', _ANGULAR),
 )

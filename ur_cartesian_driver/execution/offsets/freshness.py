@@ -1,15 +1,22 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the values that come at any time, and in any order, is the newest, and how long."""
+"""The age of values that clients send while the arm moves, and warnings about it."""
 
 from __future__ import annotations
 
 from math import inf
 
+from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, LogWarning
+
+#: Shortest time between two warnings of one kind [s].
+WARNING_PERIOD = 2.0
+
 
 class Freshness:
     """
-    Takes the stamps of values; all times are of one steady clock.
+    Tells which of the values that come at any time, and in any order, count.
+
+    All times are of one steady clock.
 
     :param max_age: how old a value may be to count [s].
     """
@@ -38,3 +45,18 @@ class Freshness:
     def is_stale(self, now: float) -> bool:
         """Tell whether the newest value is too old, or there is none."""
         return now - self._stamp > self.max_age
+
+
+class RareWarnings:
+    """Bounds how often something is warned of."""
+
+    def __init__(self) -> None:
+        """Begin before the first warning."""
+        self._next = -inf
+
+    def due(self, text: str, now: float) -> list[GoalCommand]:
+        """Return a warning, or nothing within :data:`WARNING_PERIOD` of the one before."""
+        if now < self._next:
+            return []
+        self._next = now + WARNING_PERIOD
+        return [LogWarning(text=text)]

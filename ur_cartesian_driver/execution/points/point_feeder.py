@@ -5,41 +5,48 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.execution.goal.feeder import Feeder
-from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendControl, SendPoints
+from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendControl
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.points.send_window import SendWindow
+from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 
 class PointFeeder(Feeder):
-    """Sends records as fast as the send window lets it."""
+    """Sends records as fast as the send window permits."""
+
+    #: Whether the robot program displaces the path by offsets that come through registers.
+    _takes_offsets = False
 
     def __init__(self, monitor: GoalMonitor) -> None:
         """Prepare the records of the goal."""
         super().__init__(monitor)
-        self._total = monitor.job.points
         self._window = SendWindow()
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """Return START with the first points, or CANCEL."""
         if state is GoalState.MOVING:
             self.monitor.start(packet.points_begun)
-            return [
-                SendControl(action=TrajectoryAction.START, count=self._total),
-                *self.feed(),
-            ]
+            start = SendControl(
+                action=TrajectoryAction.START,
+                count=self.monitor.job.points,
+                takes_offsets=self._takes_offsets,
+            )
+            return [start, *self._release()]
         if state is GoalState.CANCELLING:
             return [SendControl(action=TrajectoryAction.CANCEL, count=self._window.sent)]
         return []
 
-    def feed(self) -> list[GoalCommand]:
-        """Return the records that the send window lets go."""
-        first, end = self._window.release(self.monitor.records_begun(), self._total)
-        return [SendPoints(first=first, end=end)] if end > first else []
+    def feed(self, event: Event, now: float) -> list[GoalCommand]:
+        """Return the records that the send window permits."""
+        return self._release()
+
+    def _release(self) -> list[GoalCommand]:
+        return self._window.release(self.monitor.records_begun(), self.monitor.job.points)
 
     @property
     def buffered(self) -> float:
-        """Planned time of what was sent and lies ahead of the arm [s]."""
+        """Planned time of the records that were sent and lie ahead of the arm [s]."""
         return self.monitor.buffered(self._window.sent)

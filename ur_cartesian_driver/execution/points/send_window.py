@@ -1,10 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How many records may be on their way to the robot."""
+"""The bound on records that are on their way to the robot."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendPoints
 
 
 @dataclass(slots=True)
@@ -22,13 +24,17 @@ class SendWindow:
     #: How many the robot has begun, as far as is known.
     begun: int = 0
 
-    def release(self, begun: int, limit: int) -> tuple[int, int]:
+    def release(self, begun: int, limit: int) -> list[GoalCommand]:
         """
-        Return the range of records that may be sent now, ``(first, end)``, and count it as sent.
+        Return the command that sends the records whose turn it is, or none.
 
         :param begun: how many records the robot has begun.
         :param limit: how many records may be sent in all, whatever the robot has begun.
         """
-        first, self.begun = self.sent, max(self.begun, begun)
-        self.sent = max(first, min(limit, self.begun + self.size))
-        return first, self.sent
+        self.begun = max(self.begun, begun)
+        return self.send(min(limit, self.begun + self.size))
+
+    def send(self, end: int) -> list[GoalCommand]:
+        """Return the command that sends all records before ``end``, or none."""
+        first, self.sent = self.sent, max(self.sent, end)
+        return [SendPoints(first=first, end=end)] if end > first else []

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Set-points beside a path that gives way to offsets which come while the arm moves.
+Set-points beside a path that offsets displace while the arm moves.
 
-The tool moves towards the offset that is asked (:mod:`~ur_cartesian_driver.execution.offsets`)
-with bounded speed and acceleration along each axis of the frame of the path, never beyond the
-limits of the goal, and back to its path in time for the end of the motion. All of that counts in
-the time of the motion: where the motion is held, so is the offset.
+The tool moves towards the requested offset (:mod:`~ur_cartesian_driver.execution.offsets`) with
+bounded speed and acceleration along each axis of the frame of the path, never beyond the limits of
+the goal, and back to its path in time for the end of the motion. All of that counts in the time of
+the motion: where the motion is held, so is the offset.
 
 The joints are those of the path, changed so that the tool is displaced and turns as planned.
 """
@@ -18,6 +18,7 @@ from math import copysign
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.execution.goal.feeder import Displaced
 from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
 from ur_cartesian_driver.execution.servo.servo_stream import MIN_STEP
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
@@ -39,10 +40,12 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
+from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: The offset moves in steps of the motion's time that are no longer [s].
 STEP = MIN_STEP
-#: How many set-points are remembered, to find that at which the arm is: more than are in flight.
+#: How many set-points are remembered, to find the one at which the arm is: more than are in
+#: flight.
 HISTORY = 192
 _ROUNDING = 1e-9
 
@@ -51,7 +54,7 @@ class BoundedOffset:
     """
     The offset, which moves towards a target within the bounds of a band.
 
-    Each axis moves by itself: so none is ever too fast to stop at its limit.
+    Each axis moves by itself, so none is ever too fast to stop at its limit.
     """
 
     def __init__(self, band: OffsetBand) -> None:
@@ -65,14 +68,11 @@ class BoundedOffset:
         """Move for a step of time [s] towards a target within the limits."""
         if target == self.value and self.speed == ZERO3:
             return
-        values, speeds = [], []
-        for limit, aim, value, speed in zip(
-            self._band.limits, target, self.value, self.speed, strict=True
-        ):
-            value, speed = self._step_axis(limit, aim, value, speed, dt)
-            values.append(value)
-            speeds.append(speed)
-        self.value, self.speed = vector3(values), vector3(speeds)
+        a, b, c = (
+            self._step_axis(*axis, dt)
+            for axis in zip(self._band.limits, target, self.value, self.speed, strict=True)
+        )
+        self.value, self.speed = (a[0], b[0], c[0]), (a[1], b[1], c[1])
 
     def _step_axis(
         self, limit: float, aim: float, value: float, speed: float, dt: float
@@ -89,21 +89,20 @@ class BoundedOffset:
         return min(max(value, -limit), limit), speed
 
 
-class OffsetSetpoints:
-    """
-    The set-points of another source, displaced.
-
-    :param band: of the path.
-    :param setpoints: those on the path; they take the time of the motion.
-    """
+class OffsetSetpoints(Displaced):
+    """The set-points of another source, displaced."""
 
     def __init__(self, setpoints: SetpointSource, band: OffsetBand, arm: Arm) -> None:
-        """Begin on the path, with no offset to move to."""
+        """
+        Begin on the path, with no offset to move to.
+
+        :param setpoints: those on the path; they take the time of the motion.
+        :param band: that of the path.
+        """
         self._setpoints, self._band, self._arm = setpoints, band, arm
-        #: What is asked.
         self.requests = OffsetRequests(band)
         self._offset = BoundedOffset(band)
-        #: Time of the motion [s], and that which the offset has used.
+        #: Time of the motion [s], and the part of it that the offset has used.
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
@@ -138,38 +137,33 @@ class OffsetSetpoints:
         return self._joints
 
     def _displaced(self, on_path: Joints, offset: Vector3) -> Joints:
-        if offset == ZERO3:
-            self._change = ZERO6
-            self._remember(on_path, ZERO3, ZERO3)
-            return on_path
-        shift = self._band.shift(self._time, offset)
-        flange = self._arm.forward(on_path)
-        near = add6(on_path, self._change)
-        # The band was checked: without a solution it would be by rounding, and the change stays.
-        T_base_flange = Pose(add(flange.position, shift), flange.quaternion)
-        q = track_pose(self._arm, T_base_flange, near) or near
-        self._change = subtract6(q, on_path)
-        self.requests.note_applied(offset)
-        self._remember(q, shift, offset)
-        return q
-
-    # ---- where the arm is ---------------------------------------------------------------------
-
-    def _remember(self, q: Joints, shift: Vector3, offset: Vector3) -> None:
+        """Return the joints of a set-point whose tool is displaced, and remember it."""
+        q, shift, self._change = on_path, ZERO3, ZERO6 if offset == ZERO3 else self._change
+        if offset != ZERO3:
+            shift = self._band.shift(self._time, offset)
+            flange = self._arm.forward(on_path)
+            near = add6(on_path, self._change)
+            # The band was checked: without a solution it would be by rounding, and the change
+            # stays.
+            T_base_flange = Pose(add(flange.position, shift), flange.quaternion)
+            q = track_pose(self._arm, T_base_flange, near) or near
+            self._change = subtract6(q, on_path)
+            self.requests.note_applied(offset)
         self._history[self._count % HISTORY] = (*q, *shift, *offset)
         self._count += 1
+        return q
 
-    def applied_offset(self, target_q: Joints) -> AppliedOffset:
+    def applied_offset(self, packet: RobotState) -> AppliedOffset:
         """
-        Return how far the path has given way where the controller's target is.
+        Return the offset at the place of the controller's target.
 
-        That is at the set-point nearest to it, of those that it has not passed.
+        It is that of the set-point nearest to the target, of those that it has not passed.
         """
         if not self._count:
             return NO_OFFSET
         first = max(self._seen, self._count - HISTORY)
         rows = self._history[np.arange(first, self._count) % HISTORY]
-        away = rows[:, :6] - np.array(target_q)
+        away = rows[:, :6] - np.array(packet.target_q)
         self._seen = first + int(np.argmin(np.einsum('ij,ij->i', away, away)))
         found = self._history[self._seen % HISTORY].tolist()
         return AppliedOffset(vector3(found[6:9]), vector3(found[9:]))

@@ -1,59 +1,70 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The wait of a motion for an arm that is off its path (``on_path_tolerance: STALL``)."""
+"""Stalls a motion while the arm is off its path (``on_path_tolerance: STALL``)."""
 
 from __future__ import annotations
 
+from ur_cartesian_driver.execution.goal.feeder import Ageing, how_often, Reporting, Stallable
+from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, LogWarning
+from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
+from ur_cartesian_driver.execution.servo.servo_stream import ServoStream
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
 
-class WaitForArm:
+class WaitForArm(Stallable, Ageing, Reporting):
     """
-    The waiting of a motion for an arm that is off its path.
+    Holds the set-points while the arm is off its path, for a while.
 
-    The time of the robot counts, while its program plays: in a pause the arm cannot come back.
-
-    :param timeout: how long the arm may be off its path at a time [s]; 0 = nothing waits for it.
+    The robot's time counts, and only while its program plays: in a pause the arm cannot come back.
     """
 
-    def __init__(self, timeout: float) -> None:
+    def __init__(self, monitor: GoalMonitor, stream: ServoStream) -> None:
         """Begin on the path."""
-        self.timeout = timeout
-        #: What is wrong, as a clause; empty = nothing. Whether that has just begun.
-        self.clause, self.begins = '', False
-        #: By how much the motion was delayed, as far as it has been counted [s].
-        self.held_time = 0.0
+        self._monitor, self._stream = monitor, stream
+        self._timeout = monitor.job.stall_timeout
         self._since = self._timestamp = 0.0
         self._count, self._longest = 0, 0.0
+        #: By how much the motion was delayed, as far as its start time contains it [s].
+        self._held_time = 0.0
+        self._unsaid: list[GoalCommand] = []
 
-    def update(self, fault: Fault | None, packet: RobotState) -> bool:
-        """Take a packet, and return whether the arm is off its path."""
-        clause = fault[1] if fault and fault[0] is GoalSignal.VIOLATION else ''
-        is_off = bool(clause)
-        self.begins = is_off and not self.clause
-        if self.begins:
-            self._count, self._since = self._count + 1, packet.timestamp
+    def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
+        """Hold the motion where its fault is a violation that does not last too long."""
+        stream = self._stream
+        was_held = stream.is_held
+        stream.is_held = fault is not None and fault[0] is GoalSignal.VIOLATION
+        if not was_held:
+            self._since = packet.timestamp
         elif packet.runtime_state is not RuntimeState.PLAYING:
             self._since += packet.timestamp - self._timestamp
         self._timestamp = packet.timestamp
-        self.clause = clause
-        if is_off:
-            self._longest = max(self._longest, packet.timestamp - self._since)
-        return is_off
+        # The time of the goal stands still meanwhile.
+        self._monitor.start_delay += stream.held_time - self._held_time
+        self._held_time = stream.held_time
+        if fault is None or not stream.is_held:
+            return fault
+        if not was_held:
+            self._count += 1
+            text = f'the motion waits for the arm: {fault[1]}'
+            self._unsaid.append(LogWarning(text=text))
+        waited = packet.timestamp - self._since
+        self._longest = max(self._longest, waited)
+        if waited > self._timeout:
+            return GoalSignal.VIOLATION, f'{fault[1]} for {self._timeout:g} s'
+        return None
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the arm is off its path for too long."""
-        return bool(self.clause) and self._timestamp - self._since > self.timeout
+    def age(self, now: float) -> list[GoalCommand]:
+        """Return the warning that the motion waits, once for each wait."""
+        warnings, self._unsaid = self._unsaid, []
+        return warnings
 
     @property
     def report(self) -> tuple[str, ...]:
-        """What became of it."""
+        """How often, and how long, the motion has waited."""
         if not self._count:
             return ()
-        times = 'once' if self._count == 1 else f'{self._count} times'
         return (
-            f'the motion waited {times} for an arm that was off its path, for '
-            f'{self._longest:.2f} s at most; the goal took {self.held_time:.2f} s more',
+            f'the motion waited {how_often(self._count)} for an arm that was off its path, for '
+            f'{self._longest:.2f} s at most; the goal took {self._held_time:.2f} s more',
         )
