@@ -19,7 +19,6 @@ from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.points.append_feeder import (
-    AppendSettings,
     FIRST_POINTS_TIMEOUT,
 )
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
@@ -53,7 +52,7 @@ def job(first, count, **fields):
 
 
 def packet(time, begun=0, moves=True, T_flange_tcp=IDENTITY):
-    """The robot is where the plan has it at a time."""
+    """Return a packet of a robot that is where the plan has it at a time."""
     pose, v = Pose((SPEED * time, 0.0, 0.0)), SPEED if moves else 0.0
     return StateReceived(
         state=RobotState(
@@ -88,7 +87,7 @@ def actions(commands):
 
 
 def started(count=30, **settings):
-    machine = append_machine(job(1, count), settings=AppendSettings(**settings))
+    machine = append_machine(job(1, count), **settings)
     return machine, machine.start(packet(0.0, moves=False).state)
 
 
@@ -180,11 +179,11 @@ def test_the_time_at_rest_makes_nothing_late():
 
 
 def rest_at(time, place, begun):
-    """The robot is at rest where the plan has it at another time."""
+    """Return a packet of a robot at rest where the plan has it at another time."""
     return StateReceived(state=replace(packet(place, begun, moves=False).state, timestamp=time))
 
 
-def test_the_word_that_they_are_the_last_sends_the_ending_with_the_others():
+def test_points_said_to_be_the_last_are_sent_with_their_ending():
     machine, _ = started(count=10)
     commands = machine.step(AppendJob(number=1, records_before=0, job=None), 0.01)
     assert sent(commands) == [(9, 10)]
@@ -213,7 +212,7 @@ def test_points_may_come_before_the_tcp_of_the_goal_is_set():
     assert sent(commands)[0][0] == 0
 
 
-def test_what_was_passed_is_forgotten():
+def test_records_behind_the_arm_are_forgotten():
     machine, _ = started(count=20)
     records_before, held = 19, []
     for k in range(8):

@@ -9,7 +9,7 @@ from dataclasses import replace
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor, MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.goal.motion_job import MotionJob
-from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
@@ -35,12 +35,15 @@ def point_machine(
 
 def append_machine(
     job: MotionJob,
-    settings: AppendSettings | None = None,
     *,
+    horizon: float = 1.0,
+    margin: float = 0.2,
+    timeout: float = 30.0,
     max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
 ) -> GoalMachine:
     """Return the machine of a goal to which points are appended."""
-    return GoalMachine(AppendFeeder(GoalMonitor(job, max_plan_deviation), settings))
+    monitor = GoalMonitor(job, max_plan_deviation)
+    return GoalMachine(AppendFeeder(monitor, horizon=horizon, margin=margin, timeout=timeout))
 
 
 def servo_machine(job: MotionJob, settings: ServoSettings | None = None) -> GoalMachine:

@@ -24,7 +24,7 @@ from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
 from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFeeder
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
-from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.points.append_feeder import AppendFeeder
 from ur_cartesian_driver.execution.points.offset_point_feeder import OffsetPointFeeder
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.servo.append_servo_feeder import AppendServoFeeder
@@ -63,11 +63,9 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
-        AppendSettings(
-            horizon=min(config.keep_open_horizon, horizon),
-            margin=min(config.keep_open_margin, horizon),
-            timeout=config.keep_open_timeout,
-        ),
+        horizon=min(config.keep_open_horizon, horizon),
+        margin=min(config.keep_open_margin, horizon),
+        timeout=config.keep_open_timeout,
     )
 
 

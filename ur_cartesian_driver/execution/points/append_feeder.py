@@ -20,8 +20,6 @@ The states RUNNING_OUT and AWAITING_POINTS are of these goals only (:mod:`~.goal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ur_cartesian_driver.execution.goal.appended_records import AppendedRecords
 from ur_cartesian_driver.execution.goal.feeder import Appendable
 from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, SendControl
@@ -38,27 +36,22 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 FIRST_POINTS_TIMEOUT = 0.25
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AppendSettings:
-    """How far ahead the robot gets its points, and how long it waits for them."""
-
-    #: Planned time of the motion that the robot program has and has not run [s].
-    horizon: float = 1.0
-    #: The stream is closed this long before the robot program would ask for a point that is not
-    #: there [s].
-    margin: float = 0.2
-    #: How long the goal waits at rest for more points [s]; 0 = without limit.
-    timeout: float = 30.0
-
-
 class AppendFeeder(PointFeeder, Appendable):
     """Sends records up to the horizon, and the ending where nothing is appended in time."""
 
-    def __init__(self, monitor: GoalMonitor, settings: AppendSettings | None = None) -> None:
-        """Prepare the records that are known so far."""
+    def __init__(
+        self, monitor: GoalMonitor, *, horizon: float, margin: float, timeout: float
+    ) -> None:
+        """
+        Prepare the records that are known so far.
+
+        :param horizon: planned time of the motion that the robot program has and has not run [s].
+        :param margin: the stream is closed this long before the robot program would ask for a
+            point that is not there [s].
+        :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
+        """
         super().__init__(monitor)
-        self._settings = settings if settings is not None else AppendSettings()
-        self.append_timeout = self._settings.timeout
+        self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended,)
         #: How many records were sent before this stream, and whether its number was sent.
@@ -97,7 +90,7 @@ class AppendFeeder(PointFeeder, Appendable):
             time = 0.0 if packet is None else packet.timestamp
             return time - self._stream_start_time >= FIRST_POINTS_TIMEOUT
         request_time = self.monitor.records.request_time(sent)
-        return request_time - self.monitor.time() <= self._settings.margin
+        return request_time - self.monitor.time() <= self._margin
 
     # ---- points that go -----------------------------------------------------------------------
 
@@ -121,7 +114,7 @@ class AppendFeeder(PointFeeder, Appendable):
 
     def _release(self) -> list[GoalCommand]:
         """Return the records up to the horizon, without the ending; close a complete stream."""
-        ahead = self.monitor.records.count_until(self.monitor.time() + self._settings.horizon)
+        ahead = self.monitor.records.count_until(self.monitor.time() + self._horizon)
         begun, limit = self.monitor.records_begun(), min(ahead, self._appended.committed)
         commands = self._window.release(begun, limit)
         return commands if self._appended.is_open else commands + self._end_stream()
