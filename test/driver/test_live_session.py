@@ -92,7 +92,7 @@ def test_a_session_and_its_targets_come_through_the_pipe():
     assert isinstance(machine.feeder, LiveFeeder)
     set_target = sent(SetLiveTarget(motion=7, T_base_tcp=HERE, age=0.05))
     machine.can.steering.set_target(set_target.T_base_tcp, set_target.age, 10.0)
-    assert machine.feeder.targets.accepted == 1
+    assert machine.feeder.targets.freshness.accepted == 1
     assert isinstance(
         make_machine(replace(start(), live=None, freedrive=True), DriverConfig()).feeder,
         FreedriveFeeder,

@@ -75,7 +75,7 @@ def test_the_age_counts_from_the_stamp(session):
     for age in (0.25, float('nan')):
         session.add(0.1, age=age)
         assert session.generator.target is None
-    assert session.live.dropped == 2
+    assert session.live.freshness.dropped == 2
 
 
 def test_the_newest_stamp_wins_whatever_comes_last(session):
@@ -83,7 +83,7 @@ def test_the_newest_stamp_wins_whatever_comes_last(session):
     session.add(0.3, age=0.1)
     session.add(0.3, age=0.01)
     assert session.generator.target == session.beside(0.02)
-    assert (session.live.accepted, session.live.dropped) == (1, 2)
+    assert (session.live.freshness.accepted, session.live.freshness.dropped) == (1, 2)
 
 
 def test_an_arm_that_has_arrived_is_not_stopped_by_the_age(session):
@@ -126,7 +126,7 @@ def test_it_does_not_end_before_the_arm_rests(session):
     assert session.live.done
 
 
-def test_what_stops_it_is_reported_once_in_words(session):
+def test_each_reason_of_a_stop_is_reported_once(session):
     for i in range(30):
         x, y, z = session.home.position
         session.live.set_target(

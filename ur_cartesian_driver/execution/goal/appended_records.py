@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf
 
 from ur_cartesian_driver.execution.goal.feeder import how_often, Phrasing, Reporting
@@ -46,31 +47,25 @@ class AppendedRecords(Phrasing, Reporting):
         :param sent: how many records can no longer be replaced.
         :param sent_until: the time until which the motion can no longer be replaced [s].
         """
-        number, job, before = append_job.number, append_job.job, append_job.records_before
+        answer = partial(AnswerAppend, number=append_job.number)
+        job, before, cut_time = append_job.job, append_job.records_before, append_job.cut_time
         if not self.is_open:
-            return AnswerAppend(number=number, refusal=CLOSED_BY_CLIENT)
+            return answer(refusal=CLOSED_BY_CLIENT)
         if state not in _ACCEPTS_POINTS:
-            return AnswerAppend(number=number, refusal='The goal is ending.')
-        if append_job.cut_time is not None:
-            if before < sent or append_job.cut_time < sent_until - SAME_TIME:
-                return AnswerAppend(
-                    number=number,
-                    refusal='What is to be replaced has been sent.',
-                    earliest_cut=sent_until,
-                )
-        elif job is not None and before != self.committed:
-            return AnswerAppend(
-                number=number,
-                replan_from_rest=True,
-                refusal='The motion was closed before these points came.',
-            )
+            return answer(refusal='The goal is ending.')
+        if cut_time is not None and (before < sent or cut_time < sent_until - SAME_TIME):
+            refusal = 'What is to be replaced has been sent.'
+            return answer(refusal=refusal, earliest_cut=sent_until)
+        if cut_time is None and job is not None and before != self.committed:
+            refusal = 'The motion was closed before these points came.'
+            return answer(refusal=refusal, replan_from_rest=True)
         if job is not None:
             self._monitor.append(job, before)
         self.is_open = job is not None and job.keep_open
         self.committed = self._monitor.records.total
         if job is not None and job.keep_open:
             self.committed -= job.ending_records
-        return AnswerAppend(number=number)
+        return answer()
 
     def supply(self, state: GoalState, *, runs_out: bool, has_more: bool) -> Meaning:
         """
@@ -116,7 +111,7 @@ class AppendedRecords(Phrasing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """How often the arm had to wait for points."""
+        """The line about rests for lack of points."""
         if not self._stop_count:
             return ()
         times = how_often(self._stop_count)

@@ -1,16 +1,19 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeders send the robot the motion of a goal: points, set-points, or leave to be guided by hand.
+The feeder of a goal, which sends its motion to the robot, and the capabilities of feeders.
 
 A :class:`~.goal_machine.GoalMachine` knows the state of a goal. It asks its :class:`Feeder` for
-the commands of that state; the feeder never changes the state.
+commands, and the feeder never changes the state.
 
-Everything that only some motions can do is a *capability*: a small class of its own, from which a
-feeder inherits, or one of the :attr:`~Feeder.parts` of which it is made. The machine looks all of
-them up once (:class:`Capabilities`). The methods of each class here do what is right for a motion
-that does not have the capability. So a new one is a class, a line of :class:`Capabilities`, the
-place in the machine where it counts, and the feeders that have it; the others do not change.
+Motions differ much: points on a socket, set-points through registers, a person who guides the arm.
+A hook for each difference in one class would be empty in most feeders. So whatever only some
+motions can do is a *capability*: a small class, from which a feeder inherits, or one of its
+:attr:`~Feeder.parts` does. The machine looks all of them up once (:class:`Capabilities`). The
+methods of the classes below are right for a motion without the capability.
+
+A new capability is a class here, its line in :class:`Capabilities`, the place in the machine where
+it counts, and the feeder or part that has it. The other feeders stay as they are.
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ T = TypeVar('T')
 class Feeder(ABC):
     """Sends the robot the motion of one goal."""
 
-    #: Objects that add capabilities to those of the feeder itself.
+    #: Objects with capabilities that the feeder itself does not have.
     parts: tuple[object, ...] = ()
 
     def __init__(self, monitor: GoalMonitor) -> None:
@@ -46,7 +49,7 @@ class Feeder(ABC):
     @abstractmethod
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """
-        Return the commands that belong to the beginning of a state: START or CANCEL, for example.
+        Return the commands at the beginning of a state: START or CANCEL, for example.
 
         :param packet: the newest packet of the robot.
         """
@@ -56,8 +59,8 @@ class Feeder(ABC):
         """
         Return the next piece of the motion, in answer to a packet of the robot.
 
-        Packets of its state are answered in MOVING, after all that follows from them; packets of
-        its registers in every state, and before anything is concluded from them.
+        A packet of its state comes in MOVING only, and after all conclusions from it; a packet of
+        its registers comes in every state, and before any conclusion.
 
         :param now: time of a steady clock [s].
         """
@@ -71,7 +74,7 @@ class Feeder(ABC):
 class Prepared:
     """The robot has to be prepared before the motion."""
 
-    #: The motion as users read of it where the robot's inputs belong to another client.
+    #: The name of the motion in the sentence that another client has the robot's inputs.
     motion = ''
 
     def prepare(self) -> list[GoalCommand]:
@@ -94,7 +97,7 @@ class Appendable:
     append_timeout = 0.0
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Return the answer to points: all are taken or none; and the commands that follow."""
+        """Take all points or none; return the answer, and the commands that follow at once."""
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
@@ -136,7 +139,7 @@ class Displaced:
 
 
 class Ageing:
-    """Something grows old while the motion goes on, or leads to warnings now and then."""
+    """Values from clients grow old, or warnings become due, while the motion goes on."""
 
     def age(self, now: float) -> list[GoalCommand]:
         """
@@ -156,7 +159,7 @@ class Stallable:
 
 
 class Interpreting:
-    """The robot answers through other events than a motion of points has."""
+    """The robot answers with events that motions of points do not have."""
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of an event; None leaves that to the machine."""
@@ -164,11 +167,11 @@ class Interpreting:
 
 
 class Streaming:
-    """The driver streams set-points, and knows by itself how far the robot is."""
+    """The driver streams set-points, and itself knows how far the robot is."""
 
     @property
     def lag(self) -> float:
-        """How far the arm is behind the newest set-point [s]; NaN = there are no set-points."""
+        """The time by which the arm is behind the newest set-point [s]; NaN = there are none."""
         return nan
 
     @property
@@ -178,10 +181,10 @@ class Streaming:
 
     def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
         """
-        Return how many motions the robot has begun, and how far its target lags behind that.
+        Return the number of motions that the robot has begun, and the lag of its target.
 
-        :returns: the count since START (None = unknown), and the largest number of motions by
-            which the controller's target is behind it.
+        :returns: the count since START (None = unknown), and the most motions by which the
+            controller's target is behind it.
         """
         return packet.points_begun, 0
 
@@ -199,19 +202,19 @@ class Streaming:
 
 
 class Phrasing:
-    """The outcome is told in other words than that of a goal of points."""
+    """The outcome has sentences of its own."""
 
     def success_text(self) -> str:
-        """Return the sentence of a success, or '' for that of points."""
+        """Return the sentence of a success; '' = the one of points."""
         return ''
 
     def location(self, *, started: bool) -> str:
-        """Return the place or time at which the goal ended, as a clause; '' for that of points."""
+        """Return the place or time of the end, as a clause; '' = the place among the points."""
         return ''
 
 
 class Reporting:
-    """The report of the goal gets further lines."""
+    """The report of the goal has further lines."""
 
     @property
     def report(self) -> tuple[str, ...]:
@@ -220,7 +223,7 @@ class Reporting:
 
 
 class Capabilities:
-    """The capabilities of a feeder; those that it does not have do nothing."""
+    """The capabilities of a feeder; the ones that it lacks do nothing."""
 
     def __init__(self, feeder: Feeder) -> None:
         """Look them up in the feeder and its parts."""

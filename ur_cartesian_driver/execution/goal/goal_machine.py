@@ -17,6 +17,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
+from ur_cartesian_driver.execution.goal import timeouts
 from ur_cartesian_driver.execution.goal.feeder import Capabilities, Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     Finish,
@@ -50,36 +51,18 @@ from ur_cartesian_driver.execution.goal.outcome_codes import (
 )
 from ur_cartesian_driver.execution.goal.output_guard import OutputGuard
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
-from ur_cartesian_driver.execution.goal.timeouts import (
-    ARMING_TIMEOUT,
-    CAUSE_TIMEOUT,
-    EARLY_CANCELED_TIMEOUT,
-    SAFE_OUTPUTS_TIMEOUT,
-    STOP_TIMEOUT,
-)
+from ur_cartesian_driver.motion import events
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.events import (
-    CancelRequested,
-    Event,
-    INPUTS_LINK,
-    LinkLost,
-    OffsetReceived,
-    Outcome,
-    OutputsSecured,
-    PreemptRequested,
-    ServoReceived,
-    StateReceived,
-    Tick,
-    TrajectoryEnded,
-    TrajectoryResult,
-)
 from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
 
+#: Packets of the robot's registers.
+_REGISTERS = (events.ServoReceived, events.OffsetReceived)
+
 
 class MotionStatus(NamedTuple):
-    """How far a motion is; NaN = unknown."""
+    """The progress of a motion, for its recording; NaN = unknown."""
 
     #: The number of the point to which the arm moves.
     waypoint: int
@@ -112,7 +95,7 @@ class GoalMachine:
         """
         self.state = INITIAL_STATE
         self.feeder = feeder
-        #: The capabilities of the feeder, which do nothing where it has none.
+        #: The capabilities of the feeder.
         self.can = Capabilities(feeder)
         #: The TCP that was set for this goal, if any. The owner of the sockets restores it if it
         #: is not ``is_restored`` when the goal ends.
@@ -156,7 +139,7 @@ class GoalMachine:
             commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
 
-    def step(self, event: Event | AppendJob, now: float) -> list[GoalCommand]:
+    def step(self, event: events.Event | AppendJob, now: float) -> list[GoalCommand]:
         """
         Return the commands that answer an event, or points that were appended.
 
@@ -169,27 +152,28 @@ class GoalMachine:
         if self._packet_time is None:
             self._packet_time = now - self._packet.state_age
         if self.state is GoalState.ARMING:
-            self._deadline = min(self._deadline, now + ARMING_TIMEOUT)
-        commands = [command for each in self.can.ageing for command in each.age(now)]
-        match event:
-            case StateReceived(state=packet):
-                commands += self._observe(packet, now)
-            case ServoReceived() | OffsetReceived():
-                commands += self.feeder.feed(event, now)
-            case OutputsSecured():
-                self._guard.take(event)
-                return commands + ([LogWarning(text=event.failure)] if event.failure else [])
+            self._deadline = min(self._deadline, now + timeouts.ARMING_TIMEOUT)
+        commands: list[GoalCommand] = []
+        for each in self.can.ageing:
+            commands += each.age(now)
+        if isinstance(event, events.StateReceived):
+            commands += self._observe(event.state, now)
+        elif isinstance(event, _REGISTERS):
+            commands += self.feeder.feed(event, now)
+        elif isinstance(event, events.OutputsSecured):
+            self._guard.take(event)
+            return commands + ([LogWarning(text=event.failure)] if event.failure else [])
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
         # A CANCEL does not wait for a progress report: the next packet brings one.
         sends_cancel = signal is not None and self.state is GoalState.CANCELLING
-        if isinstance(event, StateReceived) and not sends_cancel:
+        if isinstance(event, events.StateReceived) and not sends_cancel:
             commands += self._after_packet(event, now)
         return commands
 
     def motion_status(self) -> MotionStatus:
-        """Return how far the motion is, for the recording."""
+        """Return the progress of the motion, for the recording."""
         return MotionStatus(self._monitor.waypoint(), self.feeder.buffered, self.can.streaming.lag)
 
     def end_time_of(self, records: int) -> float:
@@ -209,7 +193,7 @@ class GoalMachine:
             moving=self.state in RUNNING_STATES,
             applied_offset=self.can.displacement.applied_offset(packet),
         )
-        if self.state is GoalState.SETTLING:  # its time is that of the controller
+        if self.state is GoalState.SETTLING:  # whose time runs with the controller's clock
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
         return self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
@@ -222,44 +206,46 @@ class GoalMachine:
 
     # ---- from events to signals ---------------------------------------------------------------
 
-    def _interpret(self, event: Event, now: float) -> Meaning:
+    def _interpret(self, event: events.Event, now: float) -> Meaning:
         """Return the signal of an event, with a clause for the outcome's text."""
         meaning = self.can.interpretation.interpret(event, self.state)
         if meaning is not None:
             return meaning
         match event:
-            case StateReceived(state=packet):
+            case events.StateReceived(state=packet):
                 return (
                     detect_stop(packet, self._ignored_stops)
                     or self._check_age(now)
                     or self._check_outputs()
                     or self._check_packet(packet, now)
                 )
-            case ServoReceived() | OffsetReceived():
+            case events.ServoReceived() | events.OffsetReceived():
                 return NO_MEANING
-            case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
-                self._deadline = now + EARLY_CANCELED_TIMEOUT
+            case events.TrajectoryEnded(result=events.TrajectoryResult.CANCELED) if (
+                self._has_not_begun()
+            ):
+                self._deadline = now + timeouts.EARLY_CANCELED_TIMEOUT
                 return NO_MEANING
-            case TrajectoryEnded(result=TrajectoryResult.INPUT_MISSING) if (
+            case events.TrajectoryEnded(result=events.TrajectoryResult.INPUT_MISSING) if (
                 clause := self._monitor.missing_input()
             ):
                 return GoalSignal.FAILURE, clause
-            case TrajectoryEnded(result=TrajectoryResult.CONTACT):
+            case events.TrajectoryEnded(result=events.TrajectoryResult.CONTACT):
                 return GoalSignal.CONTACT, self._monitor.contact_clause(self._packet)
-            case TrajectoryEnded(result=result):
+            case events.TrajectoryEnded(result=result):
                 return RESULT_SIGNALS[result]
-            case CancelRequested(reason=reason):
+            case events.CancelRequested(reason=reason):
                 return GoalSignal.CANCEL, reason
-            case PreemptRequested(by=by):
+            case events.PreemptRequested(by=by):
                 return GoalSignal.PREEMPT, f'{by} took the place of this one'
-            case LinkLost(link='program', reason=reason):
+            case events.LinkLost(link='program', reason=reason):
                 return GoalSignal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
-            case LinkLost(link=link, reason=reason):
-                if link == INPUTS_LINK and self.state is GoalState.ARMING:
+            case events.LinkLost(link=link, reason=reason):
+                if link == events.INPUTS_LINK and self.state is GoalState.ARMING:
                     refusal = f'the robot does not take {self.can.preparation.motion}: {reason}'
                     return GoalSignal.NOT_READY, refusal.rstrip('.')
                 return GoalSignal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
-            case Tick():
+            case events.Tick():
                 return self._check_age(now) or self._check_deadline(now)
         raise TypeError(f'unknown event {event!r}')
 
@@ -281,7 +267,9 @@ class GoalMachine:
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
         """Return the signal of a packet in the present state, when nothing stops the robot."""
         if self.state in RUNNING_STATES:
-            fault = self._monitor.find_fault(packet, may_stand=self.can.streaming.is_read(now))
+            fault = self._monitor.find_fault(
+                packet, may_stand_still=self.can.streaming.is_read(now)
+            )
             fault = self.can.stalling.wait_out(fault, packet)
             return fault or self.can.appending.supply(self.state)
         if self.state is GoalState.ARMING and self._is_armed(packet):
@@ -339,7 +327,11 @@ class GoalMachine:
             )
         # Only an early CANCELED sets a deadline in these states; it counts if nothing has begun.
         self._deadline = inf
-        return RESULT_SIGNALS[TrajectoryResult.CANCELED] if self._has_not_begun() else NO_MEANING
+        return (
+            RESULT_SIGNALS[events.TrajectoryResult.CANCELED]
+            if self._has_not_begun()
+            else NO_MEANING
+        )
 
     # ---- from signals to commands -------------------------------------------------------------
 
@@ -351,7 +343,7 @@ class GoalMachine:
             if before is GoalState.PROGRAM_LOST:  # this is why the program ended
                 text = f'{text}; before that, {self._text}'
             if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.UNCONFIRMED:
-                self._text = f'{self._text}; {text}'  # which follows from it
+                self._text = f'{self._text}; {text}'  # the lost connection explains it
             else:
                 self._code, self._text = transition.code, text
         if self.state is before:
@@ -369,7 +361,7 @@ class GoalMachine:
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
-        """Set the deadline of a state, and return the commands that are not the feeder's."""
+        """Set the deadline of a state, and return the commands of the machine itself."""
         match state:
             case GoalState.MOVING:
                 self._deadline, self._has_moved = inf, True
@@ -379,11 +371,11 @@ class GoalMachine:
             case GoalState.SETTLING:
                 return self._enter_settling(now)
             case GoalState.CANCELLING | GoalState.COMING_TO_REST:
-                self._deadline = now + STOP_TIMEOUT
+                self._deadline = now + timeouts.STOP_TIMEOUT
             case GoalState.RESTORING:
                 return self._enter_restoring(now)
             case GoalState.PROGRAM_LOST:
-                self._deadline = now + CAUSE_TIMEOUT
+                self._deadline = now + timeouts.CAUSE_TIMEOUT
                 return self._guard.secure()
             case GoalState.ENDED:
                 return [*self._secure_unconfirmed(), *self._end(signal)]
@@ -416,15 +408,15 @@ class GoalMachine:
         )
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
-        """Restore the TCP, see to the outputs; a goal that has neither ends at once."""
+        """Restore the TCP, release the outputs; a goal that has neither ends at once."""
         self._is_decided = True
         if self.temporary_tcp is None and not self._guard:
             return self._apply(GoalSignal.RESTORED, '', now)
-        self._deadline = now + SAFE_OUTPUTS_TIMEOUT
+        self._deadline = now + timeouts.SAFE_OUTPUTS_TIMEOUT
         release = self._guard.release(succeeded=self._succeeds())
-        commands = [*self._final_progress(), *release]
+        commands = [*self._progress(), *release]
         if self.temporary_tcp is not None:
-            self._deadline = now + ARMING_TIMEOUT
+            self._deadline = now + timeouts.ARMING_TIMEOUT
             commands.append(RestoreTcp(T_flange_tcp=self.temporary_tcp.T_flange_original))
         return commands
 
@@ -432,7 +424,7 @@ class GoalMachine:
         """Write the safe outputs, unless the robot program has confirmed that they are."""
         if self._succeeds() or (self._is_decided and self._guard.is_safe(self._packet)):
             return []
-        # In RESTORING the program was told already.
+        # RESTORING has told the program already.
         release = [] if self._is_decided else self._guard.release(succeeded=False)
         return [*release, *self._guard.secure()]
 
@@ -444,43 +436,36 @@ class GoalMachine:
 
     # ---- reports ------------------------------------------------------------------------------
 
-    def _after_packet(self, event: StateReceived, now: float) -> list[GoalCommand]:
+    def _after_packet(self, event: events.StateReceived, now: float) -> list[GoalCommand]:
         """Return the next points to send, and the progress report if one is due."""
         if self.state is GoalState.ENDED:
             return []
         commands = self.feeder.feed(event, now) if self.state is GoalState.MOVING else []
-        if now >= self._next_report and self._has_progress():
+        if now >= self._next_report and (report := self._progress()):
             self._next_report = now + self._feedback_period
-            commands += [self._progress(), *self.can.streaming.reports()]
+            commands += [*report, *self.can.streaming.reports()]
         return commands
 
-    def _has_progress(self) -> bool:
-        """Tell whether the newest packet shows the motion, with the TCP of the goal."""
+    def _progress(self) -> list[GoalCommand]:
+        """Return a report, if the newest packet shows the motion with the TCP of the goal."""
         packet, tcp = self._monitor.latest, self.temporary_tcp
-        return (
-            packet is not None
-            and self.can.streaming.has_progress
-            and (tcp is None or tcp.is_active(packet))
-        )
-
-    def _progress(self) -> ReportProgress:
+        if packet is None or not self.can.streaming.has_progress:
+            return []
+        if tcp is not None and not tcp.is_active(packet):
+            return []
         waits = self.state is GoalState.AWAITING_POINTS
-        return ReportProgress(
-            progress=self._monitor.progress(
-                buffered=self.feeder.buffered,
-                lag=self.can.streaming.lag,
-                at_end=waits or self.state is GoalState.SETTLING,
-                waits=waits,
-            )
+        progress = self._monitor.progress(
+            buffered=self.feeder.buffered,
+            lag=self.can.streaming.lag,
+            at_end=waits or self.state is GoalState.SETTLING,
+            waits=waits,
         )
-
-    def _final_progress(self) -> list[GoalCommand]:
-        return [self._progress()] if self._has_progress() else []
+        return [ReportProgress(progress=progress)]
 
     def _finish(self) -> list[GoalCommand]:
         tcp, monitor = self.temporary_tcp, self._monitor
         has_place = not self._succeeds() and len(self.job.waypoint)
-        outcome = Outcome(
+        outcome = events.Outcome(
             code=self._code if self._code is not None else ErrorCode.EXECUTION_FAILED,
             text=self._success_text() if self._succeeds() else self._failure_text(),
             report=(
@@ -489,7 +474,7 @@ class GoalMachine:
             ),
             stopped=monitor.place() if has_place else None,
         )
-        return [*self._final_progress(), Finish(outcome=outcome)]
+        return [*self._progress(), Finish(outcome=outcome)]
 
     def _success_text(self) -> str:
         if self._text:

@@ -22,7 +22,7 @@ from ur_cartesian_driver.execution.monitoring.standstill import Standstill
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
 from ur_cartesian_driver.motion.events import PathPlace, Progress
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import add, scale, Vector3
+from ur_cartesian_driver.motion.geometry.vectors import add, subtract
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
@@ -59,14 +59,14 @@ class GoalMonitor:
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
         #: Whether the robot program has read START: it has begun a point, or the target moves.
         self._has_begun = False
-        #: How many motions of the goal the robot has begun, those in trajectories before this one
-        #: included, of which there are so many.
+        #: How many motions of the goal the robot has begun, and how many of them in trajectories
+        #: before this one.
         self._motions_begun = self._motions_before = 0
         #: The reported count of the goal before (None = no trajectory was started), and whether
         #: the robot may still report it.
         self._stale_begun: int | None = None
         self._awaits_count = False
-        #: How long the program has run the motion that it began last [s], and which one that is.
+        #: How long the program has run the motion that it began last [s], and its number.
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
@@ -134,7 +134,7 @@ class GoalMonitor:
         self._standstill.update(before, state, passed)
 
     def _count(self, begun: int | None) -> None:
-        """Take the reported count of motions, unless it may be that of the goal before."""
+        """Take the reported count of motions, unless it may belong to the goal before."""
         if begun is None or self._stale_begun is None or not self.job.reports_points_begun:
             return
         if not self._awaits_count or begun != self._stale_begun:
@@ -160,7 +160,7 @@ class GoalMonitor:
         self._tracker.finish(time)
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Take a job that follows after so many records."""
+        """Take a job that follows the first so many records."""
         self._tracker.append(job.reference, self.records.end_time(records_before))
         self.records.append(job, records_before)
         self.job = job
@@ -271,20 +271,20 @@ class GoalMonitor:
         )
 
     def missing_input(self) -> str:
-        """Return for which input the program has waited in vain, as a clause; '' = unknown."""
+        """Return the input for which the program waited in vain, as a clause; '' = unknown."""
         return self._input_wait()[1]
 
     # ---- faults -------------------------------------------------------------------------------
 
-    def find_fault(self, state: RobotState, *, may_stand: bool = False) -> Fault | None:
+    def find_fault(self, state: RobotState, *, may_stand_still: bool = False) -> Fault | None:
         """
         Return the fault of a motion, with a clause for the outcome's text, or None.
 
-        :param may_stand: the arm may stand still.
+        :param may_stand_still: the arm may stand still.
         """
         if clause := self._plan_deviation(state) or self._late_call() or self._wrong_speed(state):
             return GoalSignal.DEVIATION, clause
-        if not may_stand:
+        if self._standstill.is_long and not may_stand_still:
             longest_wait = max(self._input_wait()[0], self.script_call()[0])
             if clause := self._standstill.violation(longest_wait):
                 return GoalSignal.STANDSTILL, clause
@@ -376,7 +376,7 @@ class GoalMonitor:
     # ---- the planned pose of a tool that may give way -----------------------------------------
 
     def _press(self) -> PressWindow | None:
-        """Return the press during which the target is where it is, or None."""
+        """Return the press at the position of the target, or None."""
         if not self.job.presses:
             return None
         time = self._tracker.time()
@@ -387,12 +387,12 @@ class GoalMonitor:
         planned = self._tracker.desired(
             self._tracked(state.actual_tcp_pose), state.target_tcp_twist
         )
-        return _moved(planned, self._applied_offset.shift)
+        shift = self._applied_offset.shift
+        return Pose(add(planned.position, shift), planned.quaternion) if any(shift) else planned
 
     def _tracked(self, pose: Pose) -> Pose:
         """Return a pose without displacement and yield, as far as they are no progress."""
-        pose = _moved(pose, scale(self._applied_offset.shift, -1.0))
-        press = self._press()
+        pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
             return pose
         planned = self._tracker.pose()
@@ -402,9 +402,12 @@ class GoalMonitor:
 
     def _stiff(self, pose: Pose) -> Pose:
         """Return a pose as if neither the tool nor its path had given way."""
-        pose = _moved(pose, scale(self._applied_offset.shift, -1.0))
-        press = self._press()
+        pose, press = self._undisplaced(pose), self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
+
+    def _undisplaced(self, pose: Pose) -> Pose:
+        shift = self._applied_offset.shift
+        return Pose(subtract(pose.position, shift), pose.quaternion) if any(shift) else pose
 
     def _retracted(self, pose: Pose, planned: Pose) -> Pose:
         """Return the planned pose, allowing for the retraction after contact."""
@@ -423,8 +426,3 @@ def _offset_clause(start: Pose, pose: Pose) -> str | None:
         f'the arm is {distance:.4f} m and {angle:.4f} rad away from the start of the plan: '
         'it moved meanwhile'
     )
-
-
-def _moved(pose: Pose, shift: Vector3) -> Pose:
-    """Return a pose, moved along the axes of the base."""
-    return pose if not any(shift) else Pose(add(pose.position, shift), pose.quaternion)

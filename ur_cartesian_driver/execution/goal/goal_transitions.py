@@ -50,8 +50,8 @@ cancelled (STALE), and ends as one whose connection was lost.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import auto, Enum
+from typing import NamedTuple
 
 from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -100,8 +100,7 @@ STOP_PROGRAM_AFTER = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Transition:
+class Transition(NamedTuple):
     """The next state, and the code of the outcome where it is decided here."""
 
     state: GoalState
@@ -136,7 +135,7 @@ _WHILE_RUNNING = {
 }
 
 #: The transition of each signal in each state. Signals that a state does not list cannot happen
-#: there. The first of several requests of users decides; results that a state ignores are those of
+#: there. The first of several requests of users decides; a result that a state ignores belongs to
 #: a goal before this one.
 TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
     GoalState.ARMING: {
@@ -232,18 +231,23 @@ def detect_stop(state: RobotState, ignored_stops: SafetyStatus = NO_STOP) -> Fau
     :param ignored_stops: safety stops that do not end the goal.
     """
     safety = int(state.safety_status) & _SAFETY_STOPS & ~int(ignored_stops)
-    if safety & _EMERGENCY_STOPS:
-        return GoalSignal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
-    if safety & SafetyStatus.PROTECTIVE_STOPPED:
-        return GoalSignal.PROTECTIVE_STOP, 'the robot made a protective stop'
-    if safety & SafetyStatus.SAFEGUARD_STOPPED:
-        return GoalSignal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
     if safety:
-        mode = state.safety_mode.name.lower()
-        return GoalSignal.PROTECTIVE_STOP, f'the safety system reports {mode}'
+        return _safety_stop(safety, state)
     if state.robot_mode is not RobotMode.RUNNING:
         mode = state.robot_mode.name
         return GoalSignal.PROGRAM_STOPPED, f'the arm left the mode RUNNING and is in {mode}'
     if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
         return GoalSignal.PROGRAM_STOPPED, 'the robot program was stopped'
     return None
+
+
+def _safety_stop(safety: int, state: RobotState) -> Fault:
+    """Return the signal of safety stops, the deepest of which counts."""
+    if safety & _EMERGENCY_STOPS:
+        return GoalSignal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
+    if safety & SafetyStatus.PROTECTIVE_STOPPED:
+        return GoalSignal.PROTECTIVE_STOP, 'the robot made a protective stop'
+    if safety & SafetyStatus.SAFEGUARD_STOPPED:
+        return GoalSignal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
+    mode = state.safety_mode.name.lower()
+    return GoalSignal.PROTECTIVE_STOP, f'the safety system reports {mode}'

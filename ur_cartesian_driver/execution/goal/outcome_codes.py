@@ -4,7 +4,7 @@
 The signals of a goal, and the error code of the action with which each of them ends it.
 
 Every event is turned into one of these signals, or into none. :mod:`~.goal_transitions` has the
-states in which a signal decides the outcome; the code of the outcome is that of the signal.
+states in which a signal decides the outcome, and with it the code.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ class OutputGuard:
 
         :param goes_on: whether the goal goes on after a pause.
         """
-        if not self:
+        if not self._outputs:
             return []
         is_held = packet.runtime_state in _PAUSED or packet.safety_mode not in _MOVABLE
         was_held, self._is_held = self._is_held, is_held
@@ -111,8 +111,10 @@ class OutputGuard:
 
     def fault(self) -> str:
         """Return why the goal cannot go on after a pause, as a clause, or ''."""
+        if self._is_held or not self._changed:
+            return ''
         lost = [output for output in self._changed if not output.restore]
-        if self._is_held or not lost:
+        if not lost:
             return ''
         kind = lost[0].output.name.lower().replace('_', ' ')
         return (

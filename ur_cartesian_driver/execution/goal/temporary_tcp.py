@@ -27,7 +27,7 @@ MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
 
 def same_tcp(a: Pose, b: Pose) -> bool:
-    """Tell whether two TCPs are the same within what the wire resolves."""
+    """Tell whether two TCPs are the same to the resolution of the wire."""
     return a.distance_to(b) <= TCP_RESOLUTION and a.angle_to(b) <= TCP_RESOLUTION
 
 
@@ -42,7 +42,7 @@ class TemporaryTcp:
         """
         self.T_flange_original = T_flange_original
         self.T_flange_temporary = T_flange_temporary
-        #: Whether the robot has the temporary TCP no more, or never had it.
+        #: Whether the robot no longer has the temporary TCP, or never had it.
         self.is_restored = False
         #: Whether the robot has reported it.
         self._was_reported = False
@@ -83,7 +83,7 @@ class TemporaryTcp:
         return True
 
     def retry_now(self) -> None:
-        """Try again at once, because something has changed that may let the next try succeed."""
+        """Try again at once, because after a change the next try can succeed."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def report(self, packet: RobotState | None) -> str:

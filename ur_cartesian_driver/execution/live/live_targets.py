@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSettings:
     """
-    Bounds and times of a session; the defaults are those of ``config/driver.yaml``.
+    Bounds and times of a session, with the defaults of ``config/driver.yaml``.
 
     :raises ValueError: a time is not positive.
     """
@@ -53,7 +53,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.generator, self.settings = generator, settings
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
-        self._freshness, self._warnings = Freshness(settings.max_age), RareWarnings()
+        self.freshness, self._warnings = Freshness(settings.max_age), RareWarnings()
         self._last_came = inf
         self._is_over = self._was_blocked = False
         # The first wording of each reason.
@@ -62,7 +62,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
     def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
         """Take a target."""
         self._last_came = now
-        if not self._freshness.accept(age, now):
+        if not self.freshness.accept(age, now):
             return
         self._is_over = False
         self.generator.set_target(T_base_tcp)
@@ -75,7 +75,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
             text = f'the arm does not go to the live target: {generator.blocked}'
             warnings = self._warnings.due(text, now)
         self._was_blocked = bool(generator.blocked)
-        if generator.target is not None and self._freshness.is_stale(now):
+        if generator.target is not None and self.freshness.is_stale(now):
             # An arm that rests at its target is not stopped by that.
             self.pauses += not generator.arrived
             generator.clear_target()
@@ -93,31 +93,18 @@ class LiveTargets(Steerable, Ageing, Reporting):
         return q
 
     @property
-    def accepted(self) -> int:
-        """How many targets were followed."""
-        return self._freshness.accepted
-
-    @property
-    def dropped(self) -> int:
-        """How many targets were ignored as older than another one, or too old."""
-        return self._freshness.dropped
-
-    @property
     def done(self) -> bool:
         """Tell whether the session is over: no targets arrive any more, and the arm is at rest."""
         return self._is_over and self.generator.at_rest
 
     @property
     def report(self) -> tuple[str, ...]:
-        """How many targets were followed and ignored, and why the arm was stopped."""
+        """The lines about targets that were followed or ignored, and about stops."""
+        taken, dropped = self.freshness.accepted, self.freshness.dropped
         age = f'older than {self.settings.max_age:g} s'
-        lines = [
-            '1 target was followed'
-            if self.accepted == 1
-            else f'{self.accepted} targets were followed'
-        ]
-        if self.dropped:
-            lines.append(f'{self.dropped} came after a newer one or were {age}, and were ignored')
+        lines = ['1 target was followed' if taken == 1 else f'{taken} targets were followed']
+        if dropped:
+            lines.append(f'{dropped} came after a newer one or were {age}, and were ignored')
         if self.pauses:
             times = how_often(self.pauses)
             lines.append(f'the arm was stopped {times} because the newest target was {age}')

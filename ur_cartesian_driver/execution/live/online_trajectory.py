@@ -10,7 +10,9 @@ checks two poses: the next one, and the one where the tool would come to rest if
 there. If the second one is out of reach, beyond a joint limit, too near to a singularity or behind
 a workspace plane, the arm brakes instead, along a path that earlier cycles have checked.
 
-The length of a cycle is an argument; there is no clock in here.
+Speed and acceleration are bounded as the lengths of vectors, linear and angular, so the direction
+of the target does not matter (doc/architecture.md tells why ruckig, which bounds each axis, is not
+used). The length of a cycle is an argument; there is no clock here.
 """
 
 from __future__ import annotations
@@ -27,7 +29,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
-    Quaternion,
     rotation_vector_from_quaternion,
 )
 from ur_cartesian_driver.motion.geometry.vectors import (
@@ -78,15 +79,11 @@ class LiveLimits:
 
     def __post_init__(self) -> None:
         """Check the bounds."""
-        for name in (
-            'linear_velocity',
-            'linear_acceleration',
-            'angular_velocity',
-            'angular_acceleration',
-        ):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0.0):
-                raise ValueError(f'{name} is {value}; it must be positive and finite')
+        for half in ('linear', 'angular'):
+            for name in (f'{half}_velocity', f'{half}_acceleration'):
+                value = getattr(self, name)
+                if not (isfinite(value) and value > 0.0):
+                    raise ValueError(f'{name} is {value}; it must be positive and finite')
         if not all(speed > 0.0 for speed in self.joint_velocity):
             raise ValueError(f'joint_velocity is {self.joint_velocity}; all must be positive')
 
@@ -103,17 +100,23 @@ class OnlineTrajectoryGenerator:
     def __init__(self, arm: Arm, T_flange_tcp: Pose, q: Joints, limits: LiveLimits) -> None:
         """Begin at rest with no target."""
         self.limits = limits
+        #: Largest speed and acceleration, linear and angular.
+        self._bounds = (
+            (limits.linear_velocity, limits.linear_acceleration),
+            (limits.angular_velocity, limits.angular_acceleration),
+        )
         #: The newest set-point: joints [rad] and TCP pose.
         self.q = q
         self.T_base_tcp = arm.forward(q) @ T_flange_tcp
         #: Speed of the tool at the newest set-point [m/s], [rad/s], base axes.
         self.linear: Vector3 = ZERO3
         self.angular: Vector3 = ZERO3
-        #: Why the arm does not go to its target, as a clause; empty: it does.
+        #: Why the arm does not go to its target, as a clause; '' = it does.
         self.blocked = ''
         self._arm = arm
         self._T_tcp_flange = T_flange_tcp.inverse()
-        self._target: Pose | None = None
+        #: The pose to which the tool goes; None = it brakes or rests.
+        self.target: Pose | None = None
         self._bounds_check = _BoundsCheck(arm, T_flange_tcp, limits)
         # The joints where the tool would come to rest, from the last cycle.
         self._q_stop = q
@@ -129,11 +132,6 @@ class OnlineTrajectoryGenerator:
         self.linear = self.angular = ZERO3
 
     @property
-    def target(self) -> Pose | None:
-        """Where the tool is to go; None: it brakes or rests."""
-        return self._target
-
-    @property
     def at_rest(self) -> bool:
         """Tell whether the newest set-point does not move."""
         return self.linear == ZERO3 and self.angular == ZERO3
@@ -143,19 +141,19 @@ class OnlineTrajectoryGenerator:
         """Tell whether the tool rests at its target."""
         return (
             self.at_rest
-            and self._target is not None
-            and self.T_base_tcp.distance_to(self._target) < ARRIVAL_TOLERANCE
-            and self.T_base_tcp.angle_to(self._target) < 2.0 * ARRIVAL_TOLERANCE
+            and self.target is not None
+            and self.T_base_tcp.distance_to(self.target) < ARRIVAL_TOLERANCE
+            and self.T_base_tcp.angle_to(self.target) < 2.0 * ARRIVAL_TOLERANCE
         )
 
     def set_target(self, T_base_tcp: Pose) -> None:
         """Go to another target from now on; its quaternion is of length 1."""
-        self._is_target_new |= T_base_tcp != self._target
-        self._target = T_base_tcp
+        self._is_target_new |= T_base_tcp != self.target
+        self.target = T_base_tcp
 
     def clear_target(self) -> None:
         """Drop the target: brake, and rest."""
-        self._target = None
+        self.target = None
         self.blocked, self._is_target_new = '', False
 
     def step(self, dt: float) -> Joints:
@@ -170,62 +168,43 @@ class OnlineTrajectoryGenerator:
             self._is_target_new = False
             if self._is_path_clear():
                 self.blocked = ''
-        linear, angular = self._next_velocity(dt, change)
-        if self._target is not None and not self.blocked:
+        target = None if self.blocked else self.target
+        linear, angular = self._next_velocity(target, dt, change)
+        if target is not None:
             self.blocked = self._violation_when_braking(linear, angular, dt)
             if self.blocked:
                 self._is_target_new = False
-                linear, angular = self._braking_velocity(change)
+                linear, angular = self._next_velocity(None, dt, change)
         if linear == ZERO3 and angular == ZERO3:
             self.linear = self.angular = ZERO3
         else:
             self._move(linear, angular, dt)
         return self.q
 
-    # ---- speeds -------------------------------------------------------------------------------
-
-    def _next_velocity(self, dt: float, change: float) -> tuple[Vector3, Vector3]:
+    def _next_velocity(
+        self, target: Pose | None, dt: float, change: float
+    ) -> tuple[Vector3, Vector3]:
         """
-        Return the speeds of the next cycle towards the target, or towards rest.
+        Return the velocity of the next cycle, linear and angular.
 
-        :param change: time in which they may change [s].
+        :param target: the pose to which the tool goes; None = it brakes.
+        :param change: time in which the velocity may change [s].
         """
-        if self._target is None or self.blocked:
-            return self._braking_velocity(change)
-        limits, (linear, angular) = self.limits, _pose_difference(self.T_base_tcp, self._target)
+        shift = turn = ZERO3
+        if target is not None:
+            shift, turn = _pose_difference(self.T_base_tcp, target)
+        linear, angular = self._bounds
         return (
-            _limit_change(
-                self.linear,
-                _approach_velocity(linear, limits.linear_velocity, limits.linear_acceleration, dt),
-                limits.linear_acceleration * change,
-            ),
-            _limit_change(
-                self.angular,
-                _approach_velocity(
-                    angular, limits.angular_velocity, limits.angular_acceleration, dt
-                ),
-                limits.angular_acceleration * change,
-            ),
+            _approach_velocity(shift, self.linear, *linear, dt, change),
+            _approach_velocity(turn, self.angular, *angular, dt, change),
         )
-
-    def _braking_velocity(self, change: float) -> tuple[Vector3, Vector3]:
-        limits = self.limits
-        return (
-            _limit_change(self.linear, ZERO3, limits.linear_acceleration * change),
-            _limit_change(self.angular, ZERO3, limits.angular_acceleration * change),
-        )
-
-    # ---- poses --------------------------------------------------------------------------------
 
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
         """Take a step, shortened where the joints are not fast enough."""
         pose, q = self._next_pose(linear, angular, dt)
         if q is None:  # beside a pose that was checked: happens by rounding only
-            self.blocked = (
-                self.blocked
-                or explain_unreachable(self._arm, pose @ self._T_tcp_flange)
-                or 'the joint positions jump'
-            )
+            reason = explain_unreachable(self._arm, pose @ self._T_tcp_flange)
+            self.blocked = self.blocked or reason or 'the joint positions jump'
             self.linear = self.angular = ZERO3
             return
         allowed = self.limits.joint_velocity
@@ -245,23 +224,20 @@ class OnlineTrajectoryGenerator:
 
     def _violation_when_braking(self, linear: Vector3, angular: Vector3, dt: float) -> str:
         """
-        Return why the tool must not get these speeds; empty if it could still stop in time.
+        Return why the tool must not get these velocities, or ''.
 
         Checks the pose where the tool would come to rest with the full acceleration.
         """
-        limits = self.limits
         if linear == ZERO3 and angular == ZERO3:
             return ''
-        stop = _integrate(
-            self.T_base_tcp,
-            linear,
-            angular,
-            dt + 0.5 * norm(linear) / limits.linear_acceleration,
-            dt + 0.5 * norm(angular) / limits.angular_acceleration,
-        )
+        # The way to rest from a speed v with the deceleration a is v^2 / 2a: as at v for v / 2a.
+        moving = dt + 0.5 * norm(linear) / self.limits.linear_acceleration
+        turning = dt + 0.5 * norm(angular) / self.limits.angular_acceleration
+        stop = _integrate(self.T_base_tcp, linear, angular, moving, turning)
         return self._violation_at_stop(stop)
 
     def _violation_at_stop(self, stop: Pose) -> str:
+        """Return why the tool must not come to rest at a pose, or ''."""
         flange = stop @ self._T_tcp_flange
         q = track_pose(self._arm, flange, self._q_stop) or track_pose(self._arm, flange, self.q)
         if q is None:
@@ -272,17 +248,17 @@ class OnlineTrajectoryGenerator:
 
     def _is_path_clear(self) -> bool:
         """Tell whether the tool can go towards the target again for a minimal distance."""
-        if self._target is None:
+        if self.target is None:
             return False
         ratio = max(
-            self.T_base_tcp.distance_to(self._target) / _MIN_RESTART_MOTION[0],
-            self.T_base_tcp.angle_to(self._target) / _MIN_RESTART_MOTION[1],
+            self.T_base_tcp.distance_to(self.target) / _MIN_RESTART_MOTION[0],
+            self.T_base_tcp.angle_to(self.target) / _MIN_RESTART_MOTION[1],
         )
         if ratio < ARRIVAL_TOLERANCE:
             return True
         self._q_stop = self.q
         return not self._violation_at_stop(
-            self.T_base_tcp.interpolate(self._target, min(1.0, 1.0 / ratio))
+            self.T_base_tcp.interpolate(self.target, min(1.0, 1.0 / ratio))
         )
 
 
@@ -298,37 +274,29 @@ class _BoundsCheck:
 
     def violation(self, q: Joints, q_now: Joints) -> str:
         """
-        Return why the arm must not come to rest at q [rad]; empty if it may.
+        Return why the arm must not come to rest at q [rad], or ''.
 
-        What is too near to a bound already may move away from it.
+        An arm that is too near to a bound already may move away from it.
         """
-        for joint, (angle, now, (low, high)) in enumerate(
-            zip(q, q_now, self._ranges, strict=True)
-        ):
-            clearance = min(angle - low, high - angle) - LIMIT_MARGIN
-            if (
-                clearance < 0.0
-                and clearance < min(now - low, high - now) - LIMIT_MARGIN - _ROUNDING
-            ):
+        for name, angle, now, (low, high) in zip(JOINT_NAMES, q, q_now, self._ranges, strict=True):
+            clearance = min(angle - low, high - angle)
+            if clearance < LIMIT_MARGIN and clearance < min(now - low, high - now) - _ROUNDING:
                 return (
-                    f'{JOINT_NAMES[joint]} would be at {angle:.4f} rad, and its limits are '
+                    f'{name} would be at {angle:.4f} rad, and its limits are '
                     f'{low:.4f} to {high:.4f} rad'
                 )
         distances = singularity_distances(self._arm, q)
         if not all(a >= b for a, b in zip(distances, self._margins, strict=True)):
-            before = singularity_distances(self._arm, q_now)
-            for distance, now, margin, (name, unit, meaning) in zip(
-                distances, before, self._margins, _SINGULARITIES, strict=True
+            distances_now = singularity_distances(self._arm, q_now)
+            for distance, before, margin, (name, unit, meaning) in zip(
+                distances, distances_now, self._margins, _SINGULARITIES, strict=True
             ):
-                if distance < min(margin, now - _ROUNDING):
+                if distance < min(margin, before - _ROUNDING):
                     return (
                         f'the {name} singularity is {margin:g} {unit} away '
                         f'(singularity_margin_{name}: {meaning})'
                     )
         return '' if self._workspace_guard is None else self._workspace_guard.violation(q, q_now)
-
-
-# --- Vectors ---------------------------------------------------------------------------------
 
 
 def _pose_difference(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
@@ -340,35 +308,36 @@ def _pose_difference(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
 
 
 def _approach_velocity(
-    difference: Vector3, limit: float, acceleration: float, dt: float
+    difference: Vector3,
+    velocity: Vector3,
+    limit: float,
+    acceleration: float,
+    dt: float,
+    change: float,
 ) -> Vector3:
-    """Return the velocity of the next cycle for a path that ends at rest."""
-    distance = norm(difference)
-    if distance < ARRIVAL_TOLERANCE:
-        return ZERO3
-    return scale(difference, approach_speed(distance, limit, acceleration, dt) / distance)
+    """
+    Return the velocity of the next cycle for a motion that ends at rest.
 
-
-def _limit_change(speed: Vector3, desired: Vector3, limit: float) -> Vector3:
-    """Return the desired velocity, or the nearest one that the acceleration allows."""
-    change = subtract(desired, speed)
-    size = norm(change)
-    return desired if size <= limit else add(speed, scale(change, limit / size))
+    :param difference: the way to go, or zeros to brake.
+    :param velocity: of the last cycle.
+    :param change: time in which the velocity may change [s].
+    """
+    distance, desired = norm(difference), ZERO3
+    if distance >= ARRIVAL_TOLERANCE:
+        speed = approach_speed(distance, limit, acceleration, dt)
+        desired = scale(difference, speed / distance)
+    step, allowed = subtract(desired, velocity), acceleration * change
+    size = norm(step)
+    return desired if size <= allowed else add(velocity, scale(step, allowed / size))
 
 
 def _integrate(
-    pose: Pose, linear: Vector3, angular: Vector3, seconds: float, turning: float
+    pose: Pose, linear: Vector3, angular: Vector3, moving: float, turning: float
 ) -> Pose:
-    """Return a pose after it has moved and turned (base axes), for a time each."""
-    return Pose(
-        add(pose.position, scale(linear, seconds)),
-        multiply(_rotation_after(angular, turning), pose.quaternion)
-        if angular != ZERO3
-        else pose.quaternion,
-    )
-
-
-def _rotation_after(angular: Vector3, seconds: float) -> Quaternion:
-    speed = norm(angular)
-    half = 0.5 * speed * seconds
-    return (*scale(angular, sin(half) / speed), cos(half))
+    """Return a pose after it has moved and turned at a velocity, for a time each [s]."""
+    position, speed = add(pose.position, scale(linear, moving)), norm(angular)
+    if speed == 0.0:
+        return Pose(position, pose.quaternion)
+    half = 0.5 * speed * turning
+    turn = (*scale(angular, sin(half) / speed), cos(half))
+    return Pose(position, multiply(turn, pose.quaternion))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 
 #: No link is thicker [m].
@@ -68,24 +68,22 @@ class WorkspaceGuard:
             + workspace.tool_radius
             + _THICKNESS
         )
-        self._last_check: tuple[Joints, float] | None = None
+        #: Where the last check was, and by how much nothing was too near there [rad], [m].
+        self._last_check: tuple[Joints, float] = ZERO6, 0.0
 
     def violation(self, q: Joints, q_now: Joints) -> str:
         """
-        Return what would be too near to what, as a clause; empty: nothing.
+        Return the bodies that would be too near to each other or to a plane, as a clause, or ''.
 
-        What is too near already may move away.
+        Those that are too near already may move away.
 
         :param q: where the arm would be [rad].
         :param q_now: where it is.
         """
-        if self._last_check is not None:
-            q_checked, slack = self._last_check
-            if (
-                self._max_lever_arm * sum([abs(a - b) for a, b in zip(q, q_checked, strict=True)])
-                < slack
-            ):
-                return ''
+        q_checked, slack = self._last_check
+        turns = sum([abs(a - b) for a, b in zip(q, q_checked, strict=True)])
+        if self._max_lever_arm * turns < slack:
+            return ''
         slacks = self._clearance_slacks(q)
         min_slack = float(slacks.min())
         self._last_check = (q, min_slack)
@@ -118,14 +116,11 @@ class WorkspaceGuard:
         if number < len(planes):
             plane, name = planes[number], self._names[body]
             height = plane.margin + slack
-            near = (
-                f'come within {height:.4f} m of'
-                if height >= 0.0
-                else (f'go {-height:.4f} m beyond')
-            )
-            return f'{name} would {near} the workspace plane "{plane.name}"' + (
-                f', its margin is {plane.margin:.4f} m' if plane.margin else ''
-            )
+            near = f'come within {height:.4f} m of'
+            if height < 0.0:
+                near = f'go {-height:.4f} m beyond'
+            margin = f', its margin is {plane.margin:.4f} m' if plane.margin else ''
+            return f'{name} would {near} the workspace plane "{plane.name}"{margin}'
         clearance = self._workspace.min_clearance or 0.0
         a, b = self._bodies.pairs[index - len(planes) * len(self._names)]
         return (

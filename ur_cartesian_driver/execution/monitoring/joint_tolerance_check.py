@@ -3,7 +3,7 @@
 """
 Check the joints against the tolerances of a joint goal, joint by joint.
 
-An error is desired - actual. On the path, what the controller wants in the same packet is desired:
+An error is desired - actual. On the path the controller's target of the same packet is desired:
 the slider, a pause or the robot's own limits change target and actual value alike, and another
 check sees that the target itself is on the plan. At the end, the last point at rest is desired.
 """

@@ -6,11 +6,11 @@ Find where the controller is on the planned path, and where the tool should be.
 The reference path is compared as a geometric line, so a robot that was slowed down, or that has
 its own speed profile, is not off the path.
 
-Progress is that of the controller's target, which has no noise and cannot be pushed: where the
+Progress is measured by the controller's target, which has no noise and cannot be pushed: where the
 *target* leaves the path, the robot makes another motion than the planned one. The desired pose is
 the one on the path that is nearest to the tool, within a plausible lag behind the target. The
-controller goes on while somebody pushes the arm along its path, so beyond the lag that is an error
-too.
+controller goes on while somebody pushes the arm along its path, so a push beyond the lag is an
+error too.
 
 All of this runs between a packet and a CANCEL, and most packets concern one or two edges of the
 path. Those are computed in plain floats: numpy costs more than the seven numbers.
@@ -20,16 +20,16 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
-from math import inf, sqrt
-from typing import TypeAlias
+from math import dist, hypot, inf, sqrt
+from operator import mul
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
+from ur_cartesian_driver.motion.geometry.vectors import norm, scale, Vector3, Vector6, ZERO3
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
@@ -40,7 +40,7 @@ SEARCH_MARGIN = 0.005
 #: The same in planned time [s]: where set-points turn back, a servo that lags turns before them.
 SEARCH_TIME = 0.1
 #: The target is no farther than its speed explains unless the path is nearer there by this [m]:
-#: where a path turns back, both ways are as near.
+#: where a path turns back, both branches are as near.
 CLEARLY_NEARER = 0.0005
 #: How far the tool may be ahead of or behind its target: this long at the speed of the target
 #: [s], and this far [m]. Position controllers of arms lag by some cycles.
@@ -62,47 +62,35 @@ MAX_CACHED_EDGES = 256
 TrackerPoint: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class PathPosition:
+class PathPosition(NamedTuple):
     """A position on the reference path: between row ``row`` and the next, at ``fraction``."""
 
     row: int
     fraction: float
 
 
-@dataclass(frozen=True, slots=True)
-class Edge:
+class Edge(NamedTuple):
     """A row of the path and the next one, as poses and in the tracker's coordinates."""
 
     start: Pose
     end: Pose
     origin: TrackerPoint
     vector: TrackerPoint
-    #: Of the length.
+    #: Square of the length of the vector.
     length_squared: float
 
     def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
-        """Return the nearest fraction of the edge, and the square of the distance there."""
+        """Return the nearest fraction of the edge, and the distance there."""
+        # Seven numbers written out take half the time of loops over them.
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
         ex, ey, ez, ea, eb, ec, ed = self.vector
-        x, y, z, a, b, c, d = px - ox, py - oy, pz - oz, pa - oa, pb - ob, pc - oc, pd - od
-        at = 1.0
+        away, at = (px - ox, py - oy, pz - oz, pa - oa, pb - ob, pc - oc, pd - od), 1.0
         if self.length_squared > 0.0:
-            at = (
-                x * ex + y * ey + z * ez + a * ea + b * eb + c * ec + d * ed
-            ) / self.length_squared
-            at = 0.0 if at < 0.0 else 1.0 if at > 1.0 else at
-        at = max(lowest, min(at, highest))
-        return at, (
-            (x - at * ex) ** 2
-            + (y - at * ey) ** 2
-            + (z - at * ez) ** 2
-            + (a - at * ea) ** 2
-            + (b - at * eb) ** 2
-            + (c - at * ec) ** 2
-            + (d - at * ed) ** 2
-        )
+            at = sum(map(mul, away, self.vector)) / self.length_squared
+        at = max(lowest, min(max(at, 0.0), 1.0, highest))
+        foot = (at * ex, at * ey, at * ez, at * ea, at * eb, at * ec, at * ed)
+        return at, dist(away, foot)
 
 
 class PathTracker:
@@ -136,8 +124,10 @@ class PathTracker:
             2.0 * METRES_PER_RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
         )
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
-        self._arc = _float_array(np.concatenate(([0.0], np.cumsum(steps))))
-        self._time, self._points = _float_array(path.time), array('i', path.point.tobytes())
+        # Searching an array needs no numpy scalars.
+        self._arc = array('d', np.concatenate(([0.0], np.cumsum(steps))).tobytes())
+        self._time = array('d', path.time.astype(np.float64).tobytes())
+        self._points = array('i', path.point.tobytes())
         waits = (steps == 0.0) & (np.diff(path.time) > SAME_TIME)
         #: The rows from which on the plan waits, in order.
         self._waits = array('l', np.flatnonzero(waits).tolist())
@@ -149,6 +139,8 @@ class PathTracker:
     def last_row(self) -> int:
         """The row of the end of the path."""
         return len(self._rows) - 1
+
+    # ---- the target ---------------------------------------------------------------------------
 
     def update(
         self, target: Pose, max_advance: float, running: tuple[int, int] | None = None
@@ -163,7 +155,7 @@ class PathTracker:
         :returns: the new position, never behind the one before.
         """
         first, end = self._window(max_advance, running)
-        explained = self._arc_length() + max_advance
+        explained = self._at(self._arc) + max_advance
         near = min(max(bisect_right(self._arc, explained + SAME_PLACE), first + 1), end)
         found = self._search(target, first, near, explained)
         if found[1] > CLEARLY_NEARER:
@@ -172,6 +164,24 @@ class PathTracker:
                 found = farther
         self.path_position, self.residual = found
         return self.path_position
+
+    def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
+        """Return the rows between which the target may be."""
+        if running is not None:
+            # The program runs that motion, or is in the blend that leads to it: everything before
+            # was passed, perhaps between two packets.
+            passed = bisect_left(self._points, running[1]) - 1
+            if passed > self.path_position.row:
+                self.path_position = PathPosition(passed, 0.0)
+        first = self.path_position.row
+        end = max(
+            bisect_left(self._arc, self._at(self._arc) + max_advance + SEARCH_MARGIN),
+            bisect_left(self._time, self.time() + SEARCH_TIME),
+        )
+        end = min(max(end, first + 1), self.last_row)
+        if running is not None:
+            end = min(end, bisect_right(self._points, running[0]) - 1)
+        return first, max(end, first)
 
     def _search(
         self, target: Pose, first: int, end: int, limit: float = inf
@@ -185,10 +195,16 @@ class PathTracker:
         while end > first:
             # The target does not pass a place where the plan waits before it has been there.
             wait = self._next_wait(first, end)
-            found = self._nearest_in(target, first, wait, limit)
-            if found is not None and found[1] <= nearest[1]:
-                nearest = found
-            if wait >= end or self._arc[wait] - self._arc_length(nearest[0]) > SAME_PLACE:
+            if wait > first:
+                lowest = self.path_position.fraction if first == self.path_position.row else 0.0
+                highest = self._fraction(wait - 1, limit)
+                if first == wait - 1:
+                    highest = max(highest, lowest)
+                point = self._coordinates(target, first)
+                found = self._nearest(point, first, wait, lowest, highest)
+                if found[1] <= nearest[1]:
+                    nearest = found
+            if wait >= end or self._arc[wait] - self._at(self._arc, nearest[0]) > SAME_PLACE:
                 break
             here = self._edge(wait).start
             distance = here.distance_to(target) + METRES_PER_RADIAN * here.angle_to(target)
@@ -198,22 +214,8 @@ class PathTracker:
             first = wait + 1
         return nearest
 
-    def _nearest_in(
-        self, target: Pose, first: int, end: int, limit: float
-    ) -> tuple[PathPosition, float] | None:
-        """Return the position on some edges, and its distance; None where there are none."""
-        if end <= first:
-            return None
-        lowest = self.path_position.fraction if first == self.path_position.row else 0.0
-        highest = self._fraction(end - 1, limit)
-        if first == end - 1:
-            highest = max(highest, lowest)
-        return self._nearest(self._coordinates(target, first), first, end, lowest, highest)
-
     def _next_wait(self, first: int, end: int) -> int:
         """Return the first row from which on the plan waits, or the end of the rows."""
-        if not self._waits:
-            return end
         k = bisect_left(self._waits, first)
         return min(self._waits[k], end) if k < len(self._waits) else end
 
@@ -225,73 +227,14 @@ class PathTracker:
 
     def wait(self, time: float) -> None:
         """Let a time pass where the plan waits [s]."""
-        row, fraction = self.path_position.row, self.path_position.fraction
+        row, fraction = self.path_position
         fraction += time / (self._time[row + 1] - self._time[row])
-        self.path_position = (
-            PathPosition(row, fraction) if fraction < 1.0 else PathPosition(row + 1, 0.0)
-        )
+        self.path_position = _position(row, fraction)
 
-    def desired(self, actual: Pose, twist: Vector6) -> Pose:
-        """
-        Return the planned pose that is nearest to the tool, around the target's position.
-
-        :param actual: pose of the TCP in base.
-        :param twist: of the target; its speed bounds the lag.
-        """
-        here, lag = self._arc_length(), LAG_DISTANCE + LAG_TIME * tracker_speed(twist)
-        first = max(bisect_right(self._arc, here - lag) - 1, 0)
-        end = min(bisect_left(self._arc, here + lag), self.last_row)
-        if end <= first:
-            return self.pose()
-        path_position, _ = self._nearest(
-            self._coordinates(actual, first),
-            first,
-            end,
-            self._fraction(first, here - lag),
-            self._fraction(end - 1, here + lag),
-        )
-        return self.pose(path_position)
-
-    def behind(self, pose: Pose) -> Pose:
-        """Return the planned pose nearest to a pose, up to the target's position."""
-        row, fraction = self.path_position.row, self.path_position.fraction
-        if row == 0 and not fraction:
-            return self.pose()
-        end = row + 1 if fraction else row
-        found, _ = self._nearest(self._coordinates(pose, 0), 0, end, 0.0, fraction or 1.0)
-        return self.pose(found)
-
-    def deviation(self, target: Pose) -> tuple[float, float]:
-        """
-        Return how far the controller's target is from the plan, [m] and [rad].
-
-        In a blend, whose shape only the robot knows, the blend tolerance is subtracted.
-        """
-        here = self.pose()
-        distance, angle = here.distance_to(target), here.angle_to(target)
-        if not self._has_blend_tolerance:
-            return distance, angle
-        row, fraction = self.path_position.row, self.path_position.fraction
-        tolerance = self.path.blend_tolerance[row : row + (2 if fraction > 0.0 else 1)].max(axis=0)
-        return max(0.0, distance - float(tolerance[0])), max(0.0, angle - float(tolerance[1]))
-
-    def is_within(self, distance: float, angle: float) -> bool:
-        """
-        Tell whether the target is surely within a distance [m] and angle [rad] of the path.
-
-        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
-        used, because the straight line between two quaternions is not quite the turn from one to
-        the other; where they are so far apart that this matters, the line is farther away than
-        that.
-        """
-        return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
-
-    def finish(self, time: float = inf) -> PathPosition:
+    def finish(self, time: float = inf) -> None:
         """Move on to the end of the path, or to its position at a time [s]."""
-        self.path_position = PathPosition(
-            max(bisect_right(self._time, time + SAME_TIME) - 1, 0), 0.0
-        )
-        return self.path_position
+        row = max(bisect_right(self._time, time + SAME_TIME) - 1, 0)
+        self.path_position = PathPosition(row, 0.0)
 
     def pass_stop(self, waypoint: int) -> None:
         """Move on to a point of the goal that the program has left, if it has no blend."""
@@ -301,7 +244,7 @@ class PathTracker:
 
     def append(self, path: ReferencePath, since: float) -> None:
         """
-        Append a path from a time on [s], and forget what lies far behind.
+        Append a path from a time on [s], and forget the rows far behind.
 
         From that time up to where the arm is, if it is farther on, both paths are the same.
         """
@@ -326,28 +269,79 @@ class PathTracker:
             row, (now - self._time[row]) / time if time > 0.0 else 0.0
         )
 
+    # ---- the plan where the target is ---------------------------------------------------------
+
+    def desired(self, actual: Pose, twist: Vector6) -> Pose:
+        """
+        Return the planned pose that is nearest to the tool, around the target's position.
+
+        :param actual: pose of the TCP in base.
+        :param twist: of the target; its speed bounds the lag.
+        """
+        here, lag = self._at(self._arc), LAG_DISTANCE + LAG_TIME * tracker_speed(twist)
+        first = max(bisect_right(self._arc, here - lag) - 1, 0)
+        end = min(bisect_left(self._arc, here + lag), self.last_row)
+        if end <= first:
+            return self.pose()
+        lowest, highest = self._fraction(first, here - lag), self._fraction(end - 1, here + lag)
+        point = self._coordinates(actual, first)
+        return self.pose(self._nearest(point, first, end, lowest, highest)[0])
+
+    def behind(self, pose: Pose) -> Pose:
+        """Return the planned pose nearest to a pose, up to the target's position."""
+        row, fraction = self.path_position
+        if row == 0 and not fraction:
+            return self.pose()
+        end = row + 1 if fraction else row
+        found, _ = self._nearest(self._coordinates(pose, 0), 0, end, 0.0, fraction or 1.0)
+        return self.pose(found)
+
+    def deviation(self, target: Pose) -> tuple[float, float]:
+        """
+        Return how far the controller's target is from the plan, [m] and [rad].
+
+        In a blend, whose shape only the robot knows, the blend tolerance is subtracted.
+        """
+        here = self.pose()
+        distance, angle = here.distance_to(target), here.angle_to(target)
+        if not self._has_blend_tolerance:
+            return distance, angle
+        row, fraction = self.path_position
+        rows = self.path.blend_tolerance[row : row + (2 if fraction > 0.0 else 1)]
+        tolerance, tolerance_angle = rows.max(axis=0).tolist()
+        return max(0.0, distance - tolerance), max(0.0, angle - tolerance_angle)
+
+    def is_within(self, distance: float, angle: float) -> bool:
+        """
+        Tell whether the target is surely within a distance [m] and angle [rad] of the path.
+
+        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
+        used, because the straight line between two quaternions is not quite the turn from one to
+        the other; where they are so far apart that this matters, the line is farther away than
+        that.
+        """
+        return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
+
     def pose(self, path_position: PathPosition | None = None) -> Pose:
         """Return the planned pose at a position, by default the present one."""
-        at = self.path_position if path_position is None else path_position
-        if at.row == self.last_row:
+        row, fraction = path_position or self.path_position
+        if row == self.last_row:
             return self._end
-        edge = self._edge(at.row)
-        return edge.start.interpolate(edge.end, at.fraction) if at.fraction else edge.start
+        edge = self._edge(row)
+        return edge.start.interpolate(edge.end, fraction) if fraction else edge.start
 
     def time(self) -> float:
         """Return the planned time of the present position [s]."""
-        row, fraction = self.path_position.row, self.path_position.fraction
-        here = self._time[row]
-        return here + fraction * (self._time[row + 1] - here) if fraction else here
+        return self._at(self._time)
 
     def direction(self) -> Vector3:
         """Return the unit vector along which the path goes on; zeros where it only turns."""
         row = self.path_position.row + (self.path_position.fraction > AT_END)
         while row < self.last_row:
             x, y, z, *turn = self._edge(row).vector
-            length = sqrt(x * x + y * y + z * z)
+            length = norm((x, y, z))
             if length > 0.0:
-                return (x / length, y / length, z / length)
+                return scale((x, y, z), 1.0 / length)
             if any(turn):
                 break
             row += 1
@@ -360,39 +354,21 @@ class PathTracker:
 
     def place(self) -> PathPlace:
         """Return the present position as a place on the path of the goal."""
-        point, row = self.waypoint(), self.path_position.row
+        point, (row, fraction) = self.waypoint(), self.path_position
         fractions, last = self.path.fraction, min(row + 1, self.last_row)
         # A segment begins where the one before it ends.
         begin = float(fractions[row]) if self._points[row] == point else 0.0
         end = float(fractions[last]) if self._points[last] == point else begin
-        part = begin + self.path_position.fraction * (end - begin)
+        part = begin + fraction * (end - begin)
         return PathPlace(point=point, fraction=min(max(part, 0.0), 1.0))
 
-    def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
-        """Return the rows between which the tool may be."""
-        points = self._points
-        if running is not None:
-            # The program runs that motion, or is in the blend that leads to it: everything before
-            # was passed, perhaps between two packets.
-            passed = bisect_left(points, running[1]) - 1
-            if passed > self.path_position.row:
-                self.path_position = PathPosition(passed, 0.0)
-        first = self.path_position.row
-        end = max(
-            bisect_left(self._arc, self._arc_length() + max_advance + SEARCH_MARGIN),
-            bisect_left(self._time, self.time() + SEARCH_TIME),
-        )
-        end = min(max(end, first + 1), self.last_row)
-        if running is not None:
-            end = min(end, bisect_right(points, running[0]) - 1)
-        return first, max(end, first)
+    # ---- geometry -----------------------------------------------------------------------------
 
-    def _arc_length(self, path_position: PathPosition | None = None) -> float:
-        """Return the length of the path up to a position, by default the present one [m]."""
-        at = self.path_position if path_position is None else path_position
-        row, fraction = at.row, at.fraction
-        here = self._arc[row]
-        return here + fraction * (self._arc[row + 1] - here) if fraction else here
+    def _at(self, values: array[float], path_position: PathPosition | None = None) -> float:
+        """Return the length or time of the path at a position, by default the present one."""
+        row, fraction = path_position or self.path_position
+        here = values[row]
+        return here + fraction * (values[row + 1] - here) if fraction else here
 
     def _fraction(self, row: int, distance: float) -> float:
         """Return the fraction of an edge, 0 to 1, at a distance from the start of the path."""
@@ -405,11 +381,11 @@ class PathTracker:
         if edge is None:
             if len(self._edges) >= MAX_CACHED_EDGES:
                 self._edges.clear()
-            start, end = self._rows[row : row + 2]
+            poses, (start, end) = self.path.poses, self._rows[row : row + 2]
             vector = end - start
             edge = self._edges[row] = Edge(
-                pose_from_row(self.path.poses[row]),
-                pose_from_row(self.path.poses[row + 1]),
+                pose_from_row(poses[row]),
+                pose_from_row(poses[row + 1]),
                 tuple(start.tolist()),
                 tuple(vector.tolist()),
                 float(vector @ vector),
@@ -420,15 +396,12 @@ class PathTracker:
         """Return the pose in the seven coordinates, its quaternion's sign as at the row."""
         (x, y, z), (a, b, c, d) = pose.position, pose.quaternion
         _, _, _, ra, rb, rc, rd = self._edge(row).origin
-        scale = (
-            2.0 * METRES_PER_RADIAN
-            if a * ra + b * rb + c * rc + d * rd >= 0.0
-            else -2.0 * METRES_PER_RADIAN
-        )
-        return x, y, z, scale * a, scale * b, scale * c, scale * d
+        sign = 1.0 if a * ra + b * rb + c * rc + d * rd >= 0.0 else -1.0
+        weight = sign * 2.0 * METRES_PER_RADIAN
+        return x, y, z, weight * a, weight * b, weight * c, weight * d
 
     def _nearest(
-        self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float = 1.0
+        self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
     ) -> tuple[PathPosition, float]:
         """
         Return the nearest position on the edges ``first`` to ``end``, and its distance.
@@ -447,10 +420,7 @@ class PathTracker:
             )
             if residual < nearest:
                 nearest, best, fraction = residual, row, at
-        path_position = (
-            PathPosition(best + 1, 0.0) if fraction >= 1.0 else PathPosition(best, fraction)
-        )
-        return path_position, sqrt(nearest)
+        return _position(best, fraction), nearest
 
     def _nearest_of_many(
         self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
@@ -471,16 +441,12 @@ class PathTracker:
         residual = away - fraction[:, None] * edge
         squares = np.einsum('ij,ij->i', residual, residual)
         best = int(np.argmin(squares))
-        at = float(fraction[best])
-        path_position = (
-            PathPosition(first + best + 1, 0.0) if at >= 1.0 else PathPosition(first + best, at)
-        )
-        return path_position, sqrt(float(squares[best]))
+        return _position(first + best, float(fraction[best])), sqrt(float(squares[best]))
 
 
-def _float_array(values: NDArray[np.float64]) -> array[float]:
-    """Return an array whose search needs no numpy scalars."""
-    return array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
+def _position(row: int, fraction: float) -> PathPosition:
+    """Return a position; the end of an edge is the beginning of the next one."""
+    return PathPosition(row + 1, 0.0) if fraction >= 1.0 else PathPosition(row, fraction)
 
 
 def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -492,6 +458,4 @@ def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 def tracker_speed(twist: Vector6) -> float:
     """Return how fast a twist moves in the coordinates of :class:`PathTracker` [m/s]."""
     x, y, z, rx, ry, rz = twist
-    return float(
-        (x * x + y * y + z * z) ** 0.5 + METRES_PER_RADIAN * (rx * rx + ry * ry + rz * rz) ** 0.5
-    )
+    return hypot(x, y, z) + METRES_PER_RADIAN * hypot(rx, ry, rz)

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the checks of a motion leave out while the tool presses.
+The checks of a motion while the tool presses.
 
-Along compliant axes the arm gives way to what it touches, so a deviation there says nothing; how
-far it may be is a bound of its own. Whether a controller adds what has given way to its target is
-not published, so target and actual pose are treated alike. After a press the arm goes straight to
-the next point from where it is; until there, the same axes are left out.
+Along compliant axes the arm gives way to contact, so a deviation there says nothing and is left
+out; a bound of its own limits it. Whether a controller adds that yield to its target is not
+published, so target and actual pose are treated alike. After a press the arm goes straight to the
+next point from where it is; until there, the same axes are left out.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 #: The tracker may be so much before the time of a point at which the arm stands [s].
 POINT_TIME_TOLERANCE = 0.01
-_AXES = ('x', 'y', 'z')
+_YIELDS = (('m', 'along', 'max_yield'), ('rad', 'about', 'max_yield_angle'))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressWindow:
-    """When on its path the tool gives way, and how."""
+    """The part of a path on which the tool gives way, and how."""
 
     #: Planned times at which it begins and ends to press, and is back on its path [s].
     begin: float
@@ -40,11 +40,11 @@ class PressWindow:
     release: float
     #: 1.0 for each compliant axis.
     compliant: Vector6
-    #: Axes in the base; None = those of the tool.
+    #: Axes in the base; None = the axes of the tool.
     q_base_task: Quaternion | None
     #: How far it may give way [m], [rad].
     max_yields: tuple[float, float]
-    #: Whether the tool goes back on its path, to where it touched, and the goal ends there.
+    #: Whether the tool retracts along its path to the place of contact, where the goal ends.
     ends_at_contact: bool = False
 
     def contains(self, time: float) -> bool:
@@ -55,31 +55,28 @@ class PressWindow:
         """Return that the tool has given way too far, as a clause, or None."""
         if time > self.end + POINT_TIME_TOLERANCE:
             return None
-        errors = self._errors(planned, state.actual_tcp_pose)
-        for k, (bound, unit) in enumerate(zip(self.max_yields, ('m', 'rad'), strict=True)):
-            for axis, error, free in zip(
-                _AXES, errors[k], self.compliant[3 * k : 3 * k + 3], strict=True
-            ):
-                if free and not abs(error) <= bound:
-                    return (
-                        f'the tool gave way by {abs(error):.4f} {unit} '
-                        f'{"about" if k else "along"} {axis} of its press, '
-                        f'{"max_yield_angle" if k else "max_yield"} is {bound:.4f} {unit}'
-                    )
+        shift, turn = self._errors(planned, state.actual_tcp_pose)
+        for k, (error, free) in enumerate(zip((*shift, *turn), self.compliant, strict=True)):
+            bound, (unit, by, name) = self.max_yields[k // 3], _YIELDS[k // 3]
+            if free and not abs(error) <= bound:
+                return (
+                    f'the tool gave way by {abs(error):.4f} {unit} {by} {"xyz"[k % 3]} of its '
+                    f'press, {name} is {bound:.4f} {unit}'
+                )
         return None
 
     def without_yield(self, planned: Pose, pose: Pose, share: float = 0.0) -> Pose:
         """
         Return a pose as it would be if the tool had not given way.
 
-        :param share: the part of what it has given way that stays.
+        :param share: the part of the yield that stays.
         """
         q_base_task = self._axes(planned)
         shift, turn = self._errors(planned, pose)
-        position = add(planned.position, rotate(q_base_task, self._kept(shift, 0, share)))
+        position = add(planned.position, rotate(q_base_task, self._stiff(shift, 0, share)))
         if not any(self.compliant[3:]):
             return Pose(position, pose.quaternion)
-        turned = quaternion_from_rotation_vector(rotate(q_base_task, self._kept(turn, 3, share)))
+        turned = quaternion_from_rotation_vector(rotate(q_base_task, self._stiff(turn, 3, share)))
         return Pose(position, multiply(turned, planned.quaternion))
 
     def compliant_share(self, planned: Pose, direction: Vector3) -> float:
@@ -96,7 +93,7 @@ class PressWindow:
         return along * along
 
     def stiff_state(self, planned: Pose, state: RobotState) -> RobotState:
-        """Return a packet whose actual motion leaves out that along compliant axes."""
+        """Return a packet whose actual motion equals its target along compliant axes."""
         q_base_task = self._axes(planned)
         target, actual = state.target_tcp_acceleration, state.actual_tcp_acceleration
         return replace(
@@ -122,7 +119,8 @@ class PressWindow:
             rotate(to_task, rotation_vector_from_quaternion(turn)),
         )
 
-    def _kept(self, vector: Vector3, first: int, share: float = 0.0) -> Vector3:
+    def _stiff(self, vector: Vector3, first: int, share: float = 0.0) -> Vector3:
+        """Return an error without its parts along compliant axes, but for a share of them."""
         x, y, z = vector
         a, b, c = (1.0 - free * (1.0 - share) for free in self.compliant[first : first + 3])
         return (a * x, b * y, c * z)
@@ -132,5 +130,5 @@ class PressWindow:
         for first in (0, 3):
             wanted, found = (vector3(rates[first : first + 3]) for rates in (target, actual))
             error = rotate(to_task, subtract(found, wanted))
-            halves.append(add(wanted, rotate(q_base_task, self._kept(error, first))))
+            halves.append(add(wanted, rotate(q_base_task, self._stiff(error, first))))
         return (*halves[0], *halves[1])

@@ -49,9 +49,9 @@ class SpeedCheck:
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
         """
-        Return which bound on speed or duration is exceeded, as a clause, or None.
+        Return the bound on speed or duration that is exceeded, as a clause, or None.
 
-        :param twist: that of the controller's own target.
+        :param twist: of the controller's own target.
         :param elapsed: time since the start in which the controller's clock ran [s].
         :param planned: planned time of the present position on the path [s].
         """

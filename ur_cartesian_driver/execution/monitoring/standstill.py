@@ -22,6 +22,8 @@ class Standstill:
 
     def __init__(self, path: ReferencePath, output_delay: float) -> None:
         """Find how long the target stands by plan."""
+        #: Whether the target stands for longer than planned.
+        self.is_long = False
         #: How long the target has stood [s]; the same in scaled time, and the bound on that.
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
@@ -42,6 +44,7 @@ class Standstill:
     def restart(self) -> None:
         """Begin to measure again, because a trajectory starts."""
         self._time = self._scaled_time = 0.0
+        self.is_long = False
 
     def update(self, before: RobotState | None, state: RobotState, passed: float) -> None:
         """
@@ -59,19 +62,17 @@ class Standstill:
             self._time += passed
             # At rest the scaling is 0: only the slider says how fast a wait would pass.
             self._scaled_time += passed * state.target_speed_fraction
+            self.is_long = self._time >= STANDSTILL_TIMEOUT and self._scaled_time >= self._timeout
         else:
             self.restart()
 
     def violation(self, longest_wait: float) -> str | None:
         """
-        Return that the target stands for too long, as a clause, or None.
+        Return that the target stands for no reason, as a clause, or None.
 
         :param longest_wait: how long the robot program may wait where it is, in real time [s].
         """
-        if (
-            self._time < max(STANDSTILL_TIMEOUT, longest_wait + STANDSTILL_MARGIN)
-            or self._scaled_time < self._timeout
-        ):
+        if self._time < longest_wait + STANDSTILL_MARGIN:
             return None
         return (
             f'the arm has stood still for {self._time:.3g} s, nothing holds it, and '

@@ -32,7 +32,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         """
         Begin with no offset.
 
-        :param band: that of the path.
+        :param band: of the path.
         """
         self._band = band
         self._fades = band.on_stale is StaleOffset.FADE
@@ -80,7 +80,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """How many offsets were followed, ignored and cut, and the largest of them."""
+        """The lines about offsets that were followed, ignored or cut, and the largest of them."""
         taken, dropped = self._freshness.accepted, self._freshness.dropped
         largest = ', '.join(
             f'{1e3 * value:.2f} mm {name}'

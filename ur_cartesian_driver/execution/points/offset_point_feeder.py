@@ -5,8 +5,8 @@ Feeds a goal whose points the robot runs while offsets displace its path.
 
 Beside the points, each packet of the robot is answered with the offset to reach. The robot program
 moves the offset there within the bounds of the goal, cycle by cycle, so neither the network nor
-this computer can make it jump; the controller adds it to its motion, and reports the sum. The time
-of the motion is that of the arm on its path.
+this computer can make it jump; the controller adds it to its motion, and reports it. The time of
+the motion follows the progress of the arm on its path.
 """
 
 from __future__ import annotations

@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals that are streamed as set-points through the buffered servo."""
+"""Goals whose set-points go through the buffered servo."""

@@ -8,7 +8,7 @@ bounded speed and acceleration along each axis of the frame of the path, never b
 the goal, and back to its path in time for the end of the motion. All of that counts in the time of
 the motion: where the motion is held, so is the offset.
 
-The joints are those of the path, changed so that the tool is displaced and turns as planned.
+The joints follow the path, changed so that the tool is displaced and turns as planned.
 """
 
 from __future__ import annotations
@@ -96,8 +96,8 @@ class OffsetSetpoints(Displaced):
         """
         Begin on the path, with no offset to move to.
 
-        :param setpoints: those on the path; they take the time of the motion.
-        :param band: that of the path.
+        :param setpoints: on the path; they take the time of the motion.
+        :param band: of the path.
         """
         self._setpoints, self._band, self._arm = setpoints, band, arm
         self.requests = OffsetRequests(band)
@@ -106,7 +106,7 @@ class OffsetSetpoints(Displaced):
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
-        #: How the joints of the newest set-point differ from those of the path [rad].
+        #: How far the joints of the newest set-point are from the path [rad].
         self._change: Vector6 = ZERO6
         # The newest set-points: joints, shift in the base, offset in the frame of the path.
         self._history: NDArray[np.float64] = np.zeros((HISTORY, 12))
@@ -157,7 +157,7 @@ class OffsetSetpoints(Displaced):
         """
         Return the offset at the place of the controller's target.
 
-        It is that of the set-point nearest to the target, of those that it has not passed.
+        It belongs to the nearest set-point that the target has not passed.
         """
         if not self._count:
             return NO_OFFSET

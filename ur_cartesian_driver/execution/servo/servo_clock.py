@@ -8,7 +8,7 @@ the robot's time runs; L, the motion time in flight, accumulates what that leave
 
     rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
-L is the motion time in the robot's buffer, which the robot reports, plus that of the set-points
+L is the motion time in the robot's buffer, which the robot reports, plus the time of set-points
 that it had not read when it made the report. So the delay of the wire does not look like a
 missing lag, and the loop (an integrator with a proportional gain) does not oscillate.
 
@@ -37,7 +37,7 @@ _ROUNDING = 1e-6
 @dataclass(slots=True, kw_only=True)
 class ServoClock:
     """
-    Counts the control steps of motion time that the next set-point stands for.
+    Counts the control steps of motion time for which the next set-point stands.
 
     :param step: the robot's control step [s].
     :param target: motion time to keep in flight [s].
@@ -66,7 +66,7 @@ class ServoClock:
 
     def take_steps(self, in_flight: float) -> int:
         """
-        Return how many steps a set-point stands for that is sent now; 0 = none is due.
+        Return for how many steps a set-point stands that is sent now; 0 = none is due.
 
         :param in_flight: as in :meth:`advance`.
         """

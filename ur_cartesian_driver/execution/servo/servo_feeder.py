@@ -69,13 +69,14 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         Prepare; the inputs are not taken yet.
 
         :param stream: of the set-points of the goal's spline, or of another source.
-        :param parts: objects with capabilities that this motion has beside those of any other.
+        :param parts: objects with further capabilities of this motion.
         """
         super().__init__(monitor)
         self.stream, self.parts = stream, parts
         if monitor.job.stall_timeout:
             self.parts = (WaitForArm(monitor, stream), *parts)
         self._spline = monitor.job.spline
+        self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
         self._last_read, self._last_answer = -1, -inf
         self._has_filled = self._has_left = False
 
@@ -185,9 +186,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         """Return how many pieces of the spline the arm has begun, and the lag of its target."""
         if self._spline is None:
             return None, 0
-        max_lag = MAX_LAG_LOOKAHEADS * self.stream.settings.lookahead_time
-        begun = self._pieces_begun(self.stream.motion_time)
-        return begun, begun - self._pieces_begun(self.stream.motion_time - max_lag)
+        time = self.stream.motion_time
+        begun = self._pieces_begun(time)
+        return begun, begun - self._pieces_begun(time - self._max_servo_lag)
 
     def _pieces_begun(self, time: float) -> int:
         """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
@@ -208,7 +209,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     @property
     def lag(self) -> float:
-        """How far the arm is behind the newest set-point [s]."""
+        """The time by which the arm is behind the newest set-point [s]."""
         return self.stream.lag
 
     def reports(self) -> list[GoalCommand]:

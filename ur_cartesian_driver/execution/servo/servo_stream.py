@@ -8,7 +8,7 @@ program that the client is alive; most of them carry a set-point. The phases, wh
 in :data:`TRANSITIONS`:
 
 * **OPENING**: the inputs are requested. The first packets show the control step of the robot, and
-  the sequence number that it read last, perhaps from an earlier client; ours continue after it.
+  the sequence number that it read last, perhaps of an earlier client; ours continue after it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
   asked to read the inputs (a program after the guide always does). It has answered when it has
   read one of our sequence numbers.
@@ -36,6 +36,7 @@ from dataclasses import dataclass
 from enum import auto, Enum
 from itertools import pairwise
 from math import ceil, inf
+from typing import NamedTuple
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
@@ -83,7 +84,7 @@ class ServoPhase(Enum):
 
 
 class ServoEvent(Enum):
-    """What changes the phase."""
+    """A change that leads to another phase."""
 
     OPENED = auto()
     ANSWERED = auto()
@@ -98,7 +99,7 @@ class ServoEvent(Enum):
 
 _STOPS = {ServoEvent.STOP: ServoPhase.LEAVING, ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT}
 
-#: Events that are not listed leave the phase unchanged.
+#: The next phase of each change in each phase; others leave the phase as it is.
 TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = {
     ServoPhase.OPENING: {
         ServoEvent.OPENED: ServoPhase.ENTERING,
@@ -125,16 +126,6 @@ TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = {
     ServoPhase.LEFT: {},
 }
 
-#: Phases in which set-points lead the arm.
-STREAMING = frozenset(
-    {
-        ServoPhase.FILLING,
-        ServoPhase.SERVOING,
-        ServoPhase.HOLDING,
-        ServoPhase.DRAINING,
-        ServoPhase.ARRIVED,
-    }
-)
 _ACTIVITIES: Mapping[ServoPhase, ServoActivity] = {
     ServoPhase.FILLING: ServoActivity.FILLING,
     ServoPhase.SERVOING: ServoActivity.SERVOING,
@@ -142,12 +133,14 @@ _ACTIVITIES: Mapping[ServoPhase, ServoActivity] = {
     ServoPhase.DRAINING: ServoActivity.DRAINING,
     ServoPhase.ARRIVED: ServoActivity.DRAINING,
 }
+#: Phases in which set-points lead the arm.
+STREAMING = frozenset(_ACTIVITIES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoSettings:
     """
-    How set-points are streamed.
+    Settings of the streaming.
 
     :raises ValueError: the values contradict each other.
     """
@@ -164,7 +157,7 @@ class ServoSettings:
     lookahead_time: float = 0.03
 
     def __post_init__(self) -> None:
-        """Refuse what lets the buffer overflow."""
+        """Refuse settings that let the buffer overflow."""
         if not MAX_STEP <= self.target_lag <= self.max_lag:
             raise ValueError(
                 f'servo_target_lag is {self.target_lag:g} s; it must be between '
@@ -178,8 +171,18 @@ class ServoSettings:
             )
 
 
+class _Setpoint(NamedTuple):
+    """A set-point that the arm was not led to yet."""
+
+    sequence: int
+    #: The time of the stream at which it ends [s].
+    state_time: float
+    #: The time of the source [s].
+    source_time: float
+
+
 class ServoStream:
-    """The streaming of one source's set-points; see the module's description."""
+    """Streams the set-points of one source; see the module's description."""
 
     def __init__(self, source: SetpointSource, settings: ServoSettings) -> None:
         """Wait for the first packet."""
@@ -192,17 +195,17 @@ class ServoStream:
         self._sequence = 0
         #: Our first sequence number, the first with mode SERVO, and the first with IDLE again.
         self._first = self._first_servo = self._first_idle = 0
-        self._state_time = 0.0
         self._joints: Vector6 = source.next(0.0)
         self._fill_target = START_FILL * settings.target_lag
-        #: Set-points that the robot has not read yet: sequence number and state time.
-        self._unread: deque[tuple[int, float]] = deque()
-        self._read_time = 0.0
-        #: Time of the source [s]; of what is in flight: state time, time of the source.
-        self._source_time = 0.0
-        self._unfinished: deque[tuple[float, float]] = deque()
-        #: Time of the source at the set-point that the arm was led to last [s].
-        self.motion_time = 0.0
+        #: Time of the stream at the newest set-point, and at the last one that the robot has read.
+        self._state_time = self._read_time = 0.0
+        #: Motion time in the robot's buffer [s].
+        self.buffered = 0.0
+        #: Set-points that the robot has not read, and those that it has not carried out.
+        self._unread: deque[_Setpoint] = deque()
+        self._unfinished: deque[_Setpoint] = deque()
+        #: Time of the source at the newest set-point, and where the arm was led to last [s].
+        self.source_time = self.motion_time = 0.0
         #: Rate of the motion relative to the set-points, 0 to 1.
         self._motion_rate = 1.0
         #: Whether the motion is held where it is on its path, and by how much that has delayed it
@@ -223,25 +226,14 @@ class ServoStream:
     # ---- state --------------------------------------------------------------------------------
 
     @property
-    def source_time(self) -> float:
-        """Time of the source at the set-point that was made last [s]."""
-        return self._source_time
-
-    @property
     def in_flight(self) -> float:
         """Motion time that was sent and not carried out yet [s]."""
-        reported = 0.0 if self._latest is None else self._latest.lag
-        return self._state_time - self._read_time + reported
+        return self._state_time - self._read_time + self.buffered
 
     @property
     def lag(self) -> float:
-        """How far the arm is behind the newest set-point [s], that of ``servoj`` included."""
+        """The time by which the arm is behind the newest set-point, with the lag of servoj [s]."""
         return self.in_flight + self.settings.lookahead_time
-
-    @property
-    def buffered(self) -> float:
-        """Motion time in the robot's buffer [s]."""
-        return 0.0 if self._latest is None else self._latest.lag
 
     def report(self, joint_error: Vector6 = UNKNOWN6) -> ServoReport | None:
         """
@@ -249,7 +241,7 @@ class ServoStream:
 
         :param joint_error: target - actual [rad].
         """
-        state, settings = self._latest, self.settings
+        state = self._latest
         if state is None:
             return None
         return ServoReport(
@@ -258,7 +250,7 @@ class ServoStream:
             setpoints_sent=self._sent,
             setpoints_done=state.setpoints_done,
             buffer_size=state.buffer_size,
-            buffer_capacity=settings.buffer_depth,
+            buffer_capacity=self.settings.buffer_depth,
             buffered=state.lag,
             lag=self.lag,
             speed_scaling=state.effective_speed,
@@ -275,11 +267,11 @@ class ServoStream:
         """Let the arm follow the set-points from now on."""
         self._apply(ServoEvent.BEGUN)
         self._first_servo = self._sequence + 1
-        # What the source says now, as the first write may come before its first set-point.
+        # The source may have moved since, and the first write may come before its next set-point.
         self._joints = self._source.next(0.0)
 
     def stop(self) -> tuple[float, ...] | None:
-        """Leave the servo; return what to write at once, None = nothing."""
+        """Leave the servo; return the inputs to write at once, None = nothing."""
         before = self.phase
         self._apply(ServoEvent.STOP)
         if self.phase is before or self.phase is ServoPhase.LEFT:
@@ -290,15 +282,14 @@ class ServoStream:
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
         """
-        Take a packet; return what to write, None = nothing.
+        Take a packet; return the inputs to write, None = nothing.
 
         :param now: time of a steady clock [s].
         """
-        before, self._latest = self._latest, feedback
+        before, self._latest, self.buffered = self._latest, feedback, feedback.lag
         if self.phase is ServoPhase.OPENING and not self._open(feedback):
             return None
-        self._update_read(feedback)
-        self._update_motion_time()
+        self._forget_finished(feedback)
         self._update_phase(feedback)
         if before is not None:
             self._advance_clock(feedback.timestamp - before.timestamp, feedback)
@@ -308,7 +299,11 @@ class ServoStream:
         ):
             return None
         self._last_write = now
-        self._next_write()
+        self._sequence += 1
+        if self.phase in (ServoPhase.FILLING, ServoPhase.SERVOING, ServoPhase.HOLDING):
+            steps = self._clock.take_steps(self.in_flight)
+            if steps:
+                self._next_setpoint(steps)
         return self._row()
 
     def _open(self, feedback: ServoFeedback) -> bool:
@@ -325,51 +320,43 @@ class ServoStream:
         self._apply(ServoEvent.OPENED)
         return True
 
-    def _update_read(self, feedback: ServoFeedback) -> None:
-        """Forget what the robot has read."""
+    def _forget_finished(self, feedback: ServoFeedback) -> None:
+        """Forget set-points that the robot has read, and those that it has carried out."""
         if feedback.last_sequence <= self._sequence:  # else it is not one of ours
-            while self._unread and self._unread[0][0] <= feedback.last_sequence:
-                self._read_time = self._unread.popleft()[1]
-
-    def _update_motion_time(self) -> None:
-        """Update the time of the source that the arm has reached."""
+            while self._unread and self._unread[0].sequence <= feedback.last_sequence:
+                self._read_time = self._unread.popleft().state_time
         done = self._state_time - self.in_flight + 0.5 * self._clock.step
-        while self._unfinished and self._unfinished[0][0] <= done:
-            self.motion_time = self._unfinished.popleft()[1]
+        while self._unfinished and self._unfinished[0].state_time <= done:
+            self.motion_time = self._unfinished.popleft().source_time
 
     def _update_phase(self, feedback: ServoFeedback) -> None:
         """Change the phase as the packet requires."""
-        phase = self.phase
-        if phase is ServoPhase.ENTERING and self._has_read(self._first):
-            self._apply(ServoEvent.ANSWERED)
-        elif self._has_left(feedback):
-            self._apply(ServoEvent.PROGRAM_LEFT)
-        elif (
-            phase in (ServoPhase.FILLING, ServoPhase.HOLDING)
-            and self.in_flight >= self._fill_target
-        ):
-            self._apply(ServoEvent.FILLED)
-        elif (
-            phase is ServoPhase.SERVOING
-            and feedback.lag <= 0.0
-            and feedback.playing
-            and self.in_flight <= 0.5 * self._clock.step
-        ):
-            self._underruns += 1
-            self._motion_rate = 0.0
-            self._apply(ServoEvent.EMPTY)
-        elif phase is ServoPhase.DRAINING and self.in_flight <= 0.5 * self._clock.step:
-            self._apply(ServoEvent.DONE)
+        match self.phase:
+            case ServoPhase.ENTERING if self._has_read(self._first):
+                self._apply(ServoEvent.ANSWERED)
+            case _ if self._has_left(feedback):
+                self._apply(ServoEvent.PROGRAM_LEFT)
+            case ServoPhase.FILLING | ServoPhase.HOLDING if self.in_flight >= self._fill_target:
+                self._apply(ServoEvent.FILLED)
+            case ServoPhase.SERVOING if (
+                feedback.lag <= 0.0 and feedback.playing and self._has_run_out()
+            ):
+                self._underruns += 1
+                self._motion_rate = 0.0
+                self._apply(ServoEvent.EMPTY)
+            case ServoPhase.DRAINING if self._has_run_out():
+                self._apply(ServoEvent.DONE)
+
+    def _has_run_out(self) -> bool:
+        return self.in_flight <= 0.5 * self._clock.step
 
     def _has_left(self, feedback: ServoFeedback) -> bool:
         """Tell whether the program is out of SERVO, on our request or by itself."""
+        if feedback.mode == ServoMode.SERVO:
+            return False
         if self.phase is ServoPhase.LEAVING:
-            return self._has_read(self._first_idle) and feedback.mode != ServoMode.SERVO
-        return (
-            self.phase in STREAMING
-            and self._has_read(self._first_servo)
-            and feedback.mode != ServoMode.SERVO
-        )
+            return self._has_read(self._first_idle)
+        return self.phase in STREAMING and self._has_read(self._first_servo)
 
     def _advance_clock(self, passed: float, feedback: ServoFeedback) -> None:
         """Let the robot's time pass."""
@@ -377,33 +364,28 @@ class ServoStream:
         if self.phase in STREAMING:
             speed = feedback.effective_speed if feedback.playing else 0.0
             self._clock.advance(passed, speed, self.in_flight)
-        if self.phase is ServoPhase.SERVOING and self.is_held:
+        if self.phase is not ServoPhase.SERVOING:
+            return
+        if self.is_held:
             self._recovers = True
             self._motion_rate = max(0.0, self._motion_rate - STALL_DECELERATION * passed)
-        elif self.phase is ServoPhase.SERVOING:
+        else:
             self._motion_rate = min(1.0, self._motion_rate + RESTART_ACCELERATION * passed)
             self._recovers = self._recovers and self._motion_rate < 1.0
 
-    def _next_write(self) -> None:
-        """Give the next write a number, and a set-point if one is due."""
-        self._sequence += 1
-        if self.phase in (ServoPhase.FILLING, ServoPhase.SERVOING, ServoPhase.HOLDING):
-            steps = self._clock.take_steps(self.in_flight)
-            if steps:
-                self._sent += steps
-                self._send(steps * self._clock.step)
-                self._unread.append((self._sequence, self._state_time))
-
-    def _send(self, time: float) -> None:
-        """Make the next set-point."""
-        moves = self.phase is ServoPhase.SERVOING
+    def _next_setpoint(self, steps: int) -> None:
+        """Make the set-point of the next write, which stands for so many control steps."""
+        moves, time = self.phase is ServoPhase.SERVOING, steps * self._clock.step
         passed = self._motion_rate * time if moves else 0.0
+        self._sent += steps
         self._joints = self._source.next(passed)
-        self._source_time += passed
+        self.source_time += passed
         self._state_time += time
         if self._recovers:
             self.held_time += time - passed
-        self._unfinished.append((self._state_time, self._source_time))
+        setpoint = _Setpoint(self._sequence, self._state_time, self.source_time)
+        self._unread.append(setpoint)
+        self._unfinished.append(setpoint)
         if moves and self._source.done:
             self._apply(ServoEvent.AT_END)
 

@@ -17,7 +17,7 @@ _TIME_TOLERANCE = 1e-12
 
 
 class SetpointSource(Protocol):
-    """Gives joint positions one after the other; the stream decides how fast time passes."""
+    """Gives joint positions one after the other, at the pace of the stream."""
 
     def next(self, dt: float) -> Vector6:
         """
@@ -28,7 +28,7 @@ class SetpointSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether the last positions were the end, where the arm comes to rest."""
+        """Whether the last positions were those at the end, where the arm comes to rest."""
 
 
 class SplineSetpoints:
@@ -36,33 +36,21 @@ class SplineSetpoints:
 
     def __init__(self, spline: JointSpline) -> None:
         """Begin at the start of the spline."""
-        self._spline = spline
-        self._time = float(spline.times[0])
-        self._end = float(spline.times[-1])
-        self._row = 0
-        self._step = 0.0
-        self._rows: list[Vector6] = []
-        self._current = self._at(self._time)
+        #: The curve, without the pieces that lie behind.
+        self.spline = spline
+        #: The time of the set-point that was returned last [s].
+        self.time = float(spline.times[0])
+        self._step, self._rows, self._row = 0.0, list[Vector6](), 0
+        self._current = vector6(spline.at(self.time)[0].tolist())
 
     @property
     def done(self) -> bool:
         """Whether the end of the spline is reached."""
-        return self._time >= self._end - _TIME_TOLERANCE
-
-    @property
-    def time(self) -> float:
-        """The time of the set-point that was returned last [s]."""
-        return self._time
-
-    @property
-    def spline(self) -> JointSpline:
-        """The curve, without what lies behind."""
-        return self._spline
+        return self.time >= self.spline.duration - _TIME_TOLERANCE
 
     def replace_tail(self, spline: JointSpline) -> None:
         """Go on along another spline from where it begins, or from here if that is later."""
-        self._spline = self._spline.followed_by(spline, self._time)
-        self._end = float(spline.times[-1])
+        self.spline = self.spline.followed_by(spline, self.time)
         self._rows, self._row = [], 0
 
     def next(self, dt: float) -> Vector6:
@@ -71,7 +59,7 @@ class SplineSetpoints:
             return self._current
         if abs(dt - self._step) > _TIME_TOLERANCE or self._row >= len(self._rows):
             self._compute_batch(dt)
-        self._time = min(self._time + dt, self._end)
+        self.time = min(self.time + dt, self.spline.duration)
         self._current = self._rows[self._row]
         self._row += 1
         return self._current
@@ -80,10 +68,5 @@ class SplineSetpoints:
         """Compute the next set-points, for steps of the same length."""
         count = BATCH if abs(dt - self._step) <= _TIME_TOLERANCE else 1
         self._step, self._row = dt, 0
-        times = self._time + dt * np.arange(1, count + 1, dtype=np.float64)
-        q, _, _ = self._spline.rows(times.astype(np.float64))
+        q, _, _ = self.spline.rows(self.time + dt * np.arange(1.0, count + 1.0))
         self._rows = [vector6(row) for row in q.tolist()]
-
-    def _at(self, time: float) -> Vector6:
-        q, _, _ = self._spline.at(time)
-        return vector6(q.tolist())

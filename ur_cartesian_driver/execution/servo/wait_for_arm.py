@@ -61,7 +61,7 @@ class WaitForArm(Stallable, Ageing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """How often, and how long, the motion has waited."""
+        """The line about waits: their number, the longest, and the time that they cost."""
         if not self._count:
             return ()
         return (
