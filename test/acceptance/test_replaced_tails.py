@@ -24,7 +24,7 @@ from robot_cell import run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import AlreadySent, GoalRefused
+from ur_cartesian_driver.motion.errors import AlreadySent, ErrorCode, GoalRefused
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -157,6 +157,20 @@ def test_a_goal_that_has_run_out_goes_on_from_rest(mode):
         end = await motion.ended()
         assert end.succeeded, end.text
         assert 'was brought to rest once' in end.report[0]
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+def test_a_goal_that_is_cancelled_while_it_waits_says_where_it_rests(mode):
+    async def scenario(cell):
+        motion, _ = await moves_around(cell, mode)
+        assert await motion.until(lambda: motion.progress.awaiting_points)
+        last = motion.points - 1
+        cell.owner.cancel()
+        end = await motion.ended()
+        assert end.code is ErrorCode.CANCELLED
+        assert end.text.endswith(f'(at rest behind point {last}, waiting for more).'), end.text
 
     run_cell(scenario)
 

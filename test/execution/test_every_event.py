@@ -236,7 +236,7 @@ def counts_fit(commands):
 
 
 @pytest.mark.parametrize('state', [state for state in GoalState if state is not GoalState.ENDED])
-def test_every_state_has_a_way_to_the_end(state):
+def test_every_state_leads_to_the_end(state):
     seen, ahead = set(), {state}
     while ahead:
         seen |= ahead

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One goal through the trajectory machine: the table, and what it sends."""
+"""One goal through its machine: the table of states, and the commands."""
 
 from dataclasses import replace
 from typing import Any
@@ -331,7 +331,7 @@ def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
     assert machine.state is GoalState.MOVING
 
 
-def test_nothing_is_watched_before_the_program_has_begun():
+def test_nothing_is_checked_before_the_program_has_begun():
     """The TCP may still be another one; it is changed before the first point."""
     machine = point_machine(job(path_tolerance=Tolerance(position=(0.001,) * 3)))
     elsewhere = {
@@ -567,7 +567,7 @@ def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, li
         robot(0.5, safety_status=SafetyStatus.EMERGENCY_STOPPED),
     ],
 )
-def test_what_took_the_program_with_it_is_the_reason_whichever_is_heard_of_first(deeper):
+def test_the_deeper_reason_of_a_lost_program_counts_whichever_comes_first(deeper):
     gone = LinkLost(link='program', reason='it hung up')
     first, then = started(), started()
     expected = outcome(first.step(deeper, 1.0)).code
@@ -628,7 +628,7 @@ def test_nothing_happens_after_the_end(event):
 
 
 @pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
-def test_what_was_decided_stays_when_the_robot_stops_before_its_tcp_is_back(changes, signal):
+def test_a_decided_outcome_survives_a_stop_before_the_tcp_is_restored(changes, signal):
     machine = brought_to(GoalState.RESTORING)
     commands = machine.step(with_tcp(NOZZLE, **changes), 1.2)
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED

@@ -58,7 +58,7 @@ def lagging():
 
 
 def slider(seed):
-    """A slider that a person plays with: 1 to 100 %, and pauses; the controller ramps it."""
+    """Return a slider in the hand of a person: 1 to 100 %, and pauses; the controller ramps it."""
     random, value, goal, until, last = Random(seed), 1.0, 1.0, 0.0, 0.0
 
     def scale(t):
@@ -74,7 +74,7 @@ def slider(seed):
 
 
 def sent(answers):
-    """The packets that were answered with CANCEL."""
+    """Return the numbers of the packets that were answered with CANCEL."""
     return [
         k
         for k, commands in enumerate(answers)
@@ -114,7 +114,7 @@ def corners(cell, kinds, radius):
     ],
     ids=lambda kinds: kinds[1].name,
 )
-def test_corners_and_blends_never_trip(cell, kinds, radius):
+def test_corners_and_blends_violate_nothing(cell, kinds, radius):
     made = cell.plan(*corners(cell, kinds, radius), path_tolerance=TIGHT)
     machine, answers = cell.run(made, disturb=lagging())
     assert sent(answers) == [], machine._text
@@ -122,7 +122,7 @@ def test_corners_and_blends_never_trip(cell, kinds, radius):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('seed', range(12))
-def test_sliders_and_pauses_never_trip(cell, seed):
+def test_sliders_and_pauses_violate_nothing(cell, seed):
     made = cell.plan(
         *corners(cell, [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.LINEAR], 0.005),
         path_tolerance=TIGHT,
@@ -132,7 +132,7 @@ def test_sliders_and_pauses_never_trip(cell, seed):
 
 
 @pytest.mark.slow
-def test_the_slowest_slider_never_trips(cell):
+def test_the_slowest_slider_violates_nothing(cell):
     made = cell.plan([cell.pose(x=0.005)], path_tolerance=TIGHT, goal_tolerance=TIGHT)
     _, answers = cell.run(made, scale=lambda t: 0.01)
     assert succeeded(answers)
@@ -141,7 +141,7 @@ def test_the_slowest_slider_never_trips(cell):
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 @pytest.mark.parametrize('axis', range(3))
 @pytest.mark.parametrize('name', NAMES)
-def test_a_disturbance_trips_its_axis_in_the_cycle_it_comes_in(cell, name, axis, sign):
+def test_a_disturbance_violates_its_axis_in_the_same_cycle(cell, name, axis, sign):
     size, bound = SIZES.get(name, (0.5, 0.1))
     limits = [-1.0] * 18
     limits[3 * NAMES.index(name) + axis] = bound
@@ -166,7 +166,7 @@ def test_a_disturbance_trips_its_axis_in_the_cycle_it_comes_in(cell, name, axis,
 
 
 def shifted(state, name, axis, value):
-    """A packet with an arm that is elsewhere, or faster, on one axis."""
+    """Return a packet with an arm that is elsewhere, or faster, on one axis."""
     v = [0.0] * 3
     v[axis] = value
     pose = state.actual_tcp_pose

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the machine is told of a plan."""
+"""The job of a plan, for the machine in another process."""
 
 from math import pi
 

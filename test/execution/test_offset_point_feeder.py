@@ -185,7 +185,7 @@ def test_the_path_is_where_the_controller_says():
     assert cell.controls[-1].action is TrajectoryAction.CANCEL
 
 
-def test_what_an_earlier_goal_has_left_in_the_registers_is_no_offset():
+def test_registers_of_an_earlier_goal_hold_no_offset():
     cell = Cell().start()
     cell.report(0.002, SHIFTED)
     assert cell.feeder.applied_offset(cell.state(0.5)) == NO_OFFSET

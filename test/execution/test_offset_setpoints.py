@@ -155,7 +155,7 @@ def test_no_stream_of_offsets_exceeds_a_bound(first):
     assert moved > 0.9 * len(seeds)
 
 
-def test_the_tool_moves_by_the_offset_and_turns_not():
+def test_the_tool_moves_by_the_offset_without_turning():
     drive = Drive(4.0)
     drive.run(0.2)
     assert not np.any(drive.places), 'no offset came yet'
@@ -195,7 +195,7 @@ def test_a_stale_offset_does_not_come_back_behind_a_corner():
     assert drive.place == [0.0, 0.0, 0.0]
 
 
-def test_what_is_old_or_no_number_is_ignored():
+def test_old_offsets_and_nan_are_ignored():
     drive = Drive(4.0)
     drive.run(0.1)
     drive.offset(0.0, 0.002, 0.0, age=0.05)
@@ -226,7 +226,7 @@ def test_a_motion_that_is_held_holds_the_offset():
     assert 0.2 * SPEED < slow < 0.26 * SPEED
 
 
-def test_where_the_arm_is_says_how_far_the_path_has_applied_offset():
+def test_the_applied_offset_belongs_to_the_place_of_the_arm():
     drive = Drive(4.0)
     drive.offset(0.0, 0.005, 0.0)
     drive.run(0.2)

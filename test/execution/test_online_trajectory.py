@@ -108,7 +108,7 @@ def test_it_goes_straight_arrives_and_rests(arm):
         assert (arm.forward(q) @ TCP).distance_to(pose) < 1e-8
 
 
-def test_it_takes_hardly_longer_than_the_fastest_way():
+def test_it_takes_hardly_longer_than_the_fastest_motion():
     flight = Flight()
     flight.generator.set_target(flight.beside(y=0.1))
     while not flight.generator.arrived:
@@ -256,7 +256,7 @@ def test_it_stops_smoothly_before(what):
     assert flight.go(flight.home, 2.3).arrived, 'and it is free to leave'
 
 
-def test_what_blocked_it_does_not_make_it_tremble():
+def test_a_blocked_arm_does_not_tremble():
     flight = Flight()
     generator = flight.go(flight.beside(x=-1.0), 2.1)
     assert generator.blocked

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the controller is on the path, and where the tool should be."""
+"""The position of the controller on the path, and the planned pose of the tool."""
 
 import itertools
 from math import cos, inf, pi, sin
@@ -39,7 +39,7 @@ SQUARE = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.6, 0.2, 0.2), (0.4, 0.2, 0.2), (0
 
 
 def running(begun):
-    """What a program runs that has begun so many motions, one for each point."""
+    """Return the points of the motions that run when so many have begun, one for each point."""
     return (begun - 1, max(begun - 2, -1)) if begun else None
 
 
@@ -170,7 +170,7 @@ def test_there_is_no_lag_before_the_start_or_behind_the_end(x):
     )
 
 
-def test_a_turn_lags_as_a_way_does():
+def test_a_rotation_lags_as_a_translation_does():
     turns = [quaternion_from_rotation_vector((0.0, 0.0, angle)) for angle in (0.0, 0.1)]
     tracker = PathTracker(path(*[(0.4, 0.0, 0.2)] * 2, quaternions=turns))
     tracker.update(Pose((0.4, 0.0, 0.2), quaternion_from_rotation_vector((0, 0, 0.05))), 0.1)
@@ -178,7 +178,7 @@ def test_a_turn_lags_as_a_way_does():
     assert tracker.desired(behind, (0, 0, 0, 0, 0, 1.0)).angle_to(behind) < 1e-4
 
 
-def test_the_target_is_compared_with_the_plan_apart_from_the_room_of_corners():
+def test_a_target_within_the_blend_tolerance_is_on_the_plan():
     blend_tolerance = np.array([[0.0, 0.0], [0.003, 0.1], [0.0, 0.0]])
     corner = (0.4, 0.0, 0.2), (0.5, 0.0, 0.2), (0.5, 0.1, 0.2)
     beside = Pose((0.45, 0.0, 0.204), quaternion_from_rotation_vector((pi + 0.15, 0.0, 0.0)))
@@ -204,7 +204,7 @@ def test_few_edges_are_searched_as_many_are(seed):
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_what_is_surely_near_the_plan_is_near_it(seed):
+def test_a_target_surely_within_bounds_deviates_by_less(seed):
     draw = np.random.default_rng(seed)
     quaternions = draw.normal(size=(2, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a press leaves out of the checks, and how far the tool may give way."""
+"""Checks during a press leave out the yield, which has a bound of its own."""
 
 from math import inf
 
@@ -50,7 +50,7 @@ def test_it_lasts_until_the_tool_is_back_on_its_path():
     assert press('z', release=inf).contains(1e9)
 
 
-def test_what_gives_way_along_the_axes_of_the_tool_is_left_out():
+def test_yield_along_the_axes_of_the_tool_is_left_out():
     assert press('z').without_yield(PLANNED, off(0.003, -0.004, 0.002)).position == pytest.approx(
         (0.103, 0.2, 0.302)
     )

@@ -189,7 +189,7 @@ def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
 
 
 @pytest.mark.parametrize('T_flange_tcp', [None, NOZZLE])
-def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_tcp):
+def test_an_arm_that_was_moved_since_the_plan_is_not_pulled_to_its_start(T_flange_tcp):
     cell = Cell(machine(T_flange_tcp))
     cell.joint = 0.05
     cell.until(GoalState.ENDED)
@@ -203,7 +203,7 @@ def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_
     ('event', 'code'),
     [(CancelRequested(), ErrorCode.CANCELLED), (PreemptRequested(), ErrorCode.PREEMPTED)],
 )
-def test_a_wish_is_written_at_once_and_answered_by_leaving(event, code):
+def test_a_cancel_is_written_at_once_and_answered_by_leaving(event, code):
     cell = Cell(machine()).until(GoalState.MOVING)
     for _ in range(60):
         cell.cycle()

@@ -270,7 +270,7 @@ def test_packets_in_one_go_are_answered_once():
     assert [row is None for row in rows] == [False, True, True, True, True]
 
 
-def test_a_spline_is_sampled_where_it_is():
+def test_setpoints_lie_on_the_spline():
     spline = JointSpline.of(
         HOME,
         [
@@ -300,7 +300,7 @@ def test_the_clock_is_never_negative_nor_fast_and_leaves_the_rest_of_the_buffer(
 
 
 @pytest.mark.parametrize('phase', [phase for phase in ServoPhase if phase is not ServoPhase.LEFT])
-def test_every_phase_has_a_way_out_by_a_stop(phase):
+def test_every_phase_is_left_by_a_stop(phase):
     seen, ahead = set(), {phase}
     while ahead:
         seen |= ahead

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the goal tolerance and its time mean once the robot program says that it has arrived."""
+"""The goal tolerance and its time, from the SUCCESS of the robot program on."""
 
 from dataclasses import replace
 from math import inf
@@ -80,7 +80,7 @@ WRONG = [
 
 
 def arrived(late=0.0, **job):
-    """A machine that was told SUCCESS, so long after the goal was due; and what it answered."""
+    """Return a machine that got SUCCESS so long after the goal was due, and its answer."""
     machine = point_machine(replace(POINT, **job), max_plan_deviation=(0.0, 0.0))
     on_the_way = replace(AT_REST, target_q=(0.1,) + (0.0,) * 5)
     machine.start(on_the_way)
@@ -94,9 +94,7 @@ def outcome(commands):
 
 
 @pytest.mark.parametrize(('text', 'state', 'tolerance'), WRONG, ids=[row[0] for row in WRONG])
-def test_what_is_not_in_its_tolerance_in_time_is_named_and_what_has_none_is_not(
-    text, state, tolerance
-):
+def test_an_axis_that_settles_late_is_named_if_it_has_a_tolerance(text, state, tolerance):
     packet = StateReceived(state=replace(AT_REST, **state))
     machine, _ = arrived(goal_tolerance=Tolerance(**tolerance), goal_time_tolerance=0.5)
     assert outcome(machine.step(packet, DUE + 0.499)) is None

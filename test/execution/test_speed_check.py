@@ -66,7 +66,7 @@ def test_the_bounds_follow_from_the_plan(moved, elapsed, planned, clause):
         assert 'wire_dialect' in said
 
 
-def test_a_path_that_stands_still_bounds_nothing_but_harm():
+def test_a_path_at_rest_permits_harmless_speeds():
     still = ReferencePath(
         poses=POSES[:1].repeat(2, axis=0),
         point=np.zeros(2, dtype=np.int32),
@@ -112,7 +112,7 @@ def is_cancelled(commands):
         (0, {'has_speed_profile': False}, False),
     ],
 )
-def test_only_who_tells_no_progress_is_watched(begun, job, stopped):
+def test_only_a_program_without_progress_reports_is_checked(begun, job, stopped):
     made = machine(**job)
     assert is_cancelled(made.step(robot(0.01, x=0.4001, v=0.5, begun=begun), 0.01)) == stopped
 

@@ -79,5 +79,5 @@ def test_tries_become_rare_until_something_changes(temporary_tcp):
         (Pose((0.0, 0.0, 0.2), quaternion_from_rotation_vector((3e-6, 0.0, 0.0))), False),
     ],
 )
-def test_what_the_wire_rounds_is_the_same_tcp(other, expected):
+def test_a_tcp_rounded_by_the_wire_is_the_same(other, expected):
     assert same_tcp(NOZZLE, other) is expected

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The truth table: which axis of which quantity trips on which disturbance, and which does not."""
+"""The truth table: each axis of each quantity violates its own limit, and no other."""
 
 from dataclasses import replace
 from math import nan, pi
@@ -51,7 +51,7 @@ AXES = [(name, axis) for name in FIELDS for axis in range(3)]
 
 
 def limit(name, values, others=-1.0):
-    """A tolerance of one quantity; of all others it is `others`."""
+    """Return a tolerance of one quantity, with `others` for all others."""
     limits: dict[str, Any] = {
         'position': [others] * 3,
         'orientation': [others] * 3,
@@ -64,7 +64,7 @@ def limit(name, values, others=-1.0):
 
 
 def disturbed(name, axis, error, frame=IDENTITY):
-    """A packet in which desired - actual is `error` on an axis of the goal's frame."""
+    """Return a packet in which desired - actual is `error` on an axis of the goal's frame."""
     errors = [0.0] * 3
     errors[axis] = error
     if name == 'orientation':  # in the tool: q_desired = q_actual * error
@@ -88,7 +88,7 @@ def test_the_table_has_all_quantities():
 @pytest.mark.parametrize('frame', [IDENTITY, TURNED], ids=['base', 'turned'])
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 @pytest.mark.parametrize(('name', 'axis'), AXES)
-def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
+def test_each_axis_is_checked_alone_and_named(name, axis, sign, frame):
     packet = disturbed(name, axis, sign * 0.0021, frame)
     unit = next(quantity.unit for quantity in QUANTITIES if quantity.name == name)
     for other, other_axis in AXES:
@@ -124,7 +124,7 @@ def test_zero_negative_and_larger_limits_let_it_pass(name, axis, bound):
     )
 
 
-def test_a_tolerance_without_a_limit_watches_nothing():
+def test_a_tolerance_without_a_limit_checks_nothing():
     assert not ToleranceCheck(Tolerance(), IDENTITY)
     assert not ToleranceCheck(Tolerance(twist=(-1.0,) * 6), IDENTITY)
     assert ToleranceCheck(Tolerance(twist=(0.0,) * 5 + (1.0,)), IDENTITY)
@@ -136,7 +136,7 @@ def test_of_several_axes_the_worst_is_named():
     assert 'position y' in ToleranceCheck(both, IDENTITY).violation(WANTED, packet)
 
 
-def test_what_is_no_number_is_outside():
+def test_nan_is_outside():
     watched = ToleranceCheck(limit('linear acceleration', [1.0, -1.0, -1.0]), IDENTITY)
     silent = replace(ON_TIME, actual_tcp_acceleration=None)
     assert 'linear acceleration x is off by nan' in watched.violation(WANTED, silent)

@@ -61,7 +61,7 @@ def test_a_point_has_the_records_before_it_behind_it():
     assert (records.total, records.points) == (6, 3)
 
 
-def test_an_order_without_records_of_its_own_has_one_motion_for_each_point():
+def test_a_job_without_records_has_one_motion_for_each_point():
     records = WireRecords(MotionJob(points=3, duration=3.0, reference=job(*MIXED).reference))
     assert [records.running_waypoints(k) for k in (1, 2, 3)] == [(0, -1), (1, 0), (2, 1)]
     assert [records.end_time(k) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
