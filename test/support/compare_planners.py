@@ -279,13 +279,19 @@ def described(error):
     return f'{type(error).__name__} {getattr(code, "value", code)}: {error}'
 
 
+def field_of(thing, name):
+    """Return a field; the rows of segments without a pose on an arc have any number there."""
+    value = getattr(thing, name)
+    return value[thing.has_via] if name == 'vias' else value
+
+
 def difference(a, b, path):
     """Return where two values differ; '' = nowhere."""
     if is_dataclass(a):
         if type(a).__name__ != type(b).__name__:
             return f'{path}: {type(a).__name__}, {type(b).__name__}'
         names = sorted({f.name for f in fields(a)} & {f.name for f in fields(b)})
-        pairs = [(f'{path}.{name}', getattr(a, name), getattr(b, name)) for name in names]
+        pairs = [(f'{path}.{name}', field_of(a, name), field_of(b, name)) for name in names]
     elif isinstance(a, dict):
         if set(a) != set(b):
             return f'{path}: keys {set(a) ^ set(b)}'

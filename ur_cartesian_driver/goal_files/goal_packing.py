@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.goal.field_table import Form, in_order_of_files
 from ur_cartesian_driver.motion.goal.goal import Posture
-from ur_cartesian_driver.motion.goal.goal_table import Integers, SegmentRows, WaypointRows
+from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
 
 
 def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any] | None:
@@ -29,47 +29,30 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
         do not fit, or numbers of types that do not exist.
     """
     names = _joint_names([*points.postures.values(), *segments.via_postures.values()])
-    numbers = np.concatenate((segments.types, segments.arc_modes, segments.free_axes))
-    if points.jerks.any() or names is None or (numbers != numbers.astype(np.uint8)).any():
+    if names is None:
         return None
-    packed: dict[str, Any] = {
-        'poses': _floats(points.poses),
-        'times': _given(points.times),
-        'twists': _given(points.twists),
-        'accelerations': _given(points.accelerations),
-        'posture_joint_names': list(names),
-        'postures': _posture_numbers(points.postures, len(points), names),
-    }
-    if segments:
-        packed |= {
-            'types': _bytes(segments.types),
-            'arc_modes': _bytes(segments.arc_modes),
-            'blend_radii': _given(segments.blend_radii),
-            'dwells': _given(segments.dwells),
-            'velocities': _given(segments.velocities),
-            'segment_accelerations': _given(segments.accelerations),
-            'via_postures': _posture_numbers(segments.via_postures, len(segments), names),
-            'free_axes': _bytes(segments.free_axes) if segments.free_axes.any() else array('B'),
-            'free_minima': _given(segments.free_minima),
-            'free_maxima': _given(segments.free_maxima),
-        }
-        if segments.has_via.any():
-            vias = np.where(segments.has_via[:, None], segments.vias, IDENTITY.row())
-            packed['vias'] = _floats(vias)
+    packed: dict[str, Any] = {}
+    for rows in (points, segments) if segments else (points,):
+        for each in in_order_of_files(rows.columns()):
+            column, is_empty = getattr(rows, each.name), rows.is_default(each)
+            code, kind = ('B', np.uint8) if each.field.form is Form.CHOICE else ('d', np.float64)
+            if code == 'B' and (column != column.astype(kind)).any():
+                return None
+            if each.packed is None:
+                if not is_empty:
+                    return None
+                continue
+            if each.field.form is Form.RECORD:
+                packed.setdefault('posture_joint_names', list(names))
+            if is_empty and not each.column.always:
+                packed[each.packed] = array(code)
+                continue
+            if each.field.form is Form.RECORD:
+                column = _posture_numbers(column, len(rows), names)
+            elif each.mask:
+                column = np.where(getattr(rows, each.mask)[:, None], column, IDENTITY.row())
+            packed[each.packed] = array(code, np.ascontiguousarray(column, dtype=kind).tobytes())
     return packed
-
-
-def _bytes(values: Integers) -> array[int]:
-    return array('B', values.astype(np.uint8).tobytes())
-
-
-def _floats(values: Floats) -> array[float]:
-    return array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
-
-
-def _given(values: Floats) -> array[float]:
-    """Return the numbers, none if all are 0."""
-    return _floats(values) if values.any() else array('d')
 
 
 def _joint_names(postures: Sequence[Posture]) -> tuple[str, ...] | None:
@@ -86,13 +69,10 @@ def _joint_names(postures: Sequence[Posture]) -> tuple[str, ...] | None:
     return tuple(names)
 
 
-def _posture_numbers(
-    postures: Mapping[int, Posture], n: int, names: Sequence[str]
-) -> array[float]:
-    if not postures:
-        return array('d')
-    values: NDArray[np.float64] = np.full((n, len(names)), np.nan)
+def _posture_numbers(postures: Mapping[int, Posture], n: int, names: Sequence[str]) -> Floats:
+    """Return postures as an array (n, joints); NaN stands for no preference."""
+    values = np.full((n, len(names)), np.nan)
     column = {name: k for k, name in enumerate(names)}
     for row, posture in postures.items():
         values[row, [column[name] for name in posture.names]] = posture.values
-    return _floats(values)
+    return values

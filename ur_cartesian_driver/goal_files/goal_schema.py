@@ -3,8 +3,9 @@
 """
 The fields of ``FollowCartesianTrajectory.Goal``, without the generated messages.
 
-A test compares them with the messages. A dict stands for a message, a list for a sequence of its
-only element, and every other value is the default of its field.
+They follow from the table of a goal; a test compares them with the messages. A dict stands for a
+message, a list for a sequence of its only element, and every other value is the default of its
+field.
 """
 
 from __future__ import annotations
@@ -14,6 +15,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, TypeAlias
+
+from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
 
 #: A message, or an object with its fields.
 Message: TypeAlias = Any
@@ -27,134 +32,71 @@ class Whole:
     high: int
 
 
-UINT8, UINT32 = Whole(0, 2**8 - 1), Whole(0, 2**32 - 1)
-TIME = {'sec': Whole(-(2**31), 2**31 - 1), 'nanosec': UINT32}
-VECTOR = {'x': 0.0, 'y': 0.0, 'z': 0.0}
-POSE = {'position': VECTOR, 'orientation': {**VECTOR, 'w': 1.0}}
-RATES = {'linear': VECTOR, 'angular': VECTOR}
-POSTURE = {'posture_joint_names': [''], 'posture_joint_values': [0.0]}
-TOLERANCE = {
-    'position_error': VECTOR,
-    'orientation_error': VECTOR,
-    'twist_error': RATES,
-    'acceleration_error': RATES,
+_UINT8, _UINT32 = Whole(0, 2**8 - 1), Whole(0, 2**32 - 1)
+_TIME = {'sec': Whole(-(2**31), 2**31 - 1), 'nanosec': _UINT32}
+_VECTOR = {'x': 0.0, 'y': 0.0, 'z': 0.0}
+_FORMS: Mapping[Form, Any] = {
+    Form.PIN: _UINT8,
+    Form.CHOICE: _UINT8,
+    Form.INDEX: _UINT32,
+    Form.DURATION: _TIME,
+    Form.VECTOR: _VECTOR,
+    Form.RATES: {'linear': _VECTOR, 'angular': _VECTOR},
+    Form.POSE: {'position': _VECTOR, 'orientation': {**_VECTOR, 'w': 1.0}},
 }
-POINT = {
-    'time_from_start': TIME,
-    'pose': POSE,
-    'twist': RATES,
-    'acceleration': RATES,
-    'jerk': RATES,
-    'posture': POSTURE,
+
+
+def _schema(kind: type) -> dict[str, Any]:
+    """Return the schema of the message that holds a dataclass of a goal."""
+    schema: dict[str, Any] = {}
+    for each in goal_fields(kind):
+        *outer, name = each.message_name.split('.')
+        inner = schema
+        for part in outer:
+            inner = inner.setdefault(part, {})
+        inner[name] = _value_schema(each)
+    return schema
+
+
+def _value_schema(each: GoalField) -> Any:
+    if each.form in _FORMS:
+        return _FORMS[each.form]
+    if each.form is Form.RECORD:
+        return _schema(each.type)
+    if each.form is Form.RECORDS:
+        return [_schema(each.type)]
+    default = each.default if each.has_default else each.type()
+    return [each.type()] if each.form is Form.VALUES else default
+
+
+def _packed_schema() -> dict[str, Any]:
+    """Return the schema of ``PackedPoints``."""
+    schema: dict[str, Any] = {}
+    for each in (*WaypointRows.columns(), *SegmentRows.columns()):
+        if each.field.form is Form.RECORD:
+            schema.setdefault('posture_joint_names', [''])
+        if each.packed is not None:
+            schema[each.packed] = [_FORMS[Form.CHOICE] if each.field.form is Form.CHOICE else 0.0]
+    return schema
+
+
+PACKED = _packed_schema()
+#: What the message has beside the goal, by the field behind which that stands.
+_BESIDE: Mapping[str, Any] = {
+    'execution': {'validate_only': False},
+    'safe_outputs': {'packed': PACKED},
 }
-SEGMENT = {
-    'type': UINT8,
-    'blend_radius': 0.0,
-    'dwell': 0.0,
-    'velocity': 0.0,
-    'acceleration': 0.0,
-    'via': POSE,
-    'via_posture': POSTURE,
-    'arc_mode': UINT8,
-    'free_axis': UINT8,
-    'free_min': 0.0,
-    'free_max': 0.0,
-}
-OUTPUT = {'output': UINT8, 'pin': UINT8, 'value': 0.0, 'analog_domain': UINT8}
-PACKED = {
-    'poses': [0.0],
-    'times': [0.0],
-    'twists': [0.0],
-    'accelerations': [0.0],
-    'posture_joint_names': [''],
-    'postures': [0.0],
-    'types': [UINT8],
-    'arc_modes': [UINT8],
-    'blend_radii': [0.0],
-    'dwells': [0.0],
-    'velocities': [0.0],
-    'segment_accelerations': [0.0],
-    'vias': [0.0],
-    'via_postures': [0.0],
-    'free_axes': [UINT8],
-    'free_minima': [0.0],
-    'free_maxima': [0.0],
-}
-GOAL: Mapping[str, Any] = {
-    'trajectory': {
-        'header': {'stamp': TIME, 'frame_id': ''},
-        'points': [POINT],
-        'controlled_frame': '',
-    },
-    'path_tolerance': TOLERANCE,
-    'goal_tolerance': TOLERANCE,
-    'goal_time_tolerance': TIME,
-    'segments': [SEGMENT],
-    'io_commands': [{'point_index': UINT32, 'offset': TIME, **OUTPUT}],
-    'input_waits': [
-        {
-            'point_index': UINT32,
-            'input': UINT8,
-            'pin': UINT8,
-            'value': 0.0,
-            'below': False,
-            'timeout': 0.0,
-            'go_on': False,
-        }
-    ],
-    'script_calls': [{'point_index': UINT32, 'function': '', 'arguments': [0.0], 'timeout': 10.0}],
-    'payload_changes': [{'point_index': UINT32, 'mass': 0.0, 'center_of_gravity': VECTOR}],
-    'proportional_outputs': [
-        {
-            'first_point': UINT32,
-            'last_point': UINT32,
-            'begin_lead': 0.0,
-            'end_lead': 0.0,
-            'pin': UINT8,
-            'analog_domain': UINT8,
-            'gain': 0.0,
-            'offset': 0.0,
-            'minimum': 0.0,
-            'maximum': 1.0,
-            'filter_time': 0.0,
-            'idle': 0.0,
-        }
-    ],
-    'presses': [
-        {
-            'first_point': UINT32,
-            'last_point': UINT32,
-            'frame': UINT8,
-            'axes': [''],
-            'forces': [0.0],
-            'speed_limits': [0.0],
-            'max_deviation': 0.0,
-            'max_deviation_angle': 0.0,
-            'max_yield': 0.0,
-            'max_yield_angle': 0.0,
-            'damping': 0.005,
-            'gain_scaling': 1.0,
-            'zero_sensor': False,
-            'contact': UINT8,
-        }
-    ],
-    'execution': UINT8,
-    'validate_only': False,
-    'keep_open': False,
-    'replace_horizon': 0.0,
-    'safe_outputs': [{**OUTPUT, 'restore': False}],
-    'packed': PACKED,
-    'min_speed_fraction': 0.0,
-    'on_path_tolerance': UINT8,
-    'stall_timeout': TIME,
-    'path_offset': {
-        'limits': VECTOR,
-        'speed': 0.0,
-        'acceleration': 0.0,
-        'timeout': 0.0,
-        'on_stale': UINT8,
-    },
-}
+
+
+def _goal_schema() -> dict[str, Any]:
+    schema: dict[str, Any] = {}
+    for name, value in _schema(Goal).items():
+        schema |= {name: value, **_BESIDE.get(name, {})}
+    schema['trajectory']['header'] = {'stamp': _TIME, **schema['trajectory']['header']}
+    return schema
+
+
+GOAL: Mapping[str, Any] = _goal_schema()
 
 
 class FieldError(ValueError):

@@ -1,7 +1,29 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A goal as the client sent it, in the frame of the client.
+A goal as the client sent it, in its own frame: the one table of its fields.
+
+A field of a goal concerns many: the messages, files in YAML, flat arrays, columns, checks, the
+builder of paths, the goal that is left after a stop. As long as each of them listed the fields, a
+new one meant two dozen edits, and a forgotten one was no error: the field was just lost in a file
+or after a stop. So the dataclasses below say all that anybody wants to know of a field, and
+everybody else walks through them (:func:`~.field_table.goal_fields`).
+
+A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_table.Sent`
+where messages name or hold it otherwise, :class:`~.field_table.Range` where not every number will
+do. Schema, reading, writing, conversion of users' values to the declared types, and checks of
+ranges and enumerations follow from that. Points and segments come by the thousand, so inside they
+are columns (:mod:`~.goal_table`): ``WaypointColumns`` and ``SegmentColumns`` name the column, and
+the flat array, of each field. Rules that concern more than one field are in ``planning.request``.
+
+A new number of a segment: declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment`` and
+``SegmentColumns``, and honour it where the motion is planned. Paths take it by its name, as
+``Path.at(name=...)``. A new number of the whole goal needs the action in place of both messages,
+and no column. ``test/ros/test_goal_files.py`` compares table and messages.
+
+Not nice: the column repeats the field, because no type checker would know it otherwise. And files
+list a few fields in another order than messages (``after``), or although they are zero
+(``always``), so that files that exist are written as they were.
 
 A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
 (:mod:`~ur_cartesian_driver.motion.plan.plan`) is known to be feasible.
@@ -9,13 +31,19 @@ A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, NOT_SENT, Range, Sent
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
@@ -128,13 +156,28 @@ DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 #: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
+#: The longest rest and time-out at a point; longer ones are mistakes [s].
+MAX_STOP_TIME = 600.0
+
+FINITE, NOT_NEGATIVE = Range(), Range(0.0)
+FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
+#: NaN in a spline: the driver chooses.
+RATE = Range(nan_in_splines=True)
+TIMEOUT = Range(0.0, MAX_STOP_TIME, 's', above=True)
+
+DURATION, ALWAYS = Sent(form=Form.DURATION), Sent(always=True)
+DOMAIN = Sent(name='analog_domain')
+POINT, FIRST_POINT, LAST_POINT = (
+    Sent(name=name, form=Form.INDEX) for name in ('point_index', 'first_point', 'last_point')
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posture:
     """The joint positions [rad] to be near to, by joint name; empty = no preference."""
 
-    names: tuple[str, ...] = ()
-    values: tuple[float, ...] = ()
+    names: Annotated[tuple[str, ...], Sent(name='posture_joint_names', always=True)] = ()
+    values: Annotated[tuple[float, ...], Sent(name='posture_joint_values', always=True)] = ()
 
     def __bool__(self) -> bool:
         """Tell whether there is any preference (also a malformed one)."""
@@ -146,14 +189,30 @@ class Waypoint:
     """One point of a goal, in the frame of the goal."""
 
     #: When to be there, from the start of the motion [s].
-    time: float = 0.0
+    time: Annotated[float, Sent(name='time_from_start', form=Form.DURATION), FINITE] = 0.0
     pose: Pose
     #: Linear [m/s] and angular [rad/s] velocity at the point.
-    twist: Vector6 = ZERO6
+    twist: Annotated[Vector6, RATE] = ZERO6
     #: Linear [m/s^2] and angular [rad/s^2] acceleration at the point.
-    acceleration: Vector6 = ZERO6
-    jerk: Vector6 = ZERO6
+    acceleration: Annotated[Vector6, RATE] = ZERO6
+    jerk: Annotated[Vector6, FINITE] = ZERO6
     posture: Posture = Posture()
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class WaypointColumns:
+    """The points of a goal in columns; the units are those of a waypoint."""
+
+    #: (n, 7) x y z, quaternion x y z w
+    poses: Annotated[Floats, ColumnOf('pose', always=True)]
+    #: (n,)
+    times: Annotated[Floats, ColumnOf('time')]
+    #: (n, 6) each
+    twists: Annotated[Floats, ColumnOf('twist')]
+    accelerations: Annotated[Floats, ColumnOf('acceleration')]
+    jerks: Annotated[Floats, ColumnOf('jerk', packed=None)]
+    #: Those that are not empty, by row.
+    postures: Annotated[Mapping[int, Posture], ColumnOf('posture')] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,12 +226,12 @@ class Segment:
 
     type: SegmentType = SegmentType.AUTO
     #: Distance from the waypoint at which both segments are left [m].
-    blend_radius: float = 0.0
+    blend_radius: Annotated[float, NOT_NEGATIVE] = 0.0
     #: How long the arm rests at the waypoint [s].
-    dwell: float = 0.0
+    dwell: Annotated[float, NOT_NEGATIVE] = 0.0
     #: 0 = from the times, else the default.
-    velocity: float = 0.0
-    acceleration: float = 0.0
+    velocity: Annotated[float, NOT_NEGATIVE] = 0.0
+    acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
     #: A pose on the arc, CIRCULAR only.
     via: Pose | None = None
     via_posture: Posture = Posture()
@@ -180,92 +239,122 @@ class Segment:
     #: About which axis the driver may turn the waypoint's pose, from ``free_min`` to ``free_max``
     #: [rad]; both 0 = by any angle.
     free_axis: FreeAxis = FreeAxis.NONE
-    free_min: float = 0.0
-    free_max: float = 0.0
+    free_min: Annotated[float, FINITE] = 0.0
+    free_max: Annotated[float, FINITE] = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class SegmentColumns:
+    """The segments of a goal in columns: none, or a row for each point."""
+
+    #: (n,) each, enumerations as their numbers
+    types: Annotated[NDArray[np.int64], ColumnOf('type', always=True)]
+    arc_modes: Annotated[NDArray[np.int64], ColumnOf('arc_mode', always=True)]
+    blend_radii: Annotated[Floats, ColumnOf('blend_radius')]
+    dwells: Annotated[Floats, ColumnOf('dwell')]
+    velocities: Annotated[Floats, ColumnOf('velocity')]
+    accelerations: Annotated[Floats, ColumnOf('acceleration', packed='segment_accelerations')]
+    #: (n, 7) poses on the arcs, and whether there is one (n,)
+    vias: Annotated[Floats, ColumnOf('via', after='free_maxima')]
+    has_via: NDArray[np.bool_]
+    #: Those that are not empty, by row.
+    via_postures: Annotated[Mapping[int, Posture], ColumnOf('via_posture')] = field(
+        default_factory=dict
+    )
+    free_axes: Annotated[NDArray[np.int64], ColumnOf('free_axis')]
+    free_minima: Annotated[Floats, ColumnOf('free_min')]
+    free_maxima: Annotated[Floats, ColumnOf('free_max')]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IOCommand:
     """Switch an output when the tool passes a waypoint."""
 
-    waypoint: int
+    waypoint: Annotated[int, POINT]
     #: Time after the waypoint [s].
-    offset: float
+    offset: Annotated[
+        float,
+        Sent(form=Form.DURATION, always=False, after='domain'),
+        Range(0.0, 60.0, 's', 'name another point'),
+    ]
     output: OutputKind
     pin: int
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
     #: What an analog output carries.
-    domain: AnalogDomain = AnalogDomain.CURRENT
+    domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputWait:
     """Wait at a waypoint, where the arm stops, until an input has a value."""
 
-    waypoint: int
+    waypoint: Annotated[int, POINT]
     input: InputKind
     pin: int
     #: Digital 0 or 1; analog the level to be reached [A] or [V], or the one to fall below.
     value: float
-    below: bool = False
+    below: Annotated[bool, Sent(after='timeout')] = False
     #: Longest wait [s].
-    timeout: float
+    timeout: Annotated[float, TIMEOUT]
     #: Whether the motion goes on then; if not, the goal ends.
     go_on: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PayloadChange:
-    """Set the payload of the controller at a waypoint, where the arm stops."""
-
-    waypoint: int
-    #: [kg]
-    mass: float
-    #: In the flange [m].
-    center_of_gravity: Vector3 = ZERO3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScriptCall:
     """Call a function of the script prelude at a waypoint, where the arm stops."""
 
-    waypoint: int
+    waypoint: Annotated[int, POINT]
     function: str
-    arguments: tuple[float, ...] = ()
+    #: The wire carries no larger ones.
+    arguments: Annotated[tuple[float, ...], Range(-2147.0, 2147.0)] = ()
     #: Longest time until it returns [s].
-    timeout: float = 10.0
+    timeout: Annotated[float, ALWAYS, TIMEOUT] = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadChange:
+    """Set the payload of the controller at a waypoint, where the arm stops."""
+
+    waypoint: Annotated[int, POINT]
+    #: [kg]
+    mass: Annotated[float, Range(0.0, 100.0, 'kg')]
+    #: In the flange [m].
+    center_of_gravity: Annotated[Vector3, ALWAYS] = ZERO3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProportionalOutput:
     """An analog output that follows the speed of the tool between two waypoints."""
 
-    first_waypoint: int
-    last_waypoint: int
+    first_waypoint: Annotated[int, FIRST_POINT]
+    last_waypoint: Annotated[int, LAST_POINT]
     #: How much earlier on the path it begins, and ends [s].
-    begin_lead: float = 0.0
-    end_lead: float = 0.0
-    pin: int
-    domain: AnalogDomain = AnalogDomain.CURRENT
+    begin_lead: Annotated[float, SMALL_LEAD] = 0.0
+    end_lead: Annotated[float, SMALL_LEAD] = 0.0
+    pin: Annotated[int, Sent(always=False), Range(0, 1)]
+    domain: Annotated[AnalogDomain, Sent(name='analog_domain', after='last_waypoint')] = (
+        AnalogDomain.CURRENT
+    )
     #: Fraction of the range per speed [1/(m/s)], and at speed 0.
-    gain: float
-    offset: float = 0.0
+    gain: Annotated[float, Sent(always=False), Range(-1000.0, 1000.0)]
+    offset: Annotated[float, Range(-100.0, 100.0)] = 0.0
     #: Bounds, fractions of the range.
-    minimum: float = 0.0
-    maximum: float = 1.0
+    minimum: Annotated[float, FRACTION] = 0.0
+    maximum: Annotated[float, ALWAYS, FRACTION] = 1.0
     #: Time constant of a low-pass filter of first order for the speed [s].
-    filter_time: float = 0.0
+    filter_time: Annotated[float, SMALL_LEAD] = 0.0
     #: Value when it does not follow the speed.
-    idle: float = 0.0
+    idle: Annotated[float, FRACTION] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Press:
     """The controller's force mode between two waypoints, at both of which the arm stops."""
 
-    first_waypoint: int
-    last_waypoint: int
+    first_waypoint: Annotated[int, FIRST_POINT]
+    last_waypoint: Annotated[int, LAST_POINT]
     frame: PressFrame = PressFrame.TOOL
     #: The compliant axes of the frame, of :data:`PRESS_AXES`.
     axes: tuple[str, ...] = ()
@@ -274,16 +363,16 @@ class Press:
     #: How fast it gives way along each of them [m/s, rad/s]; empty = the default.
     speed_limits: tuple[float, ...] = ()
     #: How far it may be off the path along the others [m], [rad]; 0 = the default.
-    max_deviation: float = 0.0
-    max_deviation_angle: float = 0.0
+    max_deviation: Annotated[float, ALWAYS, Range(0.0, 0.1)] = 0.0
+    max_deviation_angle: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
     #: How far it may give way along compliant ones [m], [rad]; 0 = the default.
-    max_yield: float = 0.0
-    max_yield_angle: float = 0.0
-    damping: float = 0.005
-    gain_scaling: float = 1.0
+    max_yield: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
+    max_yield_angle: Annotated[float, ALWAYS, Range(0.0, 1.5)] = 0.0
+    damping: Annotated[float, ALWAYS, FRACTION] = 0.005
+    gain_scaling: Annotated[float, ALWAYS, Range(0.0, 2.0)] = 1.0
     #: Whether the force sensor is zeroed before.
-    zero_sensor: bool = False
-    contact: ContactEnd = ContactEnd.NONE
+    zero_sensor: Annotated[bool, ALWAYS] = False
+    contact: Annotated[ContactEnd, Sent(after='speed_limits')] = ContactEnd.NONE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -294,7 +383,7 @@ class SafeOutput:
     pin: int
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
-    domain: AnalogDomain = AnalogDomain.CURRENT
+    domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
     #: Whether it gets its value back after a pause; if not, a pause that changed it ends the goal.
     restore: bool = False
 
@@ -308,23 +397,24 @@ class Tolerance:
     the controlled frame, twist [m/s, rad/s] and acceleration [m/s^2, rad/s^2].
     """
 
-    position: Vector3 = ZERO3
-    orientation: Vector3 = ZERO3
-    twist: Vector6 = ZERO6
-    acceleration: Vector6 = ZERO6
+    position: Annotated[Vector3, Sent(name='position_error'), FINITE] = ZERO3
+    orientation: Annotated[Vector3, Sent(name='orientation_error'), FINITE] = ZERO3
+    twist: Annotated[Vector6, Sent(name='twist_error'), FINITE] = ZERO6
+    acceleration: Annotated[Vector6, Sent(name='acceleration_error'), FINITE] = ZERO6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathOffset:
     """How far the path may give way to offsets that come while the arm moves."""
 
-    #: Along the path, across it and normal to both [m]; 0 = not at all.
-    limits: Vector3 = ZERO3
+    #: Along the path, across it and normal to both [m]; 0 = not at all. The controller's own
+    #: offsets have the same bound by default.
+    limits: Annotated[Vector3, Range(0.0, 0.1, 'm')] = ZERO3
     #: Largest speed [m/s] and acceleration [m/s^2] along each of them; 0 = the default.
-    speed: float = 0.0
-    acceleration: float = 0.0
+    speed: Annotated[float, Range(0.0, 0.1, 'm/s')] = 0.0
+    acceleration: Annotated[float, Range(0.0, 2.0, 'm/s^2')] = 0.0
     #: An offset is stale when it is so old [s]; 0 = the default.
-    timeout: float = 0.0
+    timeout: Annotated[float, Range(0.0, 60.0, 's')] = 0.0
     on_stale: StaleOffset = StaleOffset.HOLD
 
     def __bool__(self) -> bool:
@@ -336,37 +426,42 @@ class PathOffset:
 class Goal:
     """A Cartesian trajectory and how to execute it."""
 
-    waypoints: Sequence[Waypoint]
-    #: Empty, or one for each waypoint.
-    segments: Sequence[Segment] = ()
-    #: The frame of the goal in the robot's base.
-    T_base_frame: Pose = IDENTITY
-    frame_id: str = ''
+    frame_id: Annotated[str, Sent(name='trajectory.header.frame_id')] = ''
+    waypoints: Annotated[Sequence[Waypoint], Sent(name='trajectory.points', always=False)]
     #: The frame that is moved, as the goal calls it, and where it is behind the flange; None = it
     #: is the robot's active TCP.
-    controlled_frame: str = ''
-    T_flange_controlled: Pose | None = None
+    controlled_frame: Annotated[str, Sent(name='trajectory.controlled_frame')] = ''
+    T_flange_controlled: Annotated[Pose | None, NOT_SENT] = None
+    #: The frame of the goal in the robot's base.
+    T_base_frame: Annotated[Pose, NOT_SENT] = IDENTITY
     #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
-    age: float | None = None
+    age: Annotated[float | None, NOT_SENT] = None
     path_tolerance: Tolerance = Tolerance()
     goal_tolerance: Tolerance = Tolerance()
     #: How much later than planned the end may come [s]: 0 = the default, negative = without end.
-    goal_time_tolerance: float = 0.0
-    execution: ExecutionMode = ExecutionMode.AUTO
+    goal_time_tolerance: Annotated[float, DURATION, FINITE] = 0.0
+    #: Empty, or one for each waypoint.
+    segments: Sequence[Segment] = ()
     io_commands: tuple[IOCommand, ...] = ()
-    keep_open: bool = False
-    #: How far ahead of the arm points are final, so that later ones can be replaced [s]; 0 = not
-    #: asked for.
-    replace_horizon: float = 0.0
-    safe_outputs: tuple[SafeOutput, ...] = ()
-    on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
-    #: How long the arm may stay off its path with STALL [s]; 0 = the default.
-    stall_timeout: float = 0.0
-    #: The part of the speed asked for below which the goal is refused; 0 = not demanded.
-    min_speed_fraction: float = 0.0
-    input_waits: tuple[InputWait, ...] = ()
+    input_waits: Annotated[tuple[InputWait, ...], Sent(after='script_calls')] = ()
     script_calls: tuple[ScriptCall, ...] = ()
-    payload_changes: tuple[PayloadChange, ...] = ()
+    payload_changes: Annotated[tuple[PayloadChange, ...], Sent(after='presses')] = ()
     proportional_outputs: tuple[ProportionalOutput, ...] = ()
     presses: tuple[Press, ...] = ()
+    execution: ExecutionMode = ExecutionMode.AUTO
+    keep_open: bool = False
+    #: How far ahead of the arm points are final, so that later ones can be replaced [s].
+    replace_horizon: Annotated[
+        float, Range(0.05, 1.0, 's', 'set it to 0.15', zero='nothing is replaced')
+    ] = 0.0
+    safe_outputs: tuple[SafeOutput, ...] = ()
+    #: The part of the speed asked for below which the goal is refused.
+    min_speed_fraction: Annotated[
+        float, Range(0.0, 1.0, remedy='give a fraction', zero='not demanded')
+    ] = 0.0
+    on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
+    #: How long the arm may stay off its path with STALL [s]; 0 = the default.
+    stall_timeout: Annotated[
+        float, DURATION, Range(0.0, unit='s', remedy=f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s')
+    ] = 0.0
     path_offset: PathOffset = PathOffset()

@@ -11,10 +11,10 @@ all checks of the arrays take. So inside they are rows; each is still a sequence
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, Field, field, fields, replace
 from itertools import chain
-from operator import attrgetter, eq
+from operator import eq
 from typing import Any, ClassVar, overload, TypeVar
 
 import numpy as np
@@ -24,22 +24,27 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_r
 from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types
+from ur_cartesian_driver.motion.goal.field_table import (
+    Form,
+    goal_columns,
+    goal_fields,
+    GoalColumn,
+    GoalField,
+)
 from ur_cartesian_driver.motion.goal.goal import (
-    ArcMode,
-    FreeAxis,
     Goal,
-    Posture,
     Segment,
-    SegmentType,
+    SegmentColumns,
     Waypoint,
+    WaypointColumns,
 )
 
 Integers = NDArray[np.int64]
 
 T = TypeVar('T')
 R = TypeVar('R', bound='Rows[Any]')
+G = TypeVar('G', bound='GoalRows[Any]')
 
-NO_POSTURE = Posture()
 #: How many rows are made plain numbers at a time.
 _BLOCK = 4096
 
@@ -73,7 +78,7 @@ class Rows(Sequence[T]):
                 object.__setattr__(self, name, view)
 
     def _columns(self) -> list[tuple[str, Any]]:
-        return [(name, getattr(self, name)) for name in type(self).__slots__]
+        return [(each.name, getattr(self, each.name)) for each in fields(self)]
 
     def _numbers(self, *names: str) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of some columns as plain numbers, which take much more memory."""
@@ -143,138 +148,118 @@ def _are_equal(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class WaypointRows(Rows[Waypoint]):
-    """The points of a goal in its frame; the units are those of a waypoint."""
+class GoalRows(Rows[T]):
+    """Rows whose columns hold the fields of a class of the goal's table."""
 
-    #: (n,) [s]
-    times: Floats
-    #: (n, 7) x y z [m], quaternion x y z w
-    poses: Floats
-    #: (n, 6) each
-    twists: Floats
-    accelerations: Floats
-    jerks: Floats
-    #: Those that are not empty, by row.
-    postures: Mapping[int, Posture] = field(default_factory=dict)
+    __slots__: ClassVar[tuple[str, ...]] = ()
+    #: That class.
+    kind: ClassVar[type]
 
     @classmethod
-    def of(cls, points: Iterable[Waypoint], name: str = 'waypoints') -> WaypointRows:
-        """
-        Return points as rows; rows themselves as they are.
+    def columns(cls) -> tuple[GoalColumn, ...]:
+        """Return which column holds which field."""
+        return goal_columns(cls, cls.kind)
 
-        :param name: the first part of the field in the error.
+    @classmethod
+    def of(cls: type[G], objects: Iterable[T], name: str = '') -> G:
+        """
+        Return objects as rows; rows themselves as they are.
+
+        :param name: the first part of the field in the error; '' = that of a goal.
         :raises WrongType: a value is not of its declared type; the text names the field.
         """
-        if isinstance(points, cls):
-            return points
-        plain = _plain_objects(points, Waypoint, name, _are_plain_points)
-        return cls(
-            times=np.array([point.time for point in plain], dtype=np.float64),
-            poses=_pose_array([point.pose for point in plain]),
-            twists=_six_array([point.twist for point in plain]),
-            accelerations=_six_array([point.acceleration for point in plain]),
-            jerks=_six_array([point.jerk for point in plain]),
-            postures=_postures([point.posture for point in plain]),
-        )
+        if isinstance(objects, cls):
+            return objects
+        plain = _plain_objects(objects, cls.kind, name or f'{cls.kind.__name__.lower()}s')
+        columns: dict[str, Any] = {}
+        for each in cls.columns():
+            values = [getattr(one, each.field.name) for one in plain]
+            if each.mask:
+                columns[each.mask] = np.array([value is not None for value in values], dtype=bool)
+                values = [value or IDENTITY for value in values]
+            columns[each.name] = _array(each.field, values)
+        return cls.of_columns(len(plain), columns)
+
+    @classmethod
+    def of_columns(cls: type[G], n: int, columns: Mapping[str, Any]) -> G:
+        """Return n rows; columns that are None or left out have the default."""
+        whole: dict[str, Any] = {}
+        for each in cls.columns():
+            if each.mask:
+                whole[each.mask] = np.broadcast_to(np.False_, (n,))
+            whole[each.name] = default_column(each.field, n)
+        return cls(**whole | {name: rows for name, rows in columns.items() if rows is not None})
+
+    def is_default(self, column: GoalColumn) -> bool:
+        """Tell whether all rows of a column have the default, 0 where there is none."""
+        if column.mask:
+            return not getattr(self, column.mask).any()
+        rows, default = getattr(self, column.name), column.field.default
+        if isinstance(rows, Mapping):
+            return not rows
+        differs = rows != default if column.field.form is Form.PLAIN and default else rows
+        return not differs.any()
+
+    def values(self, column: GoalColumn) -> Iterable[Any]:
+        """Return the values of a field, as objects have them."""
+        rows, form = getattr(self, column.name), column.field.form
+        if isinstance(rows, Mapping):
+            return (rows.get(i, column.field.default) for i in range(len(self)))
+        if form is Form.RATES:
+            return _vectors(rows)
+        if column.mask:
+            given = getattr(self, column.mask).tolist()
+            if not any(given):
+                return (None,) * len(self)
+            return (
+                pose_from_row(row) if is_given else None
+                for row, is_given in zip(rows.tolist(), given, strict=True)
+            )
+        if form is Form.POSE:
+            return map(pose_from_row, rows.tolist())
+        numbers: list[Any] = rows.tolist()
+        if form is Form.CHOICE:
+            members = {int(member): member for member in column.field.type}
+            return [members.get(number, number) for number in numbers]
+        return numbers
+
+    def __len__(self) -> int:
+        return len(getattr(self, self.columns()[0].name))
+
+    def __iter__(self) -> Iterator[T]:
+        columns, kind = self.columns(), self.kind
+        names = [each.field.name for each in columns]
+        for first in range(0, len(self), _BLOCK):
+            block = self.take(slice(first, first + _BLOCK))
+            for row in zip(*map(block.values, columns), strict=True):
+                yield kind(**dict(zip(names, row)))  # noqa: B905  # as many as columns
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class WaypointRows(GoalRows[Waypoint], WaypointColumns):
+    """The points of a goal in its frame."""
+
+    kind: ClassVar[type[Waypoint]] = Waypoint
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one point."""
         return pose_from_row(self.poses[row].tolist())
 
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def __iter__(self) -> Iterator[Waypoint]:
-        rates = map(_vectors, (self.twists, self.accelerations, self.jerks))
-        for i, ((time, pose), twist, acceleration, jerk) in enumerate(
-            zip(self._numbers('times', 'poses'), *rates, strict=True)
-        ):
-            yield Waypoint(
-                time=time,
-                pose=pose_from_row(pose),
-                twist=twist,
-                acceleration=acceleration,
-                jerk=jerk,
-                posture=self.postures.get(i, NO_POSTURE),
-            )
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class SegmentRows(Rows[Segment]):
-    """The segments of a goal: none, or one for each point; units as those of a segment."""
+class SegmentRows(GoalRows[Segment], SegmentColumns):
+    """The segments of a goal."""
 
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`
-    types: Integers
-    #: (n,) each
-    blend_radii: Floats
-    dwells: Floats
-    velocities: Floats
-    accelerations: Floats
-    #: (n, 7) poses on the arcs, and whether there is one (n,)
-    vias: Floats
-    has_via: NDArray[np.bool_]
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`
-    arc_modes: Integers
-    #: (n,) the numbers of :class:`~ur_cartesian_driver.motion.goal.goal.FreeAxis`, and the
-    #: ranges [rad]
-    free_axes: Integers
-    free_minima: Floats
-    free_maxima: Floats
-    #: Postures at the vias that are not empty, by row.
-    via_postures: Mapping[int, Posture] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, segments: Iterable[Segment], name: str = 'segments') -> SegmentRows:
-        """
-        Return segments as rows; rows themselves as they are.
-
-        :param name: the first part of the field in the error.
-        :raises WrongType: a value is not of its declared type; the text names the field.
-        """
-        if isinstance(segments, cls):
-            return segments
-        plain = _plain_objects(segments, Segment, name, _are_plain_segments)
-        vias = [segment.via for segment in plain]
-        has_via = np.array([via is not None for via in vias], dtype=np.bool_)
-        columns: dict[str, Any] = {
-            column: np.array([getattr(segment, name) for segment in plain], dtype=kind)
-            for column, (name, kind) in _NUMBERS_OF_SEGMENTS.items()
-        }
-        return cls(
-            **columns,
-            vias=_pose_array([via or IDENTITY for via in vias])
-            if has_via.any()
-            else zeros(len(plain), 7),
-            has_via=has_via,
-            via_postures=_postures([segment.via_posture for segment in plain]),
-        )
+    kind: ClassVar[type[Segment]] = Segment
 
     @classmethod
     def plain(cls, n: int) -> SegmentRows:
         """Return the segments of a goal that has none."""
-        columns: dict[str, Any] = {
-            column: np.broadcast_to(np.zeros((), dtype=kind), (n,))
-            for column, (_, kind) in _NUMBERS_OF_SEGMENTS.items()
-        }
-        has_via = np.broadcast_to(np.zeros((), dtype=np.bool_), (n,))
-        return cls(**columns, vias=zeros(n, 7), has_via=has_via)
+        return cls.of_columns(n, {})
 
     def via(self, row: int) -> Pose | None:
         """Return the pose on one arc, None where there is none."""
         return pose_from_row(self.vias[row].tolist()) if self.has_via[row] else None
-
-    def __len__(self) -> int:
-        return len(self.types)
-
-    def __iter__(self) -> Iterator[Segment]:
-        names = [name for name, _ in _NUMBERS_OF_SEGMENTS.values()]
-        for i, numbers in enumerate(self._numbers(*_NUMBERS_OF_SEGMENTS)):
-            values = dict(zip(names, numbers, strict=True))
-            for name, members in _MEMBERS.items():
-                values[name] = members.get(values[name], values[name])
-            posture = self.via_postures.get(i, NO_POSTURE)
-            yield Segment(via=self.via(i), via_posture=posture, **values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -312,84 +297,62 @@ def goal_table(goal: Goal) -> GoalTable:
     return GoalTable(**{each.name: getattr(goal, each.name) for each in fields(goal)})
 
 
-#: The columns of segments with a number each: the field, and its type.
-_NUMBERS_OF_SEGMENTS: dict[str, tuple[str, type]] = {
-    'types': ('type', np.int64),
-    'blend_radii': ('blend_radius', np.float64),
-    'dwells': ('dwell', np.float64),
-    'velocities': ('velocity', np.float64),
-    'accelerations': ('acceleration', np.float64),
-    'arc_modes': ('arc_mode', np.int64),
-    'free_axes': ('free_axis', np.int64),
-    'free_minima': ('free_min', np.float64),
-    'free_maxima': ('free_max', np.float64),
-}
-#: The fields that are enumerations, and their members by number.
-_MEMBERS: dict[str, dict[int, Any]] = {
-    name: {int(member): member for member in kind}
-    for name, kind in (('type', SegmentType), ('arc_mode', ArcMode), ('free_axis', FreeAxis))
-}
+def default_column(each: GoalField, n: int) -> Any:
+    """Return the column of a field in which all rows have the default, 0 where there is none."""
+    if each.form is Form.RECORD:
+        return {}
+    if each.form is Form.RATES:
+        return zeros(n)
+    if each.form is Form.POSE:
+        return np.broadcast_to(np.array(IDENTITY.row()), (n, 7))
+    default = each.default if each.has_default else 0
+    return np.broadcast_to(np.array(default, dtype=_number_type(each)), (n,))
 
 
-def _plain_objects(
-    objects: Iterable[T], kind: type[T], name: str, are_plain: Callable[[Sequence[T]], bool]
-) -> Sequence[T]:
+def _number_type(each: GoalField) -> type:
+    return np.int64 if each.form is Form.CHOICE else np.float64
+
+
+def _array(each: GoalField, values: Sequence[Any]) -> Any:
+    """Return the column of a field from its values; None where all surely are the default."""
+    if each.form is Form.RECORD:
+        return {i: value for i, value in enumerate(values) if value}
+    zero = {Form.RATES: ZERO6, Form.POSE: IDENTITY}.get(each.form)
+    if zero is not None and all(value is zero for value in values):
+        return None
+    if each.form is Form.POSE:
+        values = [pose.row() for pose in values]
+    return np.array(values, dtype=_number_type(each))
+
+
+def _plain_objects(objects: Iterable[T], kind: type[T], name: str) -> Sequence[T]:
     """Return objects whose fields have exactly their types, which nearly all have already."""
     if isinstance(objects, tuple | list):
         try:
-            if set(map(type, objects)) <= {kind} and are_plain(objects):
+            if _only({kind}, objects) and all(
+                _are_plain(each, [getattr(one, each.name) for one in objects])
+                for each in goal_fields(kind)  # type: ignore[arg-type]  # a class is hashable
+            ):
                 return objects
         except (AttributeError, TypeError):
             pass
     return with_declared_types(objects, tuple[kind, ...], name)  # type: ignore[valid-type, arg-type]  # a type made here
 
 
-def _are_plain_points(points: Sequence[Waypoint]) -> bool:
-    poses = [point.pose for point in points]
-    rates = [six for point in points for six in (point.twist, point.acceleration, point.jerk)]
-    return (
-        _only({Pose}, poses)
-        and _only({float}, (point.time for point in points))
-        and _are_floats([pose.position for pose in poses], 3)
-        and _are_floats([pose.quaternion for pose in poses], 4)
-        and _are_floats([six for six in rates if six is not ZERO6], 6)
-        and _are_plain_postures(point.posture for point in points)
+def _are_plain(each: GoalField, values: Sequence[Any]) -> bool:
+    """Tell whether the values of a field need no conversion."""
+    values = [value for value in values if value is not each.default]
+    if each.form is Form.RATES:
+        return _are_floats(values, 6)
+    if not _only({each.type}, values):
+        return False
+    if each.form is Form.RECORD:  # an empty posture of its own; an array has no truth value
+        parts = [part for one in values for part in (one.names, one.values)]
+        return _only({tuple}, parts) and not any(parts)
+    return each.form is not Form.POSE or (
+        _are_floats([pose.position for pose in values], 3)
+        and _are_floats([pose.quaternion for pose in values], 4)
     )
-
-
-def _are_plain_segments(segments: Sequence[Segment]) -> bool:
-    vias = [segment.via for segment in segments if segment.via is not None]
-    numbers = attrgetter(
-        'blend_radius', 'dwell', 'velocity', 'acceleration', 'free_min', 'free_max'
-    )
-    return (
-        _only({SegmentType}, (segment.type for segment in segments))
-        and _only({ArcMode}, (segment.arc_mode for segment in segments))
-        and _only({FreeAxis}, (segment.free_axis for segment in segments))
-        and _only({float}, chain.from_iterable(map(numbers, segments)))
-        and _only({Pose}, vias)
-        and _are_floats([via.position for via in vias], 3)
-        and _are_floats([via.quaternion for via in vias], 4)
-        and _are_plain_postures(segment.via_posture for segment in segments)
-    )
-
-
-def _are_plain_postures(postures: Iterable[Posture]) -> bool:
-    """Tell whether postures need no conversion, as the empty ones that most are."""
-    return all(
-        type(posture) is Posture
-        and _is_empty_tuple(posture.names)
-        and _is_empty_tuple(posture.values)
-        for posture in postures
-        if posture is not _DEFAULT_POSTURE
-    )
-
-
-def _is_empty_tuple(values: object) -> bool:
-    return type(values) is tuple and not values  # an array may be neither true nor false
-
-
-_DEFAULT_POSTURE = Waypoint(pose=IDENTITY).posture
 
 
 def _only(kinds: set[type], values: Iterable[Any]) -> bool:
@@ -404,24 +367,8 @@ def _are_floats(vectors: Sequence[tuple[float, ...]], count: int) -> bool:
     )
 
 
-def _pose_array(poses: Sequence[Pose]) -> Floats:
-    rows = np.array([pose.row() for pose in poses], dtype=np.float64)
-    return rows.reshape(len(poses), 7)
-
-
-def _six_array(vectors: Sequence[tuple[float, ...]]) -> Floats:
-    """Return vectors as an array (n, 6); nearly always they are all the same zeros."""
-    if all(vector is ZERO6 for vector in vectors):
-        return zeros(len(vectors))
-    return np.array(vectors, dtype=np.float64).reshape(len(vectors), 6)
-
-
-def _vectors(rows: Floats) -> Iterator[Any]:
+def _vectors(rows: Floats) -> Iterable[Any]:
     """Return rows (n, 6) as tuples; those of zeros share one."""
     if not rows.any():
-        return iter((ZERO6,) * len(rows))
+        return (ZERO6,) * len(rows)
     return (vector6(row) if any(row) else ZERO6 for row in rows.tolist())
-
-
-def _postures(postures: Sequence[Posture]) -> Mapping[int, Posture]:
-    return {i: posture for i, posture in enumerate(postures) if posture}
