@@ -21,7 +21,8 @@ import ur_cartesian_driver
 NAME = 'ur_cartesian_driver'
 PACKAGE = Path(ur_cartesian_driver.__file__).parent
 GENERATED = {f'{NAME}.{kind}' for kind in ('action', 'msg', 'srv')}
-MAY_IMPORT_GENERATED = ('ros/', 'pytest_plugin.py')
+#: The last one only where a path becomes a message.
+MAY_IMPORT_GENERATED = ('ros/', 'pytest_plugin.py', 'path/path_builder.py')
 HEADER = (
     '# Copyright 2026 the ur_cartesian_driver contributors\n'
     '# SPDX-License-Identifier: Apache-2.0\n'

@@ -18,11 +18,10 @@ from ur_cartesian_driver.goal_files import (
     goal_text,
     read_goal_file,
 )
-from ur_cartesian_driver.goal_files.goal_schema import GOAL, Whole
+from ur_cartesian_driver.goal_files.goal_schema import GOAL, message_of, Whole, with_defaults
 from ur_cartesian_driver.motion.goal.known_frames import Frames
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.messages.goal_messages import goal_message
 
 EXAMPLES = tracked_files(share_path() / 'config' / 'examples', '**/*.yaml')
 
@@ -64,7 +63,7 @@ def test_a_goal_survives_file_and_message(path):
     goal = goal_from_fields(read_goal_file(path))
     fields = fields_of_goal(goal)
     assert goal_from_fields(read_goal_file(goal_text(fields))) == goal
-    message = goal_message(fields)
+    message = message_of(with_defaults(fields), FollowCartesianTrajectory.Goal)
     assert goal_from_fields(message) == goal
     if goal.frame_id in ('', 'base') and not goal.controlled_frame:
         assert goal_from_message(message, Frames(), now=0) == replace(goal, age=None)

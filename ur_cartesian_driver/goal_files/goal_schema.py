@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
@@ -150,6 +151,29 @@ def default(schema: Any) -> Any:
     if isinstance(schema, list):
         return []
     return 0 if isinstance(schema, Whole) else schema
+
+
+def message_of(plain: Message, kind: type[Any]) -> Any:
+    """
+    Return a generated message with the fields of an object, which has all of them.
+
+    :param kind: its class.
+    """
+    names = kind.get_fields_and_field_types()
+    return kind(
+        **{
+            name: _slot_value(getattr(plain, name), slot)
+            for name, slot in zip(names, kind.SLOT_TYPES, strict=True)
+        }
+    )
+
+
+def _slot_value(value: Any, slot: Any) -> Any:
+    if hasattr(slot, 'namespaces'):  # a message
+        return message_of(value, getattr(import_module('.'.join(slot.namespaces)), slot.name))
+    if hasattr(getattr(slot, 'value_type', None), 'namespaces'):
+        return [_slot_value(item, slot.value_type) for item in value]
+    return value
 
 
 def _number(value: object, key: str) -> float:

@@ -11,7 +11,6 @@ mistake is an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from importlib import import_module
 import os
 from pathlib import Path as FilePath
 from typing import Any
@@ -23,6 +22,7 @@ from ur_cartesian_driver.goal_files import (
     read_goal_file,
 )
 from ur_cartesian_driver.goal_files.goal_reading import nanoseconds
+from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
@@ -408,8 +408,9 @@ class Path(PathWithEvents):
 
     def to_message(self) -> Any:
         """Return the goal message of the action; needs ROS."""
-        messages = import_module('ur_cartesian_driver.ros.messages.goal_messages')
-        return messages.goal_message(self._fields())
+        from ur_cartesian_driver.action import FollowCartesianTrajectory
+
+        return message_of(with_defaults(self._fields()), FollowCartesianTrajectory.Goal)
 
     @classmethod
     def from_message(cls, message: Any) -> Path:

@@ -35,16 +35,14 @@ from std_msgs.msg import Header
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.goal_files.goal_file import read_goal_file
-from ur_cartesian_driver.goal_files.goal_reading import (
-    goal_from_fields,
-)
+from ur_cartesian_driver.goal_files.goal_reading import goal_from_fields
+from ur_cartesian_driver.goal_files.goal_schema import message_of, with_defaults
 from ur_cartesian_driver.goal_files.goal_writing import fields_of_goal
 from ur_cartesian_driver.motion.events import Outcome, PathPlace
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.path import Path, resume, ResumedGoal
 from ur_cartesian_driver.ros.goal_appender import GoalAppender
 from ur_cartesian_driver.ros.messages.action_messages import outcome_of
-from ur_cartesian_driver.ros.messages.goal_messages import goal_message, message_of
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.srv import AppendPoints, Recover
 
@@ -107,7 +105,8 @@ def resumed_goal(
     :raises InvalidGoal: it cannot be resumed.
     """
     left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
-    return goal_message(fields_of_goal(left.goal)), left
+    fields = with_defaults(fields_of_goal(left.goal))
+    return message_of(fields, FollowCartesianTrajectory.Goal), left
 
 
 # ---- sending ----------------------------------------------------------------------------------
