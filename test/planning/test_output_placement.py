@@ -20,7 +20,6 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
     MAX_PENDING_OUTPUTS,
@@ -244,7 +243,7 @@ REFUSED = [
     (command(output=OutputKind.STANDARD_ANALOG, value=-inf), r'\.value is -inf'),
     (command(offset=-0.001), r'\.offset is -0\.001 s, outside 0 to 60 s; '),
     (command(offset=nan), r'\.offset is nan'),
-    (command(offset=MAX_OUTPUT_OFFSET + 0.1), r'\.offset is 60\.1 s'),
+    (command(offset=60.1), r'\.offset is 60\.1 s'),
 ]
 
 

@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import ContactEnd, Goal, Press, PressFrame, Waypoint
 from ur_cartesian_driver.motion.goal.goal_table import goal_table
-from ur_cartesian_driver.planning.request.presses import check_press_support, press_records
+from ur_cartesian_driver.planning.request.point_events.presses import press_records, Presses
 
 PRESS = Press(first_waypoint=0, last_waypoint=1, axes=('rx', 'z'), forces=(0.5, 20.0))
 POINTS = (Waypoint(pose=Pose((0.1, 0.0, 0.0))), Waypoint(pose=Pose((0.2, 0.0, 0.0))))
@@ -65,6 +65,6 @@ def test_contact_is_named_in_the_report():
 def test_what_a_robot_cannot_do_is_refused(press, model, T_tcp_controlled, sentence):
     goal = goal_table(Goal(waypoints=POINTS, presses=(press,)))
     with pytest.raises(NotAvailable) as refusal:
-        check_press_support(goal, robot_model(model), T_tcp_controlled)
+        Presses().check_robot(goal, robot_model(model), T_tcp_controlled)
     assert str(refusal.value).startswith(sentence)
-    check_press_support(replace(goal, presses=(PRESS,)), robot_model(model), IDENTITY)
+    Presses().check_robot(replace(goal, presses=(PRESS,)), robot_model(model), IDENTITY)

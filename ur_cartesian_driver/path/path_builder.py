@@ -10,7 +10,7 @@ mistake is an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path as FilePath
 from typing import Any
@@ -40,7 +40,7 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.path.centre_line import CentreLine, RestToRest
 from ur_cartesian_driver.path.outputs import Output
 from ur_cartesian_driver.path.path_events import PathWithEvents
-from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal
+from ur_cartesian_driver.path.path_goal import goal_of_points, points_of_goal, settings_of
 from ur_cartesian_driver.path.path_motions import (
     MAX_BLEND,
     MAX_COORDINATE,
@@ -54,9 +54,9 @@ from ur_cartesian_driver.path.path_points import (
     merged,
     moved,
     PathPoint,
-    PathSettings,
-    POINT_FIELDS,
+    point_fields,
     seen_from,
+    with_fields,
 )
 from ur_cartesian_driver.path.resumption import APPROACH, OVERLAP, resume
 from ur_cartesian_driver.path.weave import strokes, woven
@@ -113,6 +113,14 @@ class Path(PathWithEvents):
                 else round(time * NANOSECONDS) / NANOSECONDS,
             )
         )
+
+    def asking(self, **fields: Any) -> Path:
+        """
+        Set fields of the goal for which there is no method, by their names in the action.
+
+        :raises InvalidGoal: a field does not take the value.
+        """
+        return self._with(_settings=with_fields('asking()', self._settings, fields))
 
     def executed_as(self, mode: ExecutionMode) -> Path:
         """Choose how the path is executed: a spline by the robot (SPLINE) or streamed (SERVO)."""
@@ -258,7 +266,7 @@ class Path(PathWithEvents):
         """
         if self._start is None:
             raise InvalidGoal('reversed()', 'has no start to go back to', 'write Path(start)')
-        if any(point.outputs or point.stops or point.stretches for point in self._points):
+        if any(point.events for point in self._points):
             raise InvalidGoal(
                 'reversed()',
                 'has outputs, inputs, payloads or presses, which have no reverse',
@@ -272,10 +280,7 @@ class Path(PathWithEvents):
             replace(
                 motion,
                 waypoint=backwards(place.waypoint),
-                segment=replace(
-                    motion.segment,
-                    **{name: getattr(place.segment, name) for name in POINT_FIELDS},
-                ),
+                segment=replace(motion.segment, **point_fields(place.segment)),
                 feed_blend=place.feed_blend,
                 auto_blend=place.auto_blend,
             )
@@ -284,7 +289,7 @@ class Path(PathWithEvents):
         end = places[-1]
         start = PathPoint(
             waypoint=backwards(end.waypoint),
-            segment=Segment(**{name: getattr(end.segment, name) for name in POINT_FIELDS}),
+            segment=Segment(**point_fields(end.segment)),
             feed_blend=end.feed_blend,
             auto_blend=end.auto_blend,
         )
@@ -398,10 +403,7 @@ class Path(PathWithEvents):
                 'controlled_frame', 'has no name', 'name it, so that it can be found'
             )
         path = cls(frame=goal.frame_id, tool=goal.controlled_frame)._with(
-            _points=points_of_goal(goal),
-            _settings=PathSettings(
-                **{each.name: getattr(goal, each.name) for each in fields(PathSettings)}
-            ),
+            _points=points_of_goal(goal), _settings=settings_of(goal)
         )
         unnamed = goal.frame_id in ('', 'base') and goal.T_base_frame != IDENTITY
         return path.transformed(goal.T_base_frame) if unnamed else path
@@ -452,6 +454,7 @@ class Path(PathWithEvents):
 
     def _table(self) -> GoalTable:
         """Return the goal with its frames unresolved."""
+        self._check_ends()
         return goal_of_points(self._points, self._settings, self.start, self.frame, self.tool)
 
     def _fields(self) -> dict[str, Any]:

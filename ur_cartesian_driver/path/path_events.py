@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.goal.goal import (
     ContactEnd,
     InputWait,
+    MAX_STOP_TIME,
     OutputKind,
     PayloadChange,
     Press,
@@ -24,15 +25,14 @@ from ur_cartesian_driver.path.outputs import Input, Output
 from ur_cartesian_driver.path.path_motions import PathOfMotions
 from ur_cartesian_driver.path.path_numbers import amount, NANOSECONDS, to_nanoseconds, vector
 from ur_cartesian_driver.path.path_points import PathPoint
-from ur_cartesian_driver.planning.request.io_commands import check_proportional_output
-from ur_cartesian_driver.planning.request.presses import check_press
-from ur_cartesian_driver.planning.request.stops import (
-    check_input_wait,
-    check_payload,
-    check_script_call,
-    MAX_DWELL,
-    MAX_OFFSET,
-)
+from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
+from ur_cartesian_driver.planning.request.point_events.registry import check_event
+
+#: Of what has a begin and an end: the methods that name both, and what the end is missing for.
+_METHODS = {
+    Press: ('press()', 'end_press()', ''),
+    ProportionalOutput: ('follow_speed()', 'end_follow_speed()', ' for analog output {0.pin}'),
+}
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -68,8 +68,7 @@ class PathWithEvents(PathOfMotions):
             offset += self._points[index].segment.dwell
         command = output.command(value, 0, round(offset * NANOSECONDS) / NANOSECONDS)
         point = self._points[index]
-        point = replace(point, outputs=(*point.outputs, command))
-        return self._with(_points=(*self._points[:index], point, *self._points[index + 1 :]))
+        return self._with_point(index, replace(point, events=(*point.events, command)))
 
     def follow_speed(
         self,
@@ -112,8 +111,7 @@ class PathWithEvents(PathOfMotions):
             begin_lead=float(lead),
             idle=float(idle),
         )
-        check_proportional_output(where, proportional, 2)
-        return self._begin_stretch(self._points[-1], replace(proportional, last_waypoint=0))
+        return self._happening(where, self._points[-1], proportional)
 
     def end_follow_speed(self, output: Output, *, lead: float = 0.0) -> Self:
         """
@@ -122,24 +120,17 @@ class PathWithEvents(PathOfMotions):
         :param lead: end so long before the point [s].
         :raises InvalidGoal: the output does not follow the speed, or began to at this point.
         """
-        begun = self._open_stretch(
+        begun = self._begun(
             lambda one: isinstance(one, ProportionalOutput) and one.pin == output.pin
         )
-        last = len(self) - 1
         if begun is None:
             raise InvalidGoal(
-                f'end_follow_speed() at point {last}',
+                f'end_follow_speed() at point {len(self) - 1}',
                 f'has no begin for analog output {output.pin} at a point before',
                 'call follow_speed() there',
             )
-        i, k = begun
-        proportional = self._points[i].stretches[k]
-        assert isinstance(proportional, ProportionalOutput)
-        proportional = replace(proportional, end_lead=float(lead))
-        check_proportional_output(
-            'end_follow_speed()', replace(proportional, last_waypoint=last - i), last + 1
-        )
-        return self._end_stretch(i, k, proportional)
+        check_event('end_follow_speed()', replace(begun[1], end_lead=float(lead), last_waypoint=1))
+        return self._ended(*begun, end_lead=float(lead))
 
     def press(
         self,
@@ -194,8 +185,7 @@ class PathWithEvents(PathOfMotions):
             zero_sensor=zero_sensor,
             contact=contact,
         )
-        check_press(where, press)
-        return self._begin_stretch(point, replace(press, last_waypoint=0))
+        return self._happening(where, point, press)
 
     def end_press(self) -> Self:
         """
@@ -206,35 +196,10 @@ class PathWithEvents(PathOfMotions):
         :raises InvalidGoal: as :meth:`dwell`, or no press has begun at a point before.
         """
         where, point = self._stop('end_press')
-        begun = self._open_stretch(lambda one: isinstance(one, Press))
+        begun = self._begun(lambda one: isinstance(one, Press))
         if begun is None:
             raise InvalidGoal(where, 'has no begin at a point before', 'call press() there')
-        i, k = begun
-        ended = self._end_stretch(i, k, self._points[i].stretches[k])
-        return ended._with(_points=(*ended._points[:-1], point))
-
-    def _begin_stretch(self, point: PathPoint, stretch: ProportionalOutput | Press) -> Self:
-        """Return the path with something that begins at the last point, given as it is there."""
-        point = replace(point, stretches=(*point.stretches, stretch))
-        return self._with(_points=(*self._points[:-1], point))
-
-    def _open_stretch(
-        self, is_wanted: Callable[[ProportionalOutput | Press], bool]
-    ) -> tuple[int, int] | None:
-        """Return the latest point at which one began that has no end, and its number there."""
-        for i in range(len(self) - 2, -1, -1):
-            for k, stretch in enumerate(self._points[i].stretches):
-                if not stretch.last_waypoint and is_wanted(stretch):
-                    return i, k
-        return None
-
-    def _end_stretch(self, i: int, k: int, stretch: ProportionalOutput | Press) -> Self:
-        """Return the path with the end of one at the last point."""
-        point = self._points[i]
-        stretch = replace(stretch, last_waypoint=len(self) - 1 - i)
-        stretches = (*point.stretches[:k], stretch, *point.stretches[k + 1 :])
-        point = replace(point, stretches=stretches)
-        return self._with(_points=(*self._points[:i], point, *self._points[i + 1 :]))
+        return self._with_point(-1, point)._ended(*begun)
 
     def dwell(self, time: float) -> Self:
         """
@@ -245,9 +210,11 @@ class PathWithEvents(PathOfMotions):
         :raises InvalidGoal: there is no point, or it is passed with a blend or a twist of its own.
         """
         where, point = self._stop('dwell')
-        length = to_nanoseconds(where, amount(where, 'time', time, MAX_DWELL, 's')) / NANOSECONDS
+        length = (
+            to_nanoseconds(where, amount(where, 'time', time, MAX_STOP_TIME, 's')) / NANOSECONDS
+        )
         segment = replace(point.segment, dwell=length)
-        return self._with(_points=(*self._points[:-1], replace(point, segment=segment)))
+        return self._with_point(-1, replace(point, segment=segment))
 
     def call(self, function: str, *arguments: float, timeout: float = 10.0) -> Self:
         """
@@ -260,9 +227,7 @@ class PathWithEvents(PathOfMotions):
         where, point = self._stop('call')
         numbers = tuple(float(argument) for argument in arguments)
         call = ScriptCall(waypoint=0, function=function, arguments=numbers, timeout=float(timeout))
-        check_script_call(where, call)
-        point = replace(point, stops=(*point.stops, call))
-        return self._with(_points=(*self._points[:-1], point))
+        return self._happening(where, point, call)
 
     def wait_for(
         self,
@@ -286,15 +251,14 @@ class PathWithEvents(PathOfMotions):
         """
         where, point = self._stop('wait_for')
         wait = what.wait(float(value), timeout, below, go_on)
-        check_input_wait(where, wait)
-        if any(isinstance(other, InputWait) for other in point.stops):
+        path = self._happening(where, point, wait)
+        if any(isinstance(other, InputWait) for other in point.events):
             raise InvalidGoal(where, 'waits for a second input', 'add a point for it')
-        if any(isinstance(other, ScriptCall) for other in point.stops):
+        if any(isinstance(other, ScriptCall) for other in point.events):
             raise InvalidGoal(
                 where, 'follows a call(), which comes after it', 'let the function wait'
             )
-        point = replace(point, stops=(*point.stops, wait))
-        return self._with(_points=(*self._points[:-1], point))
+        return path
 
     def payload(self, mass: float, center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> Self:
         """
@@ -307,9 +271,57 @@ class PathWithEvents(PathOfMotions):
         where, point = self._stop('payload')
         cog = vector(where, center_of_gravity, MAX_OFFSET)
         change = PayloadChange(waypoint=0, mass=float(mass), center_of_gravity=cog)
-        check_payload(where, change)
-        point = replace(point, stops=(*point.stops, change))
-        return self._with(_points=(*self._points[:-1], point))
+        return self._happening(where, point, change)
+
+    # ---- inside --------------------------------------------------------------------------------
+
+    def _with_point(self, index: int, point: PathPoint) -> Self:
+        """Return the path with another one of its points."""
+        points = list(self._points)
+        points[index] = point
+        return self._with(_points=tuple(points))
+
+    def _happening(self, where: str, point: PathPoint, event: Any) -> Self:
+        """
+        Return the path with an event at the last point, given as it is there.
+
+        :param event: at point 0; if it has an end, at point 1, as if it ended at the next one.
+        """
+        check_event(where, event)
+        if type(event) in _METHODS:
+            event = replace(event, last_waypoint=0)
+        return self._with_point(-1, replace(point, events=(*point.events, event)))
+
+    def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
+        """Return the latest event that has no end, with the point at which it begins."""
+        for i in range(len(self) - 2, -1, -1):
+            for event in self._points[i].events:
+                if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):
+                    return i, event
+        return None
+
+    def _ended(self, i: int, event: Any, **changes: float) -> Self:
+        """Return the path with the end of an event, which begins at a point, at the last one."""
+        ended = replace(event, last_waypoint=len(self) - 1 - i, **changes)
+        point = self._points[i]
+        events = tuple(ended if each is event else each for each in point.events)
+        return self._with_point(i, replace(point, events=events))
+
+    def _check_ends(self) -> None:
+        """
+        Refuse what has no end.
+
+        :raises InvalidGoal: names the method that begins it, and the one that ends it.
+        """
+        for i, point in enumerate(self._points):
+            for event in point.events:
+                if type(event) in _METHODS and not event.last_waypoint:
+                    begin, end, what = _METHODS[type(event)]
+                    raise InvalidGoal(
+                        f'{begin} at point {i}',
+                        f'has no end{what.format(event)}',
+                        f'call {end} at a later point',
+                    )
 
     def _stop(self, name: str) -> tuple[str, PathPoint]:
         """Return where the method is, and the last point as one at which the arm stops."""

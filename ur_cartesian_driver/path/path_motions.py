@@ -13,7 +13,14 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import multiply, Pose, Quaternion, rotate
 from ur_cartesian_driver.motion.geometry.vectors import add, Vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal.goal import (
+    ArcMode,
+    FreeAxis,
+    Goal,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
 from ur_cartesian_driver.path.centre_line import arc, turned
 from ur_cartesian_driver.path.path_numbers import (
     amount,
@@ -26,11 +33,12 @@ from ur_cartesian_driver.path.path_numbers import (
 )
 from ur_cartesian_driver.path.path_points import (
     Feed,
-    MotionRates,
+    MotionOptions,
     PathPoint,
-    PathSettings,
+    point_fields,
     SAME_ANGLE,
     SAME_POSITION,
+    with_fields,
 )
 
 #: A place: a position x y z [m], or a pose.
@@ -52,6 +60,11 @@ _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
+#: Fields of a segment for which methods have words of their own; the others go by their names.
+_OWN_WORDS = {
+    *('type', 'blend_radius', 'dwell', 'velocity', 'acceleration'),
+    *('via', 'via_posture', 'arc_mode', 'free_axis', 'free_min', 'free_max'),
+}
 _BY_NAME = {
     'line': SegmentType.LINEAR,
     'joint': SegmentType.JOINT,
@@ -69,7 +82,8 @@ class PathOfMotions:
     _start: PathPoint | None
     _points: tuple[PathPoint, ...]
     _feed: Feed
-    _settings: PathSettings
+    #: A goal without points, for what holds for the whole path.
+    _settings: Goal
 
     def __init__(
         self,
@@ -91,7 +105,7 @@ class PathOfMotions:
             if not isinstance(value, str):
                 raise InvalidGoal(name, f'is {value!r:.60}', 'give its name; transformed() places')
             object.__setattr__(self, name, value)
-        self._set(_start=None, _points=(), _feed=Feed(), _settings=PathSettings())
+        self._set(_start=None, _points=(), _feed=Feed(), _settings=Goal(waypoints=()))
         if start is not None:
             pose = self._pose('start', start, orientation)
             self._set(_start=PathPoint(waypoint=Waypoint(pose=pose), auto_blend=True))
@@ -146,6 +160,7 @@ class PathOfMotions:
         joint_acceleration: float | None = None,
         turn_speed: float | None = None,
         turn_acceleration: float | None = None,
+        **fields: Any,
     ) -> Self:
         """
         Set speeds and blends of the motions that follow, like a feed rate; None = as before.
@@ -154,6 +169,7 @@ class PathOfMotions:
         :param blend: radius around each point [m]; 0 = stop there.
         :param joint_speed: of the leading axis in joint motions [rad/s], [rad/s^2].
         :param turn_speed: of the tool where it only turns [rad/s], [rad/s^2].
+        :param fields: other fields of a segment, by their names in ``MotionSegment``.
         :raises InvalidGoal: a value is negative, or looks like millimetres or degrees.
         """
         where = f'at() after {len(self)} points'
@@ -170,11 +186,22 @@ class PathOfMotions:
             )
             if (number := amount(where, name, value, bound, hint)) is not None
         }
+        path = self._with_segment(self._segment(where, fields))
+        path = path._with(_feed=replace(path._feed, **given))
+        start = path._start
+        if start is None or self._points or 'blend' not in given:
+            return path
+        segment = replace(start.segment, blend_radius=given['blend'])  # for the way back
+        start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
+        return path._with(_start=start)
+
+    def _with_segment(self, segment: Segment) -> Self:
+        """Return the path with other fields of the segments of motions that follow."""
         start = self._start
-        if start is not None and not self._points and 'blend' in given:  # for the way back
-            segment = replace(start.segment, blend_radius=given['blend'])
-            start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
-        return self._with(_feed=replace(self._feed, **given), _start=start)
+        if start is not None and not self._points:  # for the way back
+            own = {**point_fields(segment), 'blend_radius': start.segment.blend_radius}
+            start = replace(start, segment=replace(start.segment, **own))
+        return self._with(_feed=replace(self._feed, segment=segment), _start=start)
 
     def free(self, axis: str | None, low: float | None = None, high: float | None = None) -> Self:
         """
@@ -200,15 +227,13 @@ class PathOfMotions:
                 f'has the range {least:g} to {greatest:g} rad',
                 'give it in radians, of at most a full turn; deg() converts',
             )
-        given: dict[str, Any] = {
-            'free_axis': FreeAxis.NONE if axis is None else _FREE_AXES[axis],
-            'free_min': least,
-            'free_max': greatest,
-        }
-        start = self._start
-        if start is not None and not self._points:  # for the way back
-            start = replace(start, segment=replace(start.segment, **given))
-        return self._with(_feed=replace(self._feed, **given), _start=start)
+        segment = replace(
+            self._feed.segment,
+            free_axis=FreeAxis.NONE if axis is None else _FREE_AXES[axis],
+            free_min=least,
+            free_max=greatest,
+        )
+        return self._with_segment(segment)
 
     # ---- motions -------------------------------------------------------------------------------
 
@@ -223,6 +248,7 @@ class PathOfMotions:
         duration: float | None = None,
         posture: Mapping[str, float] | None = None,
         optimized: bool = False,
+        **fields: Any,
     ) -> Self:
         """
         Add a straight line.
@@ -234,11 +260,12 @@ class PathOfMotions:
         :param posture: joint positions to arrive near to, by joint name [rad].
         :param optimized: as fast as the robot can (optimovel); speed and acceleration are
             fractions then.
+        :param fields: other fields of its segment, by their names in ``MotionSegment``.
         :raises InvalidGoal: a value cannot be meant.
         """
         kind = SegmentType.OPTIMIZED_LINEAR if optimized else SegmentType.LINEAR
-        rates = MotionRates(blend, speed, acceleration, duration)
-        return self._move(kind, place, orientation, rates, posture)
+        options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
+        return self._move(kind, place, orientation, options)
 
     def joint(
         self,
@@ -251,6 +278,7 @@ class PathOfMotions:
         duration: float | None = None,
         posture: Mapping[str, float] | None = None,
         optimized: bool = False,
+        **fields: Any,
     ) -> Self:
         """
         Add a joint motion, in which the path of the tool is not straight; as :meth:`line`.
@@ -258,8 +286,8 @@ class PathOfMotions:
         ``speed`` and ``acceleration`` are those of the leading axis [rad/s], [rad/s^2].
         """
         kind = SegmentType.OPTIMIZED_JOINT if optimized else SegmentType.JOINT
-        rates = MotionRates(blend, speed, acceleration, duration)
-        return self._move(kind, place, orientation, rates, posture)
+        options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
+        return self._move(kind, place, orientation, options)
 
     def process(
         self,
@@ -271,6 +299,7 @@ class PathOfMotions:
         acceleration: float | None = None,
         duration: float | None = None,
         posture: Mapping[str, float] | None = None,
+        **fields: Any,
     ) -> Self:
         """
         Add a straight line at constant speed with rounded corners (movep); as :meth:`line`.
@@ -278,8 +307,8 @@ class PathOfMotions:
         Without a blend it gets one of 2 mm or so, because the arm would stop at its point;
         ``blend=0`` means a stop. So does an arc before it.
         """
-        rates = MotionRates(blend, speed, acceleration, duration)
-        return self._move(SegmentType.PROCESS, place, orientation, rates, posture)
+        options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
+        return self._move(SegmentType.PROCESS, place, orientation, options)
 
     def arc(
         self,
@@ -294,6 +323,7 @@ class PathOfMotions:
         duration: float | None = None,
         posture: Mapping[str, float] | None = None,
         via_posture: Mapping[str, float] | None = None,
+        **fields: Any,
     ) -> Self:
         """
         Add an arc through a point on the way; as :meth:`line`.
@@ -309,7 +339,7 @@ class PathOfMotions:
             raise InvalidGoal(
                 where, 'has an orientation, but the arc turns the tool', 'give the position only'
             )
-        if follow and self._feed.free_axis:
+        if follow and self._feed.segment.free_axis:
             raise InvalidGoal(
                 where,
                 'turns the tool with the arc, but its axis is free',
@@ -339,8 +369,8 @@ class PathOfMotions:
             'via_posture': posture_near(f'{where}: via_posture', via_posture),
             'arc_mode': ArcMode.FIXED if follow else ArcMode.UNCONSTRAINED,
         }
-        rates = MotionRates(blend, speed, acceleration, duration)
-        return self._move(SegmentType.CIRCULAR, pose, None, rates, posture, arc_fields)
+        options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
+        return self._move(SegmentType.CIRCULAR, pose, None, options, arc_fields)
 
     def spline(
         self,
@@ -351,6 +381,7 @@ class PathOfMotions:
         twist: Sequence[float] = FREE,
         acceleration: Sequence[float] = FREE,
         posture: Mapping[str, float] | None = None,
+        **fields: Any,
     ) -> Self:
         """
         Add a point that a spline passes through; the points of a path are all of one, or none is.
@@ -372,7 +403,7 @@ class PathOfMotions:
         )
         point = PathPoint(
             waypoint=waypoint,
-            segment=Segment(**self._feed.free),
+            segment=self._segment(where, fields),
             duration=self._nanoseconds(where, duration),
             in_spline=True,
         )
@@ -395,6 +426,7 @@ class PathOfMotions:
         acceleration: float | None = None,
         duration: float | None = None,
         posture: Mapping[str, float] | None = None,
+        **fields: Any,
     ) -> Self:
         """
         Add a motion from the point before by a distance [m] and a turn.
@@ -418,8 +450,8 @@ class PathOfMotions:
             turn = unit_quaternion(where, turn)
             turned_q = multiply(q, turn) if of_tool else multiply(turn, q)
         there = add(here.position, rotate(q, step) if of_tool else step)
-        rates = MotionRates(blend, speed, acceleration, duration)
-        return self._move(_BY_NAME[motion], Pose(there, turned_q), None, rates, posture)
+        options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
+        return self._move(_BY_NAME[motion], Pose(there, turned_q), None, options)
 
     # ---- inside --------------------------------------------------------------------------------
 
@@ -450,8 +482,7 @@ class PathOfMotions:
         kind: SegmentType,
         place: Place,
         orientation: Quaternion | None,
-        rates: MotionRates,
-        posture: Mapping[str, float] | None,
+        options: MotionOptions,
         arc_fields: Mapping[str, Any] | None = None,
     ) -> Self:
         name = {SegmentType.CIRCULAR: 'arc'}.get(kind, kind.name.lower().split('_')[-1])
@@ -460,25 +491,27 @@ class PathOfMotions:
             raise mixed_spline(where)
         pose, here = self._pose(where, place, orientation), self.end
         moved = here is None or here.distance_to(pose) > SAME_POSITION
-        if not moved and not posture and kind is not SegmentType.JOINT:
+        if not moved and not options.posture and kind is not SegmentType.JOINT:
             assert here is not None
-            if here.angle_to(pose) <= SAME_ANGLE and (self._points or not rates.duration):
+            if here.angle_to(pose) <= SAME_ANGLE and (self._points or not options.duration):
                 raise InvalidGoal(
                     where, 'is where the tool is before: it has no distance to go', 'leave it out'
                 )
-        duration = self._nanoseconds(where, rates.duration)
-        velocity, acceleration = self._rates(where, kind, rates, moved, bool(duration))
-        blend = amount(where, 'blend', rates.blend, MAX_BLEND, 'm')
+        duration = self._nanoseconds(where, options.duration)
+        velocity, acceleration = self._rates(where, kind, options, moved, bool(duration))
+        blend = amount(where, 'blend', options.blend, MAX_BLEND, 'm')
         feed_blend = blend is None and self._feed.blend is not None
         blend = self._feed.blend if blend is None else blend
         point = PathPoint(
-            waypoint=Waypoint(pose=pose, posture=posture_near(f'{where}: posture', posture)),
-            segment=Segment(
+            waypoint=Waypoint(
+                pose=pose, posture=posture_near(f'{where}: posture', options.posture)
+            ),
+            segment=replace(
+                self._segment(where, options.fields),
                 type=kind,
                 blend_radius=blend or 0.0,
                 velocity=velocity,
                 acceleration=acceleration,
-                **self._feed.free,
                 **(arc_fields or {}),
             ),
             duration=duration,
@@ -487,8 +520,14 @@ class PathOfMotions:
         )
         return self._with(_points=(*self._points, point))
 
+    def _segment(self, where: str, fields: Mapping[str, Any]) -> Segment:
+        """Return the segment of a motion, as far as no words of the methods make it."""
+        if own := _OWN_WORDS & set(fields):
+            raise TypeError(f'{where} has a word of its own for the field {min(own)}')
+        return with_fields(where, self._feed.segment, fields) if fields else self._feed.segment
+
     def _rates(
-        self, where: str, kind: SegmentType, rates: MotionRates, moved: bool, timed: bool
+        self, where: str, kind: SegmentType, options: MotionOptions, moved: bool, timed: bool
     ) -> tuple[float, float]:
         """Return speed and acceleration of a motion, in the units of its type."""
         feed = self._feed
@@ -500,8 +539,8 @@ class PathOfMotions:
         elif not moved:
             unit, usual = _JOINTS, (feed.turn_speed, feed.turn_acceleration)
         bounds = _MAX_SPEED[unit]
-        speed = amount(where, 'speed', rates.speed, bounds[0], unit)
-        acceleration = amount(where, 'acceleration', rates.acceleration, bounds[1], unit)
+        speed = amount(where, 'speed', options.speed, bounds[0], unit)
+        acceleration = amount(where, 'acceleration', options.acceleration, bounds[1], unit)
         speed = usual[0] if speed is None else speed
         if timed and (speed or kind in _OPTIMIZED_TYPES):
             raise InvalidGoal(

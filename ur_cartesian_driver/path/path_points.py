@@ -4,36 +4,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion, rotate
 from ur_cartesian_driver.motion.geometry.vectors import add, Vector6, vector6, ZERO6
-from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.goal import (
-    ArcMode,
-    FreeAxis,
-    InputWait,
-    IOCommand,
-    OnPathTolerance,
-    PathOffset,
-    PayloadChange,
-    Press,
-    ProportionalOutput,
-    SafeOutput,
-    ScriptCall,
-    Segment,
-    Tolerance,
-    Waypoint,
-)
+from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
+from ur_cartesian_driver.motion.goal.field_table import goal_fields
+from ur_cartesian_driver.motion.goal.goal import ArcMode, Goal, Segment, Waypoint
 from ur_cartesian_driver.motion.state.rigid_body import acceleration_at, twist_at
+from ur_cartesian_driver.planning.request.field_rules import check_record
+
+T = TypeVar('T')
 
 #: Poses that are nearer are the same [m], [rad].
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
-#: What belongs to the point at which a segment ends, not to the motion.
-FREE_FIELDS = ('free_axis', 'free_min', 'free_max')
-POINT_FIELDS = ('blend_radius', 'dwell', *FREE_FIELDS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,15 +35,8 @@ class Feed:
     joint_acceleration: float = 0.0
     turn_speed: float = 0.0
     turn_acceleration: float = 0.0
-    #: As in a segment.
-    free_axis: FreeAxis = FreeAxis.NONE
-    free_min: float = 0.0
-    free_max: float = 0.0
-
-    @property
-    def free(self) -> dict[str, Any]:
-        """The fields of a segment that let its point turn."""
-        return {name: getattr(self, name) for name in FREE_FIELDS}
+    #: The other fields of the segments of motions.
+    segment: Segment = field(default_factory=Segment)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,12 +47,9 @@ class PathPoint:
     segment: Segment = field(default_factory=Segment)
     #: Of the motion [ns]; 0 = by its speed.
     duration: int = 0
-    #: With the waypoint 0, whichever point this is.
-    outputs: tuple[IOCommand, ...] = ()
-    stops: tuple[InputWait | ScriptCall | PayloadChange, ...] = ()
-    #: Those that begin here: with the first waypoint 0, and the number of points to their end as
-    #: the last one; 0 = not ended yet.
-    stretches: tuple[ProportionalOutput | Press, ...] = ()
+    #: What happens here, or begins here, as if this were point 0. What ends behind the point 0 has
+    #: not ended yet.
+    events: tuple[Any, ...] = ()
     #: Whether the blend is that of the feed, which the last point of a path does without, and
     #: whether it is chosen when the path is finished.
     feed_blend: bool = False
@@ -85,31 +62,39 @@ class PathPoint:
         return self.waypoint.pose
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathSettings:
-    """What holds for the whole path."""
-
-    path_tolerance: Tolerance = field(default_factory=Tolerance)
-    goal_tolerance: Tolerance = field(default_factory=Tolerance)
-    goal_time_tolerance: float = 0.0
-    execution: ExecutionMode = ExecutionMode.AUTO
-    keep_open: bool = False
-    replace_horizon: float = 0.0
-    safe_outputs: tuple[SafeOutput, ...] = ()
-    on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
-    stall_timeout: float = 0.0
-    min_speed_fraction: float = 0.0
-    path_offset: PathOffset = field(default_factory=PathOffset)
-
-
 @dataclass(frozen=True, slots=True)
-class MotionRates:
-    """What one motion says about its speed and blend."""
+class MotionOptions:
+    """What one motion says besides its place."""
 
     blend: float | None
     speed: float | None
     acceleration: float | None
     duration: float | None
+    posture: Mapping[str, float] | None
+    #: Other fields of its segment.
+    fields: Mapping[str, Any]
+
+
+def with_fields(where: str, record: T, fields: Mapping[str, Any]) -> T:
+    """
+    Return a dataclass of the table with other values in some fields.
+
+    :raises InvalidGoal: a field does not take the value; ``where`` is the name of the dataclass.
+    """
+    kind: type[T] = type(record)
+    try:
+        changed = with_declared_types(replace(record, **fields), kind, where)  # type: ignore[type-var]  # a dataclass
+    except WrongType as error:
+        raise InvalidGoal(error.field, error.problem) from None
+    check_record(where, changed)
+    return changed
+
+
+def point_fields(segment: Segment) -> dict[str, Any]:
+    """Return the fields of a segment that belong to the point where it ends."""
+    return {
+        each.name: getattr(segment, each.name) for each in goal_fields(Segment) if each.is_of_point
+    }
 
 
 def moved(point: PathPoint, T: Pose) -> PathPoint:
@@ -173,16 +158,16 @@ def is_same(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
 
-def merged(first: PathSettings, second: PathSettings) -> PathSettings:
+def merged(first: Goal, second: Goal) -> Goal:
     """
     Return the settings of two paths as one.
 
     :raises InvalidGoal: both have chosen, and differ.
     """
-    usual, values = PathSettings(), {}
-    for each in fields(PathSettings):
+    usual, values = Goal(waypoints=()), {}
+    for each in goal_fields(Goal):
         mine, its, default = (getattr(x, each.name) for x in (first, second, usual))
         if mine not in (its, default) and its != default:
             raise InvalidGoal('then()', f'joins paths of different {each.name}', 'set it once')
         values[each.name] = its if mine == default else mine
-    return PathSettings(**values)
+    return Goal(**values)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, sqrt
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +27,7 @@ from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     Goal,
-    InputWait,
-    IOCommand,
-    PayloadChange,
     Posture,
-    Press,
-    ProportionalOutput,
-    ScriptCall,
     Segment,
     SegmentType,
     Waypoint,
@@ -43,6 +37,8 @@ from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION
+from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
 #: How far before the place the path is resumed, and from how far behind the tool comes [m].
@@ -51,8 +47,8 @@ OVERLAP, APPROACH = 0.005, 0.03
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 #: Blends begin somewhat farther from their points on arcs.
 _BLEND_MARGIN = 1.05
-#: What is left of a segment is nothing below this [m]; of the fraction of a segment.
-_NOTHING, _NO_FRACTION = 1e-5, 1e-6
+#: What is left of a segment is nothing below this [m].
+_NOTHING = 1e-5
 #: The shortest arc, and the least height over its chord, that is left of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
 #: The shortest time in which a spline gathers speed [s], and the number of points meanwhile.
@@ -60,8 +56,6 @@ _RAMP_TIME, _RAMP_POINTS = 0.4, 8
 #: Chords that measure the length of a piece of a spline.
 _CHORDS = 64
 _DIGITS = 9
-_Event = TypeVar('_Event', InputWait, PayloadChange, ScriptCall)
-_Stretch = TypeVar('_Stretch', ProportionalOutput, Press)
 _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
@@ -155,16 +149,17 @@ class _Resumption:
     def _goal(
         self, points: Sequence[Waypoint], segments: Sequence[Segment], places: Sequence[float]
     ) -> ResumedGoal:
+        rest = GoalRest(
+            begin=self.begin, stopped=self.stopped, places=places, time_since=self._time_since
+        )
+        left: dict[str, Any] = {
+            kind.field: tuple(kind.left(kind.of(self.goal), rest)) for kind in EVENT_KINDS.values()
+        }
         goal = replace(
             self.goal,
             waypoints=tuple(points),
             segments=tuple(segments) if self.goal.segments or self.spline is None else (),
-            io_commands=self._outputs(places),
-            script_calls=self._calls(places),
-            input_waits=self._events(self.goal.input_waits, places),
-            payload_changes=self._events(self.goal.payload_changes, places),
-            proportional_outputs=self._stretches(self.goal.proportional_outputs, places),
-            presses=self._stretches(self.goal.presses, places),
+            **left,
             execution=self.mode,
             age=None,
         )
@@ -318,7 +313,7 @@ class _Resumption:
         begin, end = spline.time(self.begin), spline.end
         ramp = min(max(2.0 * (spline.time(self.stopped) - begin), _RAMP_TIME), end - begin)
         # In the time t of the ramp the curve's time passes by t^2 / (2 ramp).
-        knots = [time for time in spline.knots if begin + _NO_FRACTION < time]
+        knots = [time for time in spline.knots if begin + NO_FRACTION < time]
         gathered = begin + 0.5 * ramp * np.linspace(0.0, 1.0, _RAMP_POINTS + 1)[1:] ** 2
         apart = ramp / _RAMP_POINTS**2
         inner = [x for x in gathered.tolist() if all(abs(x - knot) > apart for knot in knots)]
@@ -329,7 +324,7 @@ class _Resumption:
         after = zero[-1]
         for time in sorted([*inner, *knots]):
             passed = time - begin
-            if passed < 0.5 * ramp - _NO_FRACTION:
+            if passed < 0.5 * ramp - NO_FRACTION:
                 t = sqrt(2.0 * ramp * passed)
                 rate, gain = t / ramp, 1.0 / ramp
             else:
@@ -337,92 +332,12 @@ class _Resumption:
             points.append(spline.waypoint(time, after + t, rate, gain))
             places.append(spline.place(time))
         last = len(self.segments) - 1
-        segments = [self.segments[min(floor(p - _NO_FRACTION), last)] for p in places]
+        segments = [self.segments[min(floor(p - NO_FRACTION), last)] for p in places]
         return self._goal(points, segments, places)
 
-    # -- outputs ---------------------------------------------------------------------------------
+    # -- events ----------------------------------------------------------------------------------
 
-    def _outputs(self, places: Sequence[float]) -> tuple[IOCommand, ...]:
-        """Return the commands that are left, after the state at the place."""
-        first, state = self._start_index(places), dict[tuple[int, int], IOCommand]()
-        left = []
-        for number, command in sorted(
-            enumerate(self.goal.io_commands), key=lambda each: (each[1].waypoint, each[1].offset)
-        ):
-            if not self._is_passed(command.waypoint):
-                left.append(replace(command, waypoint=_index(places, command.waypoint)))
-                continue
-            due = command.offset - self._time_since(command.waypoint, number, command.offset)
-            if due > 0.0:
-                left.append(replace(command, waypoint=first, offset=round(due, _DIGITS)))
-            else:
-                state[command.output, command.pin] = replace(command, waypoint=first, offset=0.0)
-        return (*state.values(), *left)
-
-    def _events(self, events: Sequence[_Event], places: Sequence[float]) -> tuple[_Event, ...]:
-        """Return what happens at the points that are left, and the last of before at the place."""
-        passed = [each for each in events if self._is_passed(each.waypoint)]
-        left = self._ahead(events, places)
-        first = self._start_index(places)
-        if places[first] > self.begin + _NO_FRACTION:  # the arm need not stop there
-            return tuple(left)
-        last = max((each.waypoint for each in passed), default=0)
-        again: list[_Event] = [
-            replace(each, waypoint=first) for each in passed if each.waypoint == last
-        ]
-        return tuple(again + left)
-
-    def _calls(self, places: Sequence[float]) -> tuple[ScriptCall, ...]:
-        """Return the calls of the points that the arm had not left when the goal was stopped."""
-        first = self._start_index(places)
-        return tuple(
-            replace(
-                call,
-                waypoint=first
-                if self._is_passed(call.waypoint)
-                else _index(places, call.waypoint),
-            )
-            for call in self.goal.script_calls
-            if call.waypoint + 1.0 >= self.stopped - _NO_FRACTION
-        )
-
-    def _ahead(self, events: Sequence[_Event], places: Sequence[float]) -> list[_Event]:
-        """Return what happens at the points that are left."""
-        return [
-            replace(each, waypoint=_index(places, each.waypoint))
-            for each in events
-            if not self._is_passed(each.waypoint)
-        ]
-
-    def _stretches(
-        self, stretches: Sequence[_Stretch], places: Sequence[float]
-    ) -> tuple[_Stretch, ...]:
-        """Return what holds between two points on the rest of the path, from the place on."""
-        left = []
-        for stretch in stretches:
-            if self._is_passed(stretch.last_waypoint):
-                continue
-            last = _index(places, stretch.last_waypoint)
-            if not self._is_passed(stretch.first_waypoint):
-                first = _index(places, stretch.first_waypoint)
-            else:
-                first = self._start_index(places)
-                if isinstance(stretch, ProportionalOutput):
-                    stretch = replace(stretch, begin_lead=0.0)
-                elif stretch.zero_sensor:  # it was zeroed where the tool was free
-                    stretch = replace(stretch, zero_sensor=False)
-            if first < last:
-                left.append(replace(stretch, first_waypoint=first, last_waypoint=last))
-        return tuple(left)
-
-    def _is_passed(self, waypoint: int) -> bool:
-        return waypoint + 1.0 <= self.begin + _NO_FRACTION
-
-    def _start_index(self, places: Sequence[float]) -> int:
-        """Return the number of the point at the place, or of the first one behind it."""
-        return max(sum(place <= self.begin + _NO_FRACTION for place in places) - 1, 0)
-
-    def _time_since(self, waypoint: int, number: int, offset: float) -> float:
+    def _time_since(self, waypoint: int, field: str, offset: float) -> float:
         """Return how long before the place a point was passed [s]; no less than needed."""
         if offset <= 0.0:
             return 0.0
@@ -438,7 +353,7 @@ class _Resumption:
                 break
             if not self.segments[k].velocity:
                 raise InvalidGoal(
-                    f'io_commands[{number}].offset',
+                    field,
                     f'is {offset:g} s after points[{waypoint}], but when the arm was there is not '
                     f'known: segments[{k}] has no velocity',
                     'give it one, or switch the output at a point',
@@ -520,11 +435,6 @@ class _Spline:
             twist=vector6(twist.tolist()),
             acceleration=vector6((acceleration * self.points.quintic).tolist()),
         )
-
-
-def _index(places: Sequence[float], waypoint: int) -> int:
-    """Return the number of a point of the other goal."""
-    return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
 
 
 def _path_place(place: float, points: int) -> PathPlace:

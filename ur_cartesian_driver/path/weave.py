@@ -29,8 +29,8 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
     before = start
     for i, point in enumerate(points):
         where = f'weave() at point {i}'
-        segment, has_events = point.segment, point.outputs or point.stops or point.stretches
-        if has_events or point.duration or point.waypoint.posture or segment.dwell:
+        segment = point.segment
+        if point.events or point.duration or point.waypoint.posture or segment.dwell:
             raise InvalidGoal(
                 where,
                 'has outputs or inputs, a duration, a posture or a dwell',

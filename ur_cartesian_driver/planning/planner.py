@@ -76,9 +76,12 @@ from ur_cartesian_driver.planning.request.controlled_frame import (
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
-from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
-from ur_cartesian_driver.planning.request.presses import check_press_support
-from ur_cartesian_driver.planning.request.stops import Stops
+from ur_cartesian_driver.planning.request.point_events.registry import (
+    OUTPUT_EVENTS,
+    POINT_EVENTS,
+)
+from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_safe_outputs
+from ur_cartesian_driver.planning.request.point_events.stops import Stops
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
@@ -291,8 +294,9 @@ class GoalPlanner:
         options: PlanningOptions,
         running: PlannedSegment | None = None,
     ) -> None:
-        check_press_support(retargeted.goal, arm.model, retargeted.T_tcp_controlled)
-        self.stops = Stops(retargeted.goal, options.prelude)
+        for kind in POINT_EVENTS:
+            kind.check_robot(retargeted.goal, arm.model, retargeted.T_tcp_controlled)
+        self.stops = Stops(retargeted.goal, options)
         goal, state = self.stops.moving_goal, retargeted.state
         self.goal, self.state, self.arm, self.options = goal, state, arm, options
         self.running = running
@@ -364,8 +368,7 @@ class GoalPlanner:
         segments = place_outputs(
             segments,
             reference,
-            goal.io_commands,
-            proportional=goal.proportional_outputs,
+            {kind.field: kind.of(goal) for kind in OUTPUT_EVENTS},
             blend_halves=segments.blend_entries[:, -1],
         )
         return Plan(

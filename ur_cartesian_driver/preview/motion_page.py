@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.primitive import AwaitInput, CallFunction, SpeedLaw
 from ur_cartesian_driver.planning.preflight.tightest_margins import normalized_margins
-from ur_cartesian_driver.planning.request.io_commands import describe_command
+from ur_cartesian_driver.planning.request.point_events.switched_outputs import describe_command
 from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
 
 Colours = NDArray[np.uint8]

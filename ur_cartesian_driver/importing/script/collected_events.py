@@ -17,11 +17,11 @@ from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
     InputWait,
     IOCommand,
+    MAX_OUTPUT_OFFSET,
+    MAX_STOP_TIME,
     Posture,
     SegmentType,
 )
-from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
-from ur_cartesian_driver.planning.request.stops import MAX_DWELL
 from ur_cartesian_driver.urscript import RuntimeException
 
 #: What a function is that takes a cycle.
@@ -127,10 +127,10 @@ class CollectedEvents:
         elif time > 0.0:
             self.stop()
             self.last.dwell += time
-            if self.last.dwell > MAX_DWELL:
+            if self.last.dwell > MAX_STOP_TIME:
                 raise RuntimeException(
                     f'the arm rests for {self.last.dwell:g} s, and a goal rests at most '
-                    f'{MAX_DWELL:g} s at a point; split the program here'
+                    f'{MAX_STOP_TIME:g} s at a point; split the program here'
                 )
 
     def wait(self, wait: InputWait) -> None:

@@ -5,9 +5,14 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.importing.script.collected_events import CollectedEvents, Steps
-from ur_cartesian_driver.motion.goal.goal import InputKind, InputWait, IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal.goal import (
+    InputKind,
+    InputWait,
+    IOCommand,
+    MAX_STOP_TIME,
+    OutputKind,
+)
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.planning.request.stops import MAX_DWELL
 from ur_cartesian_driver.sim.builtins.arguments import index, not_negative, within
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_values import truth, Value
@@ -30,7 +35,7 @@ class OutputFunctions:
     def sleep(self, t: Value) -> Steps:
         """Rest at the last point."""
         time = not_negative(t, 't')
-        self._controller.cycles += int(min(time, MAX_DWELL) / self._controller.cycle)
+        self._controller.cycles += int(min(time, MAX_STOP_TIME) / self._controller.cycle)
         if self._events.acts:
             self._events.rest(time)
         yield
@@ -49,7 +54,7 @@ class OutputFunctions:
         inputs = self._controller.io.digital_in
         (inputs.standard, inputs.configurable, inputs.tool)[kind][pin] = level
         self._events.wait(
-            InputWait(waypoint=0, input=kind, pin=pin, value=float(level), timeout=MAX_DWELL)
+            InputWait(waypoint=0, input=kind, pin=pin, value=float(level), timeout=MAX_STOP_TIME)
         )
         yield
 

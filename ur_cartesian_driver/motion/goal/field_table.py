@@ -10,7 +10,8 @@ decides by :class:`Form`, and so need not know any field.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, MISSING
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, MISSING, replace
 from enum import auto, Enum, IntEnum
 from functools import cache
 from math import inf, isfinite
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 
+E = TypeVar('E')
 R = TypeVar('R', 'GoalField', 'GoalColumn')
 
 
@@ -65,8 +67,13 @@ class Sent:
     after: str = ''
 
 
-#: A field that the driver fills in.
-NOT_SENT = None
+class Mark(Enum):
+    """What else a field is."""
+
+    #: The driver fills it in; messages do not have it.
+    NOT_SENT = auto()
+    #: It says something of the point where a segment ends, and not of the motion to there.
+    OF_POINT = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +98,15 @@ class Range:
         in_range: NDArray[np.bool_] = least & (values <= self.high) & np.isfinite(values)
         return in_range | (values == 0.0) if self.zero else in_range
 
-    def problem(self, value: float) -> str:
-        """Return what is wrong with a number that is out of the range, as part of a sentence."""
+    def refusal(self, value: float) -> tuple[str, str]:
+        """Return what is wrong with a number that is out of the range, and what to do."""
+        if not isfinite(value) and (self.zero or self.high == inf):
+            return f'contains {value}; every number must be finite', ''
+        return self._problem(value), self.remedy
+
+    def _problem(self, value: float) -> str:
         unit = f' {self.unit}' if self.unit else ''
         to_high = f'{self.low:g} to {self.high:g}{unit}'
-        if not isfinite(value) and (self.zero or self.high == inf):
-            return f'contains {value}; every number must be finite'
         if self.zero and self.low > 0.0:
             return f'is {value:g}{unit}, but must be 0 ({self.zero}) or from {to_high}'
         if self.zero:
@@ -135,6 +145,7 @@ class GoalField:
     default: Any
     sent: Sent
     range: Range | None
+    is_of_point: bool
 
     @property
     def after(self) -> str:
@@ -164,7 +175,7 @@ def goal_fields(kind: type) -> tuple[GoalField, ...]:
     rows = []
     for each in fields(kind):
         hint, *notes = _parts(hints[each.name])
-        if NOT_SENT in notes:
+        if Mark.NOT_SENT in notes:
             continue
         sent = next((note for note in notes if isinstance(note, Sent)), Sent())
         type_, form = _form(hint)
@@ -176,9 +187,34 @@ def goal_fields(kind: type) -> tuple[GoalField, ...]:
                 default=each.default,
                 sent=sent,
                 range=next((note for note in notes if isinstance(note, Range)), None),
+                is_of_point=Mark.OF_POINT in notes,
             )
         )
     return tuple(rows)
+
+
+@cache
+def index_fields(kind: type) -> tuple[GoalField, ...]:
+    """Return the fields of a dataclass that number points."""
+    return tuple(each for each in goal_fields(kind) if each.form is Form.INDEX)
+
+
+def points_of(event: object) -> dict[str, int]:
+    """Return the points that a dataclass of the table names, by field of the message."""
+    kind: type = type(event)
+    return {each.message_name: getattr(event, each.name) for each in index_fields(kind)}
+
+
+def renumbered(event: E, number: Callable[[int], int]) -> E:
+    """Return a dataclass of the table with other numbers of the points that it names."""
+    kind: type = type(event)
+    numbers: Any = {each.name: number(getattr(event, each.name)) for each in index_fields(kind)}
+    return replace(event, **numbers)  # type: ignore[type-var]  # a dataclass
+
+
+def shifted(event: E, points: int) -> E:
+    """Return a dataclass of the table that names points so many numbers later."""
+    return renumbered(event, lambda point: point + points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

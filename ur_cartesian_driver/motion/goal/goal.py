@@ -11,10 +11,11 @@ everybody else walks through them (:func:`~.field_table.goal_fields`).
 
 A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_table.Sent`
 where messages name or hold it otherwise, :class:`~.field_table.Range` where not every number will
-do. Schema, reading, writing, conversion of users' values to the declared types, and checks of
-ranges and enumerations follow from that. Points and segments come by the thousand, so inside they
-are columns (:mod:`~.goal_table`): ``WaypointColumns`` and ``SegmentColumns`` name the column, and
-the flat array, of each field. Rules that concern more than one field are in ``planning.request``.
+do, :class:`~.field_table.Mark` for what else it is. Schema, reading, writing, conversion of users'
+values to the declared types, and checks of ranges and enumerations follow from that. Points and
+segments come by the thousand, so inside they are columns (:mod:`~.goal_table`):
+``WaypointColumns`` and ``SegmentColumns`` name the column, and the flat array, of each field.
+Rules that concern more than one field are in ``planning.request``.
 
 A new number of a segment: declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment`` and
 ``SegmentColumns``, and honour it where the motion is planned. Paths take it by its name, as
@@ -43,7 +44,7 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
-from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, NOT_SENT, Range, Sent
+from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, Mark, Range, Sent
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
@@ -158,6 +159,8 @@ DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
 #: The longest rest and time-out at a point; longer ones are mistakes [s].
 MAX_STOP_TIME = 600.0
+#: The longest time between a point and an output that it switches [s].
+MAX_OUTPUT_OFFSET = 60.0
 
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
 FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
@@ -226,9 +229,9 @@ class Segment:
 
     type: SegmentType = SegmentType.AUTO
     #: Distance from the waypoint at which both segments are left [m].
-    blend_radius: Annotated[float, NOT_NEGATIVE] = 0.0
+    blend_radius: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: How long the arm rests at the waypoint [s].
-    dwell: Annotated[float, NOT_NEGATIVE] = 0.0
+    dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: 0 = from the times, else the default.
     velocity: Annotated[float, NOT_NEGATIVE] = 0.0
     acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
@@ -238,9 +241,9 @@ class Segment:
     arc_mode: ArcMode = ArcMode.UNCONSTRAINED
     #: About which axis the driver may turn the waypoint's pose, from ``free_min`` to ``free_max``
     #: [rad]; both 0 = by any angle.
-    free_axis: FreeAxis = FreeAxis.NONE
-    free_min: Annotated[float, FINITE] = 0.0
-    free_max: Annotated[float, FINITE] = 0.0
+    free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
+    free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
+    free_max: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -275,7 +278,7 @@ class IOCommand:
     offset: Annotated[
         float,
         Sent(form=Form.DURATION, always=False, after='domain'),
-        Range(0.0, 60.0, 's', 'name another point'),
+        Range(0.0, MAX_OUTPUT_OFFSET, 's', 'name another point'),
     ]
     output: OutputKind
     pin: int
@@ -431,11 +434,11 @@ class Goal:
     #: The frame that is moved, as the goal calls it, and where it is behind the flange; None = it
     #: is the robot's active TCP.
     controlled_frame: Annotated[str, Sent(name='trajectory.controlled_frame')] = ''
-    T_flange_controlled: Annotated[Pose | None, NOT_SENT] = None
+    T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
     #: The frame of the goal in the robot's base.
-    T_base_frame: Annotated[Pose, NOT_SENT] = IDENTITY
+    T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
     #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
-    age: Annotated[float | None, NOT_SENT] = None
+    age: Annotated[float | None, Mark.NOT_SENT] = None
     path_tolerance: Tolerance = Tolerance()
     goal_tolerance: Tolerance = Tolerance()
     #: How much later than planned the end may come [s]: 0 = the default, negative = without end.

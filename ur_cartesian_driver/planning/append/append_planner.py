@@ -466,7 +466,12 @@ class _PartPlanner:
             waypoint = max(command.waypoint, segments[0].waypoint)
             offset = max(0.0, time - ends[waypoint])
             commands.append(replace(command, waypoint=waypoint, offset=offset))
-        found = place_outputs(PlannedRows.of(segments), reference, commands, start_time=start_time)
+        found = place_outputs(
+            PlannedRows.of(segments),
+            reference,
+            {'io_commands': commands},
+            start_time=start_time,
+        )
         segments = [
             replace(segment, waypoint=piece.waypoint, report_line=piece.report_line)
             for segment, piece in zip(found, pieces, strict=True)

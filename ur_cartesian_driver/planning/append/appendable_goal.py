@@ -13,6 +13,7 @@ import numpy as np
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints
+from ur_cartesian_driver.motion.goal.field_table import shifted
 from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.goal.goal_table import (
     goal_table,
@@ -23,10 +24,11 @@ from ur_cartesian_driver.motion.goal.goal_table import (
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.field_rules import check_record
 from ur_cartesian_driver.planning.request.free_axis_rules import keep_open_error
 from ur_cartesian_driver.planning.request.goal_fields import point_field
-from ur_cartesian_driver.planning.request.io_commands import check_outputs
-from ur_cartesian_driver.planning.request.stops import refuse_dwells_of_open_goals
+from ur_cartesian_driver.planning.request.point_events.dwells import refuse_dwells_of_open_goals
+from ur_cartesian_driver.planning.request.point_events.registry import check_outputs
 from ur_cartesian_driver.planning.request.validate import check_list_lengths
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
@@ -148,6 +150,7 @@ def check_appended_points(
                 f'request are {first} to {first + count - 1}',
                 'name one of these',
             )
+        check_record(f'io_commands[{i}]', command)
     # The commands alone: the plan numbers them behind older ones.
     check_outputs(
         goal_table(
@@ -164,9 +167,7 @@ def check_appended_points(
 
 def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
     """Return the appended commands, with waypoints counted from a point."""
-    return tuple(
-        replace(command, waypoint=command.waypoint - first) for command in appended.io_commands
-    )
+    return tuple(shifted(command, -first) for command in appended.io_commands)
 
 
 def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:

@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
-from ur_cartesian_driver.planning.request.number_rules import check_finite
+from ur_cartesian_driver.planning.request.field_rules import check_finite
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 #: Pieces are not cut into shorter ones [s]: a cycle of the slowest controllers.

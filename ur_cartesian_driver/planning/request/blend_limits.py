@@ -3,7 +3,7 @@
 """
 The bounds of a blend radius: both blends of a segment fit into it, and the wire carries it.
 
-A negative radius is refused by :mod:`~.number_rules`, one in a spline by :mod:`~.spline_rules`.
+A negative radius is refused by :mod:`~.field_rules`, one in a spline by :mod:`~.spline_rules`.
 """
 
 from __future__ import annotations

@@ -34,9 +34,9 @@ def point_field(index: int, field: str = '') -> str:
     return f'trajectory.points[{index}]' + (f'.{field}' if field else '')
 
 
-def segment_field(index: int, field: str) -> str:
+def segment_field(index: int, field: str = '') -> str:
     """Return the name of a segment's field as in the message."""
-    return f'segments[{index}].{field}'
+    return f'segments[{index}]' + (f'.{field}' if field else '')
 
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:

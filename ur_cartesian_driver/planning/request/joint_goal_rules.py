@@ -28,8 +28,8 @@ from ur_cartesian_driver.motion.goal.joint_goal import (
 )
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.field_rules import check_finite
 from ur_cartesian_driver.planning.request.goal_fields import point_field
-from ur_cartesian_driver.planning.request.number_rules import check_finite
 from ur_cartesian_driver.planning.request.spline_rules import (
     MAX_ACCELERATION,
     MAX_TWIST,

@@ -16,53 +16,27 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
     type_table,
 )
-
-#: Largest limit [m], as that of the controller's own offsets by default; speed [m/s], acceleration
-#: [m/s^2], timeout [s].
-MAX_LIMIT = 0.1
-MAX_SPEED, MAX_ACCELERATION, MAX_TIMEOUT = 0.1, 2.0, 60.0
+from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 
 
 def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse offsets that are out of bounds, or not possible.
+    Refuse offsets that are not possible.
 
-    :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode, or the robot, cannot offset the path.
+    :raises InvalidGoal: they are all 0.
+    :raises NotAvailable: the robot cannot offset the path of the goal.
     """
     wanted = goal.path_offset
     if wanted == PathOffset():
         return
-    for axis, limit in zip('xyz', wanted.limits, strict=True):
-        if not 0.0 <= limit <= MAX_LIMIT:  # NaN neither
-            raise InvalidGoal(
-                f'path_offset.limits.{axis}', f'is {limit:g} m, outside 0 to {MAX_LIMIT:g} m'
-            )
-    for name, unit, bound in (
-        ('speed', 'm/s', MAX_SPEED),
-        ('acceleration', 'm/s^2', MAX_ACCELERATION),
-        ('timeout', 's', MAX_TIMEOUT),
-    ):
-        value = getattr(wanted, name)
-        if not 0.0 <= value <= bound:
-            raise InvalidGoal(
-                f'path_offset.{name}', f'is {value:g} {unit}, outside 0 to {bound:g} {unit}'
-            )
     if not wanted:
         raise InvalidGoal(
             'path_offset.limits',
             'are all 0, so that the path does not give way',
             'set one, or leave path_offset empty',
         )
-    mode = resolve_execution_mode(goal)
-    if not mode.traits.takes_offsets:
-        raise NotAvailable(
-            'path_offset',
-            f'is set, but in a {mode.name} goal the robot program leads the joints along their '
-            'spline, and would bring an offset back at once',
-            'set execution to PRIMITIVES or SERVO',
-        )
-    if not mode.traits.streams_setpoints:
+    check_mode(goal, GOAL_RULES['path_offset'])
+    if not resolve_execution_mode(goal).traits.streams_setpoints:
         _check_controller_offsets(goal, options)
     if goal.keep_open:
         raise NotAvailable(

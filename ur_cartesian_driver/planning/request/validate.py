@@ -43,6 +43,11 @@ from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
+from ur_cartesian_driver.planning.request.field_rules import (
+    check_fields,
+    check_finite,
+    check_frames,
+)
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_optimized,
@@ -54,21 +59,10 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
     STRAIGHT_TYPES,
 )
-from ur_cartesian_driver.planning.request.io_commands import check_outputs
-from ur_cartesian_driver.planning.request.number_rules import (
-    check_enums,
-    check_finite,
-    check_frame_numbers,
-    check_min_speed_fraction,
-    check_point_numbers,
-    check_replace_horizon,
-    check_segment_numbers,
-    check_tolerance_numbers,
-)
+from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 from ur_cartesian_driver.planning.request.path_offset import check_path_offset
-from ur_cartesian_driver.planning.request.presses import check_presses
+from ur_cartesian_driver.planning.request.point_events.registry import check_outputs, check_stops
 from ur_cartesian_driver.planning.request.spline_rules import check_spline
-from ur_cartesian_driver.planning.request.stops import check_stops
 
 #: How far in the future a stamp may be [s].
 MAX_STAMP_AHEAD = 60.0
@@ -133,20 +127,43 @@ def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
     check_stamp(goal.age, options)
 
 
+def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse demands that need a whole path, or a path to which points are appended."""
+    fraction, horizon = goal.min_speed_fraction, goal.replace_horizon
+    if fraction and goal.keep_open:
+        raise InvalidGoal(
+            'min_speed_fraction',
+            f'is {fraction:g}, but the points of a goal with keep_open are not all known',
+            'set it to 0, or send the whole path',
+        )
+    if horizon and not goal.keep_open:
+        raise InvalidGoal(
+            'replace_horizon',
+            f'is {horizon:g} s, but only points of a goal with keep_open can be replaced',
+            'set keep_open',
+        )
+    check_mode(goal, GOAL_RULES['replace_horizon'])
+
+
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
     mode = resolve_execution_mode(goal)
-    if (
-        goal.keep_open
-        and not mode.traits.streams_setpoints
-        and not options.dialect.supports_append
-    ):
+    if goal.keep_open and not (mode.traits.streams_setpoints or options.dialect.supports_append):
         raise NotAvailable(
             'keep_open',
             f'is set, but a robot program of wire dialect {options.dialect.name} needs the '
             'number of points at the start',
             'send all points at once, or use a robot program of wire dialect 2.14',
         )
-    _can_stall(goal, options)
+    check_mode(goal, GOAL_RULES['on_path_tolerance'])
+    tolerance = apply_default_tolerances(goal, options).path_tolerance
+    limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
+    is_limited = max((*limits, *tolerance.acceleration)) > 0.0
+    if goal.on_path_tolerance == OnPathTolerance.STALL and not is_limited:
+        raise InvalidGoal(
+            'path_tolerance',
+            'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
+            'set a limit, or on_path_tolerance to ABORT',
+        )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
@@ -154,27 +171,6 @@ def _supported(goal: GoalTable, options: PlanningOptions) -> None:
             'trajectory.controlled_frame',
             f"is '{goal.controlled_frame}', but T_flange_controlled is not set",
             'set it to the pose of this frame in the flange, or leave controlled_frame empty',
-        )
-
-
-def _can_stall(goal: GoalTable, options: PlanningOptions) -> None:
-    if goal.on_path_tolerance != OnPathTolerance.STALL:
-        return
-    mode = resolve_execution_mode(goal)
-    if not mode.traits.streams_setpoints:
-        raise NotAvailable(
-            'on_path_tolerance',
-            f'is STALL, but the robot runs a {mode.name} goal by itself and does not wait on its '
-            'path',
-            'set execution to SERVO, or on_path_tolerance to ABORT',
-        )
-    tolerance = apply_default_tolerances(goal, options).path_tolerance
-    limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
-    if max((*limits, *tolerance.acceleration)) <= 0.0:
-        raise InvalidGoal(
-            'path_tolerance',
-            'limits nothing, so that the arm is never off its path; on_path_tolerance is STALL',
-            'set a limit, or on_path_tolerance to ABORT',
         )
 
 
@@ -257,13 +253,9 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
 #: All rules, in order: later ones rely on what earlier ones made sure of.
 RULES: tuple[Rule, ...] = (
     _number_of_points,
-    check_enums,
-    check_frame_numbers,
-    check_point_numbers,
-    check_segment_numbers,
-    check_tolerance_numbers,
-    check_min_speed_fraction,
-    check_replace_horizon,
+    check_fields,
+    check_frames,
+    _keep_open,
     _measurable_tolerances,
     _stamp,
     _supported,
@@ -274,7 +266,6 @@ RULES: tuple[Rule, ...] = (
     _postures,
     check_blends,
     check_stops,
-    check_presses,
     check_path_offset,
     _motions,
 )

@@ -36,11 +36,11 @@ from ur_cartesian_driver.planning.preflight.start_checks import check_approach, 
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
 from ur_cartesian_driver.planning.request.goal_fields import point_field
-from ur_cartesian_driver.planning.request.io_commands import add_safe_outputs
 from ur_cartesian_driver.planning.request.joint_goal_rules import (
     check_joint_goal,
     CheckedJointGoal,
 )
+from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_safe_outputs
 from ur_cartesian_driver.planning.request.validate import check_measurable_tolerances
 from ur_cartesian_driver.planning.spline.joint_polynomials import to_ticks
 from ur_cartesian_driver.planning.spline.spline_limits import (

@@ -1,0 +1,89 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What execution modes cannot do: a row for each field that needs a trait of the mode."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ur_cartesian_driver.motion.errors import NotAvailable
+from ur_cartesian_driver.motion.goal.execution_modes import EXECUTION_MODES, ModeTraits
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRule:
+    """A field that not every execution mode can honour."""
+
+    field: str
+    #: Which modes can.
+    is_able: Callable[[ModeTraits], bool]
+    #: Why the others cannot: a clause with ``{mode}`` and ``{value}``.
+    problem: str
+    #: What to do besides choosing another mode.
+    remedy: str = ''
+
+
+def only_rests(field: str) -> ModeRule:
+    """Return the row of something that is done where the arm stops."""
+    return ModeRule(
+        field,
+        lambda traits: not traits.streams_setpoints,
+        'is not empty, but {mode} does nothing at points but rest',
+    )
+
+
+def switches_nothing(field: str) -> ModeRule:
+    """Return the row of an output that is switched while the arm moves."""
+    return ModeRule(
+        field,
+        lambda traits: traits.switches_outputs,
+        'is not empty, but {mode} switches no outputs',
+    )
+
+
+#: Of the goal as a whole, by field; those of what happens at points are in ``point_events``.
+GOAL_RULES = {
+    rule.field: rule
+    for rule in (
+        ModeRule(
+            'replace_horizon',
+            lambda traits: traits.is_spline,
+            'is {value:g} s, but motions of the robot, which {mode} sends, cannot be planned from '
+            'the middle of a motion',
+        ),
+        ModeRule(
+            'on_path_tolerance',
+            lambda traits: traits.streams_setpoints,
+            'is STALL, but the robot runs a {mode} goal by itself and does not wait on its path',
+            ', or on_path_tolerance to ABORT',
+        ),
+        ModeRule(
+            'path_offset',
+            lambda traits: traits.takes_offsets,
+            'is set, but in a {mode} goal the robot program leads the joints along their spline, '
+            'and would bring an offset back at once',
+        ),
+    )
+}
+
+
+def check_mode(goal: GoalTable, rule: ModeRule | None) -> None:
+    """
+    Refuse a field that the execution mode of a goal cannot honour.
+
+    :param rule: its row; None = all modes can.
+    :raises NotAvailable: names the field, and the modes that can.
+    """
+    if rule is None or not (value := getattr(goal, rule.field)):
+        return
+    mode = resolve_execution_mode(goal)
+    if not rule.is_able(mode.traits):
+        able = [each.name for each, traits in EXECUTION_MODES.items() if rule.is_able(traits)]
+        raise NotAvailable(
+            rule.field,
+            rule.problem.format(mode=mode.name, value=value),
+            f'set execution to {" or ".join(able)}{rule.remedy}',
+        )

@@ -1,0 +1,85 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The rest of a goal that was stopped, as far as it matters to what happens at its points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from ur_cartesian_driver.motion.goal.field_table import points_of, renumbered
+
+E = TypeVar('E')
+
+#: A smaller part of a segment is nothing.
+NO_FRACTION = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalRest:
+    """
+    The points of a resumed goal on the path of the goal that was stopped.
+
+    A place on that path counts segments: ``k + u`` is on the segment to point k, at the fraction u
+    of it.
+    """
+
+    #: Where the path is resumed, some way before the arm was stopped.
+    begin: float
+    stopped: float
+    #: Where the points of the resumed goal are.
+    places: Sequence[float]
+    #: How long before ``begin`` the tool passed a waypoint [s], for the field and the value of an
+    #: offset from there; not known beyond that.
+    time_since: Callable[[int, str, float], float]
+
+    @property
+    def first(self) -> int:
+        """The number of the point where the path is resumed, or of the first one behind."""
+        return max(sum(place <= self.begin + NO_FRACTION for place in self.places) - 1, 0)
+
+    def is_passed(self, waypoint: int) -> bool:
+        """Tell whether the path is resumed at or behind a waypoint."""
+        return waypoint + 1.0 <= self.begin + NO_FRACTION
+
+    def index(self, waypoint: int) -> int:
+        """Return the number that a waypoint has in the resumed goal."""
+        places = self.places
+        return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
+
+    def ahead(self, events: Sequence[E]) -> list[E]:
+        """Return the events whose points are all left, with their new numbers."""
+        return [
+            renumbered(event, self.index)
+            for event in events
+            if not any(map(self.is_passed, points_of(event).values()))
+        ]
+
+    def with_last(self, events: Sequence[E]) -> list[E]:
+        """Return those ahead, and those of the last point before, where the path is resumed."""
+        first, left = self.first, self.ahead(events)
+        passed = [event for event in events if self.is_passed(*points_of(event).values())]
+        if not passed or self.places[first] > self.begin + NO_FRACTION:  # no need to stop there
+            return left
+        last = max(point for event in passed for point in points_of(event).values())
+        again = [event for event in passed if last in points_of(event).values()]
+        return [*(renumbered(event, lambda _: first) for event in again), *left]
+
+    def stretches(self, events: Sequence[E], begun: Callable[[E], E]) -> list[E]:
+        """
+        Return what holds between two points on the rest of the path.
+
+        :param begun: makes of one that has begun before what it is from here on.
+        """
+        left = []
+        for event in events:
+            first, last = points_of(event).values()
+            if self.is_passed(last):
+                continue
+            begin = self.first if self.is_passed(first) else self.index(first)
+            if begin < self.index(last):
+                numbers = {first: begin, last: self.index(last)}
+                event = begun(event) if self.is_passed(first) else event
+                left.append(renumbered(event, numbers.__getitem__))
+        return left

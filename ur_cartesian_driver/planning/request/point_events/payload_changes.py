@@ -1,0 +1,46 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of the payload, where the arm stops at a point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal.goal import PayloadChange
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.primitive import ChangePayload
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.mode_rules import only_rests
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
+
+#: A centre of gravity that is farther from the flange is a mistake [m].
+MAX_OFFSET = 5.0
+
+
+class PayloadChanges(PointEvent[PayloadChange]):
+    """Payloads that the robot program sets."""
+
+    field = 'payload_changes'
+    mode_rule = only_rests('payload_changes')
+
+    def check_event(self, where: str, change: PayloadChange) -> None:
+        """Refuse a centre of gravity that cannot be meant."""
+        if not all(isfinite(x) and abs(x) <= MAX_OFFSET for x in change.center_of_gravity):
+            raise InvalidGoal(
+                f'{where}.center_of_gravity',
+                f'contains a number beyond {MAX_OFFSET:g} m',
+                'give it in metres, in the flange frame',
+            )
+
+    def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
+        """Yield the changes."""
+        for change in goal.payload_changes:
+            stop = ChangePayload(mass=change.mass, center_of_gravity=change.center_of_gravity)
+            yield PlacedStop(change.waypoint, stop, f'sets a payload of {change.mass:g} kg there')
+
+    def left(self, events: Sequence[PayloadChange], rest: GoalRest) -> Sequence[PayloadChange]:
+        """Return those ahead, and the payload that holds where the path is resumed."""
+        return rest.with_last(events)

@@ -1,0 +1,105 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The interface of what happens at the points of a goal.
+
+A kind of event is a subclass with an instance in the registry. What it needs in a goal, in
+messages and files is a dataclass of the table of the goal
+(:mod:`~ur_cartesian_driver.motion.goal.goal`); its fields are checked by their ranges before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Generic, TypeVar
+
+from ur_cartesian_driver.kinematics.robot_models import RobotModel
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.pose import Pose
+from ur_cartesian_driver.motion.goal.field_table import points_of
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.primitive import Stop
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.mode_rules import ModeRule
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+
+E = TypeVar('E')
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedStop:
+    """What the robot program does at a waypoint where the arm stands, and a note on it."""
+
+    waypoint: int
+    stop: Stop
+    note: str = ''
+    #: The order among those at one waypoint; of the same number they keep that of the registry.
+    order: int = 0
+
+
+def check_point(field: str, waypoint: int, goal: GoalTable) -> None:
+    """
+    Refuse the number of a point that is none.
+
+    :raises InvalidGoal: names the field, and the points.
+    """
+    if not 0 <= waypoint < len(goal.waypoints):
+        raise InvalidGoal(
+            field,
+            f'is {waypoint}, but the points are 0 to {len(goal.waypoints) - 1}',
+            'name one of these',
+        )
+
+
+class PointEvent(Generic[E]):
+    """One kind of event."""
+
+    #: The field of the goal.
+    field: ClassVar[str]
+    #: Which execution modes have it; None = all.
+    mode_rule: ClassVar[ModeRule | None] = None
+
+    def of(self, goal: Goal) -> Sequence[E]:
+        """Return the events of a goal."""
+        events: Sequence[E] = getattr(goal, self.field)
+        return events
+
+    def places(self, goal: GoalTable) -> Iterator[tuple[str, int]]:
+        """Yield the points that the events name, each with the field that does."""
+        for i, event in enumerate(self.of(goal)):
+            for name, point in points_of(event).items():
+                yield f'{self.field}[{i}].{name}', point
+
+    def check(self, goal: GoalTable, options: PlanningOptions) -> None:
+        """
+        Check the events of a goal, beyond the range of each number.
+
+        :raises GoalRefused: a subclass; its text names field, value and bound.
+        """
+        for i, event in enumerate(self.of(goal)):
+            self.check_event(f'{self.field}[{i}]', event)
+
+    def check_event(self, where: str, event: E) -> None:
+        """
+        Check what an event says by itself; ``where`` is its name.
+
+        :raises InvalidGoal: names field, value and bound.
+        """
+
+    def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
+        """
+        Refuse what the robot of the goal cannot do.
+
+        :param T_tcp_controlled: the controlled frame behind the TCP of the motion.
+        :raises NotAvailable: names the field and the reason.
+        """
+
+    def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
+        """Yield what the robot program does where the arm stands."""
+        yield from ()
+
+    def left(self, events: Sequence[E], rest: GoalRest) -> Sequence[E]:
+        """Return the events that are left of a goal after a stop."""
+        return rest.ahead(events)

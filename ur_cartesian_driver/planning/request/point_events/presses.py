@@ -1,0 +1,208 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Presses: the controller's force mode from one point to another, at both of which the arm stops.
+
+The path is planned as if nothing gave way. What gives way while it runs is for the monitor
+(``execution.monitoring.press_window``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from ur_cartesian_driver.kinematics.robot_models import RobotModel
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.geometry.vectors import vector6
+from ur_cartesian_driver.motion.goal.goal import (
+    ContactEnd,
+    Press,
+    PRESS_AXES,
+    PressFrame,
+    SegmentType,
+)
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.primitive import BeginPress, EndPress, PressLaw
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import segment_field
+from ur_cartesian_driver.planning.request.mode_rules import ModeRule
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
+
+#: Of axes along which the tool moves, and about which it turns: the largest forces [N] and torques
+#: [Nm], and speeds of compliant axes [m/s], [rad/s]; more are mistakes.
+MAX_FORCES, MAX_SPEEDS = (200.0, 30.0), (0.25, 1.0)
+#: Speeds of compliant axes, and deviations of the others [m], [rad], where the goal gives none.
+DEFAULT_SPEEDS, DEFAULT_DEVIATIONS = (0.05, 0.2), (0.005, 0.05)
+_UNITS = (('N', 'm/s'), ('Nm', 'rad/s'))
+
+
+def is_turn(axis: str) -> bool:
+    """Tell whether an axis is one about which the tool turns."""
+    return axis.startswith('r')
+
+
+class Presses(PointEvent[Press]):
+    """Parts of the path on which the tool gives way."""
+
+    field = 'presses'
+    mode_rule = ModeRule(
+        'presses',
+        lambda traits: not traits.is_spline,
+        'is not empty, but {mode} follows joint positions, which do not give way',
+    )
+
+    def check(self, goal: GoalTable, options: PlanningOptions) -> None:
+        """Refuse presses at the same time, and arcs that begin where one has brought the tool."""
+        super().check(goal, options)
+        for i, press in enumerate(goal.presses):
+            field = f'presses[{i}]'
+            if any(
+                press.first_waypoint < other.last_waypoint
+                and other.first_waypoint < press.last_waypoint
+                for other in goal.presses[:i]
+            ):
+                raise InvalidGoal(
+                    f'{field}.first_point',
+                    f'is {press.first_waypoint}, where another press has begun and not ended',
+                    'let one end where the other begins',
+                )
+            after = press.last_waypoint + 1
+            if after < len(goal.waypoints) and goal.motions.types[after] == SegmentType.CIRCULAR:
+                raise InvalidGoal(
+                    segment_field(after, 'type'),
+                    f'is CIRCULAR, but it begins where {field} has brought the tool, which makes '
+                    'another arc of it',
+                    'lead the tool back by a LINEAR segment first',
+                )
+
+    def check_event(self, where: str, press: Press) -> None:
+        """Refuse what force mode cannot do."""
+        if not press.first_waypoint < press.last_waypoint:
+            raise InvalidGoal(
+                f'{where}.last_point',
+                f'is {press.last_waypoint}, not behind first_point = {press.first_waypoint}',
+            )
+        axes = press.axes
+        for k, axis in enumerate(axes):
+            if axis not in PRESS_AXES or axis in axes[:k]:
+                raise InvalidGoal(
+                    f'{where}.axes[{k}]',
+                    f"is '{axis}'; the axes are {', '.join(PRESS_AXES)}, each at most once",
+                )
+        if not axes and press.contact is ContactEnd.NONE:
+            raise InvalidGoal(
+                f'{where}.axes',
+                'is empty, and contact is NONE, so that it does nothing',
+                'name axes',
+            )
+        if len(press.forces) != len(axes):
+            raise InvalidGoal(
+                f'{where}.forces', f'has {len(press.forces)} entries for {len(axes)} axes'
+            )
+        if len(press.speed_limits) not in (0, len(axes)):
+            raise InvalidGoal(
+                f'{where}.speed_limits',
+                f'has {len(press.speed_limits)} entries for {len(axes)} axes',
+                'give one for each, or none for the defaults',
+            )
+        for k, axis in enumerate(axes):
+            force_unit, speed_unit = _UNITS[is_turn(axis)]
+            bound = MAX_FORCES[is_turn(axis)]
+            if not abs(press.forces[k]) <= bound:  # NaN neither
+                raise InvalidGoal(
+                    f'{where}.forces[{k}]',
+                    f'is {press.forces[k]:g} {force_unit}, outside -{bound:g} to {bound:g}',
+                )
+            speed, bound = _speed_limit(press, k), MAX_SPEEDS[is_turn(axis)]
+            if not 0.0 < speed <= bound:
+                raise InvalidGoal(
+                    f'{where}.speed_limits[{k}]',
+                    f'is {speed:g} {speed_unit}; it must be more than 0, and at most {bound:g}',
+                )
+
+    def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
+        """Refuse what a CB3 cannot do, and the axes of a tool that is not the robot's TCP."""
+        for i, press in enumerate(goal.presses):
+            for name, is_set in (
+                ('zero_sensor', press.zero_sensor),
+                ('gain_scaling', press.gain_scaling != 1.0),
+            ):
+                if is_set and model.series == 'CB3':
+                    raise NotAvailable(
+                        f'presses[{i}].{name}',
+                        f'is set, but a {model.name} has no force sensor and no gain of force '
+                        'mode',
+                        'leave it out',
+                    )
+            if press.frame is PressFrame.TOOL and T_tcp_controlled != IDENTITY:
+                raise NotAvailable(
+                    f'presses[{i}].frame',
+                    "is TOOL, but the controlled frame is not the robot's TCP, to which force "
+                    'mode belongs',
+                    'name another frame, or set allow_tcp_change to true',
+                )
+
+    def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
+        """Yield where force mode ends and begins; at one point it ends first."""
+        for press in goal.presses:
+            yield PlacedStop(press.last_waypoint, EndPress(), 'ends to press there', order=-1)
+            for record, note in press_records(press, goal.T_base_frame):
+                yield PlacedStop(press.first_waypoint, record, note, order=2)
+
+    def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
+        """Return those ahead, and the one that has begun; its sensor was zeroed in free air."""
+        return rest.stretches(
+            events,
+            begun=lambda press: replace(press, zero_sensor=False) if press.zero_sensor else press,
+        )
+
+
+def press_records(press: Press, T_base_frame: Pose) -> Iterator[tuple[PressLaw | BeginPress, str]]:
+    """Yield the records with which a press begins, with notes for the report."""
+    wrench, limits = [0.0] * 6, []
+    for k, axis in enumerate(PRESS_AXES):
+        if axis in press.axes:
+            at = press.axes.index(axis)
+            wrench[k] = press.forces[at]
+            limits.append(_speed_limit(press, at))
+        else:
+            given = press.max_deviation_angle if is_turn(axis) else press.max_deviation
+            limits.append(given or DEFAULT_DEVIATIONS[is_turn(axis)])
+    law = PressLaw(
+        wrench=vector6(wrench),
+        limits=vector6(limits),
+        damping=press.damping,
+        gain_scaling=press.gain_scaling,
+        zero_sensor=press.zero_sensor,
+        contact=press.contact,
+    )
+    begin = BeginPress(
+        T_base_task=T_base_frame if press.frame is PressFrame.GOAL else IDENTITY,
+        compliant=vector6(float(axis in press.axes) for axis in PRESS_AXES),
+        follows_tool=press.frame is PressFrame.TOOL,
+    )
+    yield law, ''
+    yield begin, _note(press)
+
+
+def _note(press: Press) -> str:
+    what = ' and '.join(
+        f'{force:g} {_UNITS[is_turn(axis)][0]} {"about" if is_turn(axis) else "along"} {axis[-1]}'
+        for axis, force in zip(press.axes, press.forces, strict=True)
+    )
+    pressing = f'presses with {what} of the {press.frame.name.lower()} frame' if what else 'goes'
+    end = {
+        ContactEnd.NONE: '',
+        ContactEnd.ENDS: ', or until the tool touches',
+        ContactEnd.REQUIRED: ', where the tool must have touched before',
+    }[press.contact]
+    return f'{pressing} from there to point {press.last_waypoint}{end}'
+
+
+def _speed_limit(press: Press, k: int) -> float:
+    if press.speed_limits:
+        return press.speed_limits[k]
+    return DEFAULT_SPEEDS[is_turn(press.axes[k])]

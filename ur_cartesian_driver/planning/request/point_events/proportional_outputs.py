@@ -1,0 +1,155 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Analog outputs that follow the speed of the tool from one point to another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal.goal import OutputKind, ProportionalOutput
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.primitive import SpeedLaw, SwitchOutput
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.mode_rules import switches_nothing
+from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
+from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
+from ur_cartesian_driver.planning.request.point_events.timed_path import (
+    PlacedOutput,
+    SAME_TIME,
+    TimedPath,
+)
+
+
+class ProportionalOutputs(OutputEvent[ProportionalOutput]):
+    """Parts of the path on which an output follows the speed."""
+
+    field = 'proportional_outputs'
+    mode_rule = switches_nothing('proportional_outputs')
+    cannot = 'have none'
+
+    def check(self, goal: GoalTable, options: PlanningOptions) -> None:
+        """Refuse two that drive one output at a time, and a command to it meanwhile."""
+        super().check(goal, options)
+        if goal.proportional_outputs and goal.keep_open:
+            raise NotAvailable(
+                self.field, 'is not empty, but the goal has keep_open', 'send all points at once'
+            )
+        points = len(goal.waypoints)
+        for i, output in enumerate(goal.proportional_outputs):
+            field, first, last = f'{self.field}[{i}]', output.first_waypoint, output.last_waypoint
+            if not 0 <= first < last < points:
+                raise InvalidGoal(
+                    f'{field}.last_point',
+                    f'is {last} and first_point {first}, but they must follow each other within '
+                    f'the points 0 to {points - 1}',
+                )
+            if any(
+                output.pin == other.pin
+                and first < other.last_waypoint
+                and other.first_waypoint < last
+                for other in goal.proportional_outputs[:i]
+            ):
+                raise InvalidGoal(
+                    f'{field}.pin',
+                    f'is {output.pin}, which another entry uses on the same points',
+                    'let one end where the other begins',
+                )
+            for k, command in enumerate(goal.io_commands):
+                is_same = (command.output, command.pin) == (OutputKind.STANDARD_ANALOG, output.pin)
+                if is_same and first <= command.waypoint < last:
+                    raise InvalidGoal(
+                        f'io_commands[{k}].pin',
+                        f'is {command.pin}, but that standard analog output follows the speed '
+                        f'from point {first} to point {last}',
+                        'use the other one, or end it before',
+                    )
+
+    def check_event(self, where: str, output: ProportionalOutput) -> None:
+        """Refuse bounds between which there is nothing."""
+        if not output.minimum < output.maximum:
+            raise InvalidGoal(
+                f'{where}.maximum',
+                f'is {output.maximum:g}, not more than minimum = {output.minimum:g}',
+                'set it to 1 for the whole range',
+            )
+
+    def left(
+        self, events: Sequence[ProportionalOutput], rest: GoalRest
+    ) -> Sequence[ProportionalOutput]:
+        """Return those ahead, and the one that has begun, which begins at once."""
+        return rest.stretches(events, begun=lambda output: replace(output, begin_lead=0.0))
+
+    def place(self, output: ProportionalOutput, field: str, path: TimedPath) -> list[PlacedOutput]:
+        """Return where the output begins to follow the speed, and where it ends."""
+        switch = SwitchOutput(
+            output=OutputKind.STANDARD_ANALOG,
+            pin=output.pin,
+            value=output.idle,
+            domain=output.domain,
+        )
+        law = SpeedLaw(
+            gain=output.gain,
+            offset=output.offset,
+            minimum=output.minimum,
+            maximum=output.maximum,
+            filter_time=output.filter_time,
+        )
+        name = f'standard analog output {output.pin}'
+        begin = _ahead(
+            # A value that is not 0: a stop does not carry it out.
+            replace(switch, value=1.0, follows_speed=True),
+            (output.first_waypoint, output.begin_lead, f'{field}.begin_lead'),
+            path,
+            f'{name} follows the speed',
+        )
+        end = _ahead(
+            switch,
+            (output.last_waypoint, output.end_lead, f'{field}.end_lead'),
+            path,
+            f'{name} follows it no more',
+        )
+        if end.time <= begin.time:
+            raise InvalidGoal(
+                f'{field}.end_lead',
+                f'is {output.end_lead:g} s, so the output would end before it begins',
+                'reduce it',
+            )
+        return [replace(begin, records=(law, *begin.records)), end]
+
+
+def _ahead(
+    record: SwitchOutput, at: tuple[int, float, str], path: TimedPath, what: str
+) -> PlacedOutput:
+    """
+    Return a record placed some time before a point.
+
+    :param at: the waypoint, the time before it [s], and the field that says so.
+    """
+    waypoint, lead, field = at
+    row = path.row(waypoint)
+    if row is None:
+        raise InvalidGoal(
+            field.rpartition('.')[0],
+            f'names point {waypoint}, but no motion leads there: the robot is already there',
+            'begin at the next point',
+        )
+    end = float(path.ends[row])
+    if lead <= SAME_TIME:
+        after, time, where = row, path.at_point(row), path.where(row)
+    else:
+        after, time, where = path.last_returned(end - lead), end - lead, f'{lead:.3f} s before it'
+        if after < 0:
+            raise InvalidGoal(
+                field,
+                f'is {lead:g} s, but no motion has ended so long before point {waypoint}',
+                'reduce it, or add a point before',
+            )
+    return PlacedOutput(
+        time=end if time is None else time,
+        after_index=after,
+        report_index=row,
+        records=(path.triggered(record, time, after),),
+        text=f'{what}, {where}',
+    )

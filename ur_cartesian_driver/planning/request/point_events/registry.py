@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The registry of what happens at points: a row for each kind, its checks, and what a plan needs.
+
+A new kind is a dataclass in the table of the goal, a module here, and a row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal.field_table import goal_fields, index_fields
+from ur_cartesian_driver.motion.goal.goal import Goal
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.field_rules import check_record
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_spline,
+    is_timed,
+    resolve_execution_mode,
+)
+from ur_cartesian_driver.planning.request.mode_rules import check_mode
+from ur_cartesian_driver.planning.request.point_events.dwells import (
+    Dwells,
+    refuse_dwells_of_open_goals,
+)
+from ur_cartesian_driver.planning.request.point_events.input_waits import InputWaits
+from ur_cartesian_driver.planning.request.point_events.output_event import OutputEvent
+from ur_cartesian_driver.planning.request.point_events.payload_changes import PayloadChanges
+from ur_cartesian_driver.planning.request.point_events.point_event import check_point, PointEvent
+from ur_cartesian_driver.planning.request.point_events.presses import Presses
+from ur_cartesian_driver.planning.request.point_events.proportional_outputs import (
+    ProportionalOutputs,
+)
+from ur_cartesian_driver.planning.request.point_events.safe_outputs import check_safe_outputs
+from ur_cartesian_driver.planning.request.point_events.script_calls import ScriptCalls
+from ur_cartesian_driver.planning.request.point_events.switched_outputs import SwitchedOutputs
+
+#: What is done where the arm stops.
+STOP_EVENTS: tuple[PointEvent[Any], ...] = (
+    Dwells(),
+    InputWaits(),
+    ScriptCalls(),
+    PayloadChanges(),
+    Presses(),
+)
+#: What is done while the arm moves.
+OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (SwitchedOutputs(), ProportionalOutputs())
+POINT_EVENTS: tuple[PointEvent[Any], ...] = (*OUTPUT_EVENTS, *STOP_EVENTS)
+#: Those that have a dataclass of their own, by it.
+EVENT_KINDS: Mapping[type, PointEvent[Any]] = {
+    each.type: kind
+    for kind in POINT_EVENTS
+    for each in goal_fields(Goal)
+    if each.name == kind.field and index_fields(each.type)
+}
+
+
+def check_event(where: str, event: Any) -> None:
+    """
+    Check what an event says by itself, for a goal that is not complete.
+
+    :param where: its name in the refusal.
+    :raises InvalidGoal: names field, value and bound.
+    """
+    check_record(where, event)
+    EVENT_KINDS[type(event)].check_event(where, event)
+
+
+def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
+    """
+    Refuse outputs that cannot be switched while the arm moves.
+
+    :raises InvalidGoal: names the field, the value and the bound.
+    :raises NotAvailable: the execution mode, or a robot program that is not ours, cannot do it.
+    """
+    for kind in OUTPUT_EVENTS:
+        check_mode(goal, kind.mode_rule)
+        kind.check_dialect(goal, options)
+    check_safe_outputs(goal, options)
+    for kind in OUTPUT_EVENTS:
+        kind.check(goal, options)
+
+
+def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
+    """
+    Refuse what the robot cannot do at a point, or where the arm does not stop.
+
+    :raises InvalidGoal: names the field, the value and the bound.
+    :raises NotAvailable: the robot program is not ours, or the goal is kept open.
+    """
+    mode = resolve_execution_mode(goal)
+    for kind in STOP_EVENTS:
+        check_mode(goal, kind.mode_rule)
+    refuse_dwells_of_open_goals(goal.segments, keep_open=goal.keep_open)
+    for kind in STOP_EVENTS:
+        for field, waypoint in kind.places(goal):
+            check_point(field, waypoint, goal)
+            if not (mode.traits.streams_setpoints or options.dialect.supports_stops):
+                raise NotAvailable(
+                    field,
+                    f'is set, but robot programs of wire dialect {options.dialect.name} do '
+                    f'nothing at points of {mode.name}',
+                    'split the goal there, or let the driver send its own robot program',
+                )
+            if goal.keep_open:
+                raise NotAvailable(
+                    field,
+                    'is set, but a goal with keep_open does nothing at points but switch outputs',
+                    'split the goal there',
+                )
+            _check_place(goal, field, waypoint)
+    for kind in STOP_EVENTS:
+        kind.check(goal, options)
+
+
+def _check_place(goal: GoalTable, field: str, i: int) -> None:
+    """Refuse a point at which the arm does not stop."""
+    radius = float(goal.motions.blend_radii[i])
+    if radius > 0.0 and i + 1 < len(goal.waypoints):
+        raise InvalidGoal(
+            field,
+            f'needs a stop at points[{i}], but with a blend of {1e3 * radius:g} mm the arm passes '
+            'it',
+            'set its blend_radius to 0',
+        )
+    for name in ('twists', 'accelerations') if is_spline(goal) else ():
+        if np.nan_to_num(getattr(goal.waypoints, name)[i]).any():
+            what = name.removesuffix('s')
+            raise InvalidGoal(
+                field,
+                f'needs a stop at points[{i}], which the arm passes with a {what} of its own',
+                f'set the {what} to 0',
+            )
+    if is_timed(goal) and goal.waypoints.times[i] == 0.0:
+        raise InvalidGoal(
+            field,
+            f'needs a motion to points[{i}], but the robot is there at time 0',
+            'give this and the next points later times',
+        )

@@ -1,0 +1,63 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Outputs that take a value of their own when the motion does not go on as planned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.goal.output_names import (
+    output_name,
+    parse_safe_outputs,
+    repeated_output,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.point_events.switched_outputs import check_output
+
+
+def check_safe_outputs(goal: GoalTable, options: PlanningOptions) -> None:
+    """
+    Check the outputs that a goal, or the parameter, wants to be safe.
+
+    :raises InvalidGoal: names field, value and bound.
+    :raises NotAvailable: the robot program is not ours.
+    """
+    if (goal.safe_outputs or options.safe_outputs) and not options.dialect.supports_outputs:
+        raise NotAvailable(
+            'safe_outputs',
+            'is not empty, but robot programs of wire dialect '
+            f'{options.dialect.name} do not know it',
+            'leave it empty (the parameter too), or let the driver send its own robot program',
+        )
+    for i, output in enumerate(goal.safe_outputs):
+        check_output(f'safe_outputs[{i}]', output)
+    if (twice := repeated_output(goal.safe_outputs)) is not None:
+        output = goal.safe_outputs[twice]
+        raise InvalidGoal(
+            f'safe_outputs[{twice}]',
+            f'names {output_name(output.output, output.pin)} again',
+            'name it once',
+        )
+
+
+def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
+    """Return a goal with the safe outputs of the parameter that it does not name itself."""
+    outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
+    for output in parse_safe_outputs(options.safe_outputs):
+        outputs.setdefault((output.output, output.pin), output)
+    # Those that follow the speed write their own value again when a pause has ended.
+    for pin, following in {each.pin: each for each in goal.proportional_outputs}.items():
+        outputs.setdefault(
+            (OutputKind.STANDARD_ANALOG, pin),
+            SafeOutput(
+                output=OutputKind.STANDARD_ANALOG,
+                pin=pin,
+                value=following.idle,
+                domain=following.domain,
+                restore=True,
+            ),
+        )
+    return replace(goal, safe_outputs=tuple(outputs.values()))

@@ -1,0 +1,146 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The stops of a plan: what happens where the arm stops.
+
+A goal is planned as if it did not rest, with times that count its motion only; the stops are put
+into the plan afterwards. So they change nothing of the motions before and behind them, and are not
+stretched where these are slowed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import Primitive, Spline, Stop, Wait
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_spline,
+    is_timed,
+    resolve_execution_mode,
+)
+from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop
+from ur_cartesian_driver.planning.request.point_events.registry import STOP_EVENTS
+
+
+class Stops:
+    """
+    The stops of a goal that passed the checks.
+
+    :param goal: for the TCP with which it runs.
+    """
+
+    def __init__(self, goal: GoalTable, options: PlanningOptions) -> None:
+        """Collect them."""
+        dwells = goal.motions.dwells
+        self._before: Floats = np.cumsum(dwells) - dwells
+        stops = [stop for kind in STOP_EVENTS for stop in kind.stops(goal, options)]
+        #: In the order in which they come.
+        self._stops: list[PlacedStop] = sorted(stops, key=lambda one: (one.waypoint, one.order))
+        #: The goal without them: its times count the motion only.
+        self.moving_goal = goal
+        if self._stops:
+            rates = {}
+            for name in ('twists', 'accelerations') if is_spline(goal) else ():
+                rates[name] = getattr(goal.waypoints, name).copy()
+                rates[name][[stop.waypoint for stop in self._stops]] = 0.0
+            mode = resolve_execution_mode(goal)
+            self.moving_goal = replace(self._shifted(goal, -1.0, **rates), execution=mode)
+
+    def _shifted(self, goal: GoalTable, sign: float, **rates: Any) -> GoalTable:
+        points = goal.waypoints
+        times = points.times + sign * self._before * is_timed(goal)
+        return replace(goal, waypoints=replace(points, times=times, **rates))
+
+    def insert(
+        self, goal: GoalTable, segments: PlannedRows, reference: ReferencePath
+    ) -> tuple[GoalTable, PlannedRows, ReferencePath]:
+        """
+        Return goal, segments and path of a plan that stops at the points.
+
+        :param goal: as planned, with times of the motion.
+        :param segments: without outputs.
+        """
+        if not self._stops:
+            return goal, segments, reference
+        waypoints = [each.waypoint for each in self._stops]
+        stops = [each.stop for each in self._stops]
+        at = np.searchsorted(segments.waypoints, waypoints, side='right')
+        durations = [stop.duration if isinstance(stop, Wait) else 0.0 for stop in stops]
+        columns = {
+            name: np.insert(getattr(segments, name), at, value, axis=0)
+            for name, value in (
+                ('waypoints', waypoints),
+                ('lengths', 0.0),
+                ('angles', 0.0),
+                ('durations', durations),
+                ('blend_entries', 0.0),
+                ('joints', segments.joints[at - 1]),
+            )
+        }
+        streamed = resolve_execution_mode(goal).traits.streams_setpoints
+        primitives = list(segments.primitives)
+        places = at + np.arange(len(at))
+        for row, stop in zip(places.tolist(), stops, strict=True):
+            primitives.insert(
+                row,
+                _still_spline(stop, primitives[row - 1], columns['joints'][row])
+                if streamed
+                else stop,
+            )
+        lines = segments.report_lines
+
+        def with_stops() -> list[str]:
+            made = list(lines)
+            for row in places.tolist():
+                made.insert(row, '')
+            return made
+
+        notes: dict[int, str] = {}
+        motions: dict[int, int] = {}
+        for row, each in zip(places.tolist(), self._stops, strict=True):
+            motion = motions.setdefault(each.waypoint, row - 1)
+            if each.note:
+                notes[motion] = f'{notes.get(motion, "")}; {each.note}'
+        return (
+            self._shifted(goal, 1.0),
+            PlannedRows(
+                **columns,
+                primitives=tuple(primitives),
+                report_lines=LateLines(len(primitives), with_stops),
+                notes=notes,
+            ),
+            _resting_path(reference, np.array(waypoints), np.array(durations)),
+        )
+
+
+def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
+    """Return what lets a servo rest behind a motion."""
+    assert isinstance(stop, Wait)
+    is_quintic = isinstance(before, Spline) and before.accelerations is not None
+    return Spline(
+        target=vector6(joints.tolist()),
+        velocities=ZERO6,
+        accelerations=ZERO6 if is_quintic else None,
+        duration=stop.duration,
+    )
+
+
+def _resting_path(path: ReferencePath, points: Any, durations: Floats) -> ReferencePath:
+    """Return a path with a second row at each point where the arm rests."""
+    points, durations = points[durations > 0.0], durations[durations > 0.0]
+    at = np.searchsorted(path.point, points, side='right')
+    columns = {
+        name: np.insert(getattr(path, name), at, getattr(path, name)[at - 1], axis=0)
+        for name in ('poses', 'point', 'time', 'blend_tolerance', 'fraction')
+    }
+    delays = np.zeros(len(columns['time']))
+    delays[at + np.arange(len(at))] = durations
+    return ReferencePath(**columns | {'time': columns['time'] + np.cumsum(delays)})

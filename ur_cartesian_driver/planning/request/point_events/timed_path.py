@@ -1,0 +1,178 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The planned motions over time, for outputs that are switched during them.
+
+The robot program reads a record when the motion before it returns, at its stop or where its blend
+begins, and switches the output when the tool reaches the trigger pose. So the time of a command
+(that of its point plus its offset) becomes a trigger pose on the planned path, and the record
+stands behind the last motion that has returned by then. A slower robot switches at the same poses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
+from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
+from ur_cartesian_driver.motion.plan.primitive import (
+    OutputRecord,
+    Spline,
+    Stop,
+    SwitchOutput,
+    Wait,
+)
+
+#: Times that differ by less are the same [s].
+SAME_TIME = 1e-6
+# Half of the time over which the trigger direction is measured [s], at first and at most.
+_DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
+# A shorter motion has no direction [m], [rad]; one with less distance per turn has that of its
+# turn [m/rad].
+_MIN_MOTION = 1e-7
+_TURNING = 0.01
+# Where the tool gets on by less than this part of its way, it turns back.
+_TURNS_BACK = 0.1
+# From this distance beyond the trigger pose on, the tool counts as coming round to it [m], [rad].
+_BEYOND = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacedOutput:
+    """One output: its time, the segment that it follows, and the segment that reports it."""
+
+    time: float
+    after_index: int
+    report_index: int
+    records: tuple[OutputRecord, ...]
+    text: str
+
+
+class TimedPath:
+    """The segments over time, with their path."""
+
+    def __init__(
+        self,
+        segments: PlannedRows,
+        reference: ReferencePath,
+        blend_halves: Floats | None,
+        start_time: float,
+    ) -> None:
+        """
+        Compute when each motion ends, and when it returns.
+
+        :param reference: the path of the TCP; its times are those of the segments.
+        :param blend_halves: the time in the first half of the blend after each segment [s]; None =
+            no blends.
+        :param start_time: when the first segment begins [s].
+        """
+        self._primitives, self._reference = segments.primitives, reference
+        self.ends: Floats = start_time + np.cumsum(segments.durations)
+        self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
+        self._returns: Floats = self.ends - self._blend_halves
+        still = (segments.lengths == 0.0) & (np.diff(segments.waypoints, prepend=-1) == 0)
+        stops = {
+            k: segments.primitives[k]
+            for k in np.flatnonzero(still).tolist()
+            if isinstance(segments.primitives[k], Stop)
+        }
+        #: By waypoint: the row of its rest.
+        self.rests = {
+            int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
+        }
+        self._rows = {
+            waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist()) if k not in stops
+        }
+
+    def row(self, waypoint: int) -> int | None:
+        """Return the row whose motion leads to a point; None if none does."""
+        return self._rows.get(waypoint)
+
+    def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
+        """
+        Return a record with the tool pose at a time as trigger; None = without one.
+
+        :param after: the row of the motion behind which it is read.
+        """
+        if time is None or (direction := self._trigger_direction(time)) is None:
+            return record
+        pose, read = self._pose(time), self._pose(float(self._returns[after]))
+        start = (pose.inverse() @ read).rotation_vector()
+        beyond = sum(a * b for a, b in zip(start, direction, strict=True))
+        return replace(
+            record,
+            trigger_pose=pose,
+            trigger_direction=direction,
+            starts_beyond=beyond > _BEYOND,
+        )
+
+    def last_returned(self, time: float) -> int:
+        """Return the index of the last motion that has returned at a time [s]."""
+        return int(np.searchsorted(self._returns, time + SAME_TIME, side='right')) - 1
+
+    def _passes(self, k: int) -> bool:
+        """Tell whether the arm moves at the end of a motion."""
+        piece = self._primitives[k]
+        return self._blend_halves[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
+
+    def where(self, k: int) -> str:
+        """Return where an output at the end of a motion is switched, in words."""
+        if self._blend_halves[k] > 0.0:
+            return 'in the middle of its blend'
+        return 'while passing it' if self._passes(k) else 'after stopping there'
+
+    def at_point(self, k: int) -> float | None:
+        """Return when the tool is closest to the end of a motion [s], None where it stops."""
+        if not self._passes(k):
+            return None
+        end, half = float(self.ends[k]), float(self._blend_halves[k])
+        target = getattr(self._primitives[k], 'target', None)
+        if half <= 0.0 or not isinstance(target, Pose):
+            return end
+        return self._nearest(np.array(target.position), end - half, end + half, end)
+
+    def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
+        """Return when the path is closest to a position; the middle where the tool rests."""
+        times, rows = self._reference.time, self._reference.poses
+        own = slice(
+            max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
+            int(np.searchsorted(times, end)) + 1,
+        )
+        points, t = rows[own, :3], times[own]
+        chords = np.diff(points, axis=0)
+        square = (chords * chords).sum(axis=1)
+        if square.max(initial=0.0) < _MIN_MOTION**2:
+            return middle
+        along = ((position - points[:-1]) * chords).sum(axis=1) / np.maximum(square, 1e-300)
+        u = np.clip(along, 0.0, 1.0)
+        k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
+        return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
+
+    def _pose(self, time: float) -> Pose:
+        times, rows = self._reference.time, self._reference.poses
+        k = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
+        before, span = float(times[k - 1]), float(times[k] - times[k - 1])
+        part = min(max((time - before) / span, 0.0), 1.0) if span > 0.0 else 1.0
+        return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
+
+    def _trigger_direction(self, time: float) -> Vector6 | None:
+        """Return the direction of the path at a time, None where the tool rests or turns back."""
+        pose, half = self._pose(time), _DIRECTION_TIME
+        while half <= _MAX_DIRECTION_TIME:
+            a, b = self._pose(time - half), self._pose(time + half)
+            distance, angle = a.distance_to(b), a.angle_to(b)
+            if distance < _TURNS_BACK * (a.distance_to(pose) + pose.distance_to(b)):
+                return None
+            if distance > max(_MIN_MOTION, _TURNING * angle):
+                displacement = subtract(b.position, a.position)
+                x, y, z = rotate(conjugate(pose.quaternion), displacement)
+                return (x / distance, y / distance, z / distance, 0.0, 0.0, 0.0)
+            if angle > _MIN_MOTION:
+                *_, x, y, z = (a.inverse() @ b).rotation_vector()
+                return (0.0, 0.0, 0.0, x / angle, y / angle, z / angle)
+            half *= 4.0
+        return None
