@@ -25,8 +25,8 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
     """
     Return points and segments as the fields of a message: arrays, and names of joints.
 
-    :returns: None if they have what it does not hold: a jerk, a posture with names and values that
-        do not fit, or numbers of types that do not exist.
+    :returns: None if the message cannot hold them: a jerk, a posture with names and values that do
+        not fit, or numbers of types that do not exist.
     """
     names = _joint_names([*points.postures.values(), *segments.via_postures.values()])
     if names is None:

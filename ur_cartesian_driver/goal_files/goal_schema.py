@@ -82,7 +82,7 @@ def _packed_schema() -> dict[str, Any]:
 
 
 PACKED = _packed_schema()
-#: What the message has beside the goal, by the field behind which that stands.
+#: The fields of the message beside the goal, by the field that each of them follows.
 _BESIDE: Mapping[str, Any] = {
     'execution': {'validate_only': False},
     'safe_outputs': {'packed': PACKED},

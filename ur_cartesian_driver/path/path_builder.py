@@ -4,7 +4,7 @@
 A path of the tool, composed motion by motion.
 
 A :class:`Path` never changes: each method returns a new one. Units are SI (:func:`~.units.mm` and
-:func:`~.units.deg` convert), poses are those of the controlled frame in the frame of the path. A
+:func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A
 mistake is an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line that makes it.
 """
 
@@ -299,7 +299,7 @@ class Path(PathWithEvents):
         self, place: PathPlace, *, overlap: float = OVERLAP, approach: float = APPROACH
     ) -> Path:
         """
-        Return what is left of the path when it was stopped at a place (``outcome.stopped``).
+        Return the rest of the path when it was stopped at a place (``outcome.stopped``).
 
         As :func:`~.resumption.resume`: overlap and approach are lengths [m].
 
@@ -347,7 +347,7 @@ class Path(PathWithEvents):
         Return a spline that swings to both sides of this path, across the axis z of the tool.
 
         Lines and arcs without corners become a spline through eight points on each wave. The
-        speed along the path is that of :meth:`at`, from rest to rest; whole waves fit into it.
+        speed along the path is set by :meth:`at`, from rest to rest; whole waves fit into it.
 
         :param amplitude: to either side [m].
         :param wavelength: about the length of one wave [m].
@@ -381,7 +381,7 @@ class Path(PathWithEvents):
         """
         Return the goal, as the driver plans it.
 
-        :param frames: where the frames are that the path names; None = those of every robot.
+        :param frames: places of the frames that the path names; None = the frames of every robot.
         :param snapshot: where the arm is, for frames that move with it.
         :raises InvalidGoal: a frame is not known.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.

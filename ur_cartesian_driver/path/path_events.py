@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What happens at the points of a path: outputs, inputs, rests, presses."""
+"""Events at the points of a path: outputs, inputs, rests, presses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ur_cartesian_driver.path.path_points import PathPoint
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
 
-#: Of what has a begin and an end: the methods that name both, and what the end is missing for.
+#: Of events with a begin and an end: the methods that name both, and the words for a missing end.
 _METHODS = {
     Press: ('press()', 'end_press()', ''),
     ProportionalOutput: ('follow_speed()', 'end_follow_speed()', ' for analog output {0.pin}'),
@@ -150,7 +150,7 @@ class PathWithEvents(PathOfMotions):
         """
         Press with the controller's force mode from the point before on; there it has no blend.
 
-        :param forces: what the tool applies along compliant axes of the frame, 'x' 'y' 'z' [N],
+        :param forces: forces along the compliant axes of the frame, 'x' 'y' 'z' [N],
             and about them, 'rx' 'ry' 'rz' [Nm]; empty where it only watches for contact.
         :param speed_limits: how fast it gives way, for the same axes [m/s], [rad/s]; None = 0.05
             and 0.2.
@@ -205,7 +205,7 @@ class PathWithEvents(PathOfMotions):
         """
         Let the arm rest at the point before for a time; there it has no blend.
 
-        Durations are those of motions: what follows is later by the time [s].
+        Durations count motions only: all that follows is later by the time [s].
 
         :raises InvalidGoal: there is no point, or it is passed with a blend or a twist of its own.
         """

@@ -255,7 +255,7 @@ class PathOfMotions:
 
         :param place: where it ends: a position with the orientation of the point before, or with
             its own, or a pose.
-        :param blend: instead of that of :meth:`at`, as ``speed`` and ``acceleration``.
+        :param blend: in place of the one of :meth:`at`, as ``speed`` and ``acceleration``.
         :param duration: of this motion [s]; a path has durations everywhere, or nowhere.
         :param posture: joint positions to arrive near to, by joint name [rad].
         :param optimized: as fast as the robot can (optimovel); speed and acceleration are
@@ -283,7 +283,7 @@ class PathOfMotions:
         """
         Add a joint motion, in which the path of the tool is not straight; as :meth:`line`.
 
-        ``speed`` and ``acceleration`` are those of the leading axis [rad/s], [rad/s^2].
+        ``speed`` and ``acceleration`` count on the leading axis [rad/s], [rad/s^2].
         """
         kind = SegmentType.OPTIMIZED_JOINT if optimized else SegmentType.JOINT
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)

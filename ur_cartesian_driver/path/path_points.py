@@ -25,7 +25,7 @@ SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feed:
-    """What holds for motions until it is changed; 0 = the driver's parameter."""
+    """Settings of motions, which hold until they are changed; 0 = the driver's parameter."""
 
     speed: float = 0.0
     acceleration: float = 0.0
@@ -47,10 +47,10 @@ class PathPoint:
     segment: Segment = field(default_factory=Segment)
     #: Of the motion [ns]; 0 = by its speed.
     duration: int = 0
-    #: What happens here, or begins here, as if this were point 0. What ends behind the point 0 has
-    #: not ended yet.
+    #: The events that happen or begin here, as if this were point 0. One that ends behind point 0
+    #: has not ended yet.
     events: tuple[Any, ...] = ()
-    #: Whether the blend is that of the feed, which the last point of a path does without, and
+    #: Whether the blend comes from the feed, which the last point of a path does without, and
     #: whether it is chosen when the path is finished.
     feed_blend: bool = False
     auto_blend: bool = False
@@ -58,13 +58,13 @@ class PathPoint:
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """The place."""
         return self.waypoint.pose
 
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """What one motion says besides its place."""
+    """Settings of one motion, besides its place."""
 
     blend: float | None
     speed: float | None

@@ -4,7 +4,7 @@
 The goal that is left of a goal that ended on its way.
 
 It approaches a place some way before the one where the other one was stopped (the overlap), puts
-the outputs in the state that they have there, and follows the same path to its end. What is left
+the outputs in the state that they have there, and follows the same path to its end. The rest
 of a line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which
 the arm gathers speed within the overlap.
 
@@ -47,7 +47,7 @@ OVERLAP, APPROACH = 0.005, 0.03
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 #: Blends begin somewhat farther from their points on arcs.
 _BLEND_MARGIN = 1.05
-#: What is left of a segment is nothing below this [m].
+#: A shorter rest of a segment is nothing [m].
 _NOTHING = 1e-5
 #: The shortest arc, and the least height over its chord, that is left of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
@@ -117,7 +117,7 @@ class _Resumption:
         self.begin = self._begin(place, overlap)
 
     def resumed(self) -> ResumedGoal:
-        """Return what is left."""
+        """Return the rest of the goal."""
         n, k = len(self.points), min(floor(self.begin), len(self.points) - 1)
         if k == self.begin == self.stopped > 0.0:
             k -= 1  # it rests at a point, and not on its way to the next one
@@ -257,7 +257,7 @@ class _Resumption:
         return self._curve_start(k).interpolate(self.points[k].pose, u)
 
     def _cut(self, k: int, u: float) -> Segment:
-        """Return what is left of a segment."""
+        """Return the rest of a segment."""
         segment = self.segments[k]
         if segment.type is not SegmentType.CIRCULAR:
             return segment
@@ -290,7 +290,7 @@ class _Resumption:
         return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
 
     def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
-        """Return the times of all points of moves; those of an approach come first."""
+        """Return the times of all points of moves, of an approach first."""
         if not self.timed:
             return [0.0] * (len(self.points) - k + approach)
         arrive = [point.time for point in self.points]
@@ -305,7 +305,7 @@ class _Resumption:
     # -- splines ---------------------------------------------------------------------------------
 
     def _resumed_spline(self, points: list[Waypoint]) -> ResumedGoal:
-        """Return what is left of a spline: its time is gathered first, as the arm is at rest."""
+        """Return the rest of a spline, on which the arm gathers speed first, as it is at rest."""
         assert self.spline is not None
         spline, zero = self.spline, self._approach_times()[: len(points)]
         points = [replace(point, time=time) for point, time in zip(points, zero, strict=True)]

@@ -56,9 +56,9 @@ class Form(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sent:
-    """How messages and files hold a field."""
+    """The form of a field in messages and files."""
 
-    #: Its name there, with dots where it is inside of other messages; '' = that in the dataclass.
+    #: Its name there, with dots where it is inside of other messages; '' = as in the dataclass.
     name: str = ''
     form: Form | None = None
     #: Whether a file has it even where it has its default; None = if there is no default.
@@ -68,7 +68,7 @@ class Sent:
 
 
 class Mark(Enum):
-    """What else a field is."""
+    """Further properties of a field."""
 
     #: The driver fills it in; messages do not have it.
     NOT_SENT = auto()
@@ -99,7 +99,7 @@ class Range:
         return in_range | (values == 0.0) if self.zero else in_range
 
     def refusal(self, value: float) -> tuple[str, str]:
-        """Return what is wrong with a number that is out of the range, and what to do."""
+        """Return the fault of a number that is out of the range, and the remedy."""
         if not isfinite(value) and (self.zero or self.high == inf):
             return f'contains {value}; every number must be finite', ''
         return self._problem(value), self.remedy

@@ -49,7 +49,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class SegmentType(IntEnum):
-    """How the tool gets to a point; the numbers of ``MotionSegment.type``."""
+    """The motion to a point; the numbers of ``MotionSegment.type``."""
 
     AUTO = 0
     LINEAR = 1
@@ -61,7 +61,7 @@ class SegmentType(IntEnum):
 
 
 class ArcMode(IntEnum):
-    """What the orientation does on an arc; the numbers of URScript's ``movec``."""
+    """The orientation along an arc; the numbers of URScript's ``movec``."""
 
     UNCONSTRAINED = 0
     FIXED = 1
@@ -77,7 +77,7 @@ class FreeAxis(IntEnum):
 
 
 class OutputKind(IntEnum):
-    """Which output an :class:`IOCommand` switches."""
+    """The output that an :class:`IOCommand` switches."""
 
     STANDARD_DIGITAL = 0
     CONFIGURABLE_DIGITAL = 1
@@ -86,7 +86,7 @@ class OutputKind(IntEnum):
 
 
 class OnPathTolerance(IntEnum):
-    """What follows when the arm leaves the path tolerance."""
+    """The answer to an arm that leaves the path tolerance."""
 
     ABORT = 0
     STALL = 1
@@ -99,7 +99,7 @@ DEFAULT_STALL_TIMEOUT = 10.0
 
 
 class InputKind(IntEnum):
-    """Which input an :class:`InputWait` waits for."""
+    """The input that an :class:`InputWait` waits for."""
 
     STANDARD_DIGITAL = 0
     CONFIGURABLE_DIGITAL = 1
@@ -114,18 +114,18 @@ class InputKind(IntEnum):
 
 
 class PressFrame(IntEnum):
-    """Along the axes of which frame a :class:`Press` gives way."""
+    """The frame along whose axes a :class:`Press` gives way."""
 
-    #: That of the TCP, as the path turns it.
+    #: The TCP, as the path turns it.
     TOOL = 0
-    #: That of the goal.
+    #: The frame of the goal.
     GOAL = 1
-    #: That of the robot's controller.
+    #: The base of the robot's controller.
     BASE = 2
 
 
 class ContactEnd(IntEnum):
-    """What the first contact of the tool means to a :class:`Press`."""
+    """The meaning of the first contact of the tool to a :class:`Press`."""
 
     NONE = 0
     #: The goal ends there, and has succeeded.
@@ -142,7 +142,7 @@ DEFAULT_YIELDS = (0.02, 0.2)
 
 
 class StaleOffset(IntEnum):
-    """What becomes of a path offset of which no newer one comes."""
+    """The fate of a path offset that no newer one replaces in time."""
 
     #: It stays.
     HOLD = 0
@@ -204,7 +204,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class WaypointColumns:
-    """The points of a goal in columns; the units are those of a waypoint."""
+    """The points of a goal in columns, in the units of a waypoint."""
 
     #: (n, 7) x y z, quaternion x y z w
     poses: Annotated[Floats, ColumnOf('pose', always=True)]
@@ -361,7 +361,7 @@ class Press:
     frame: PressFrame = PressFrame.TOOL
     #: The compliant axes of the frame, of :data:`PRESS_AXES`.
     axes: tuple[str, ...] = ()
-    #: What the tool applies along each of them [N, Nm].
+    #: Force or torque of the tool along each of them [N, Nm].
     forces: tuple[float, ...] = ()
     #: How fast it gives way along each of them [m/s, rad/s]; empty = the default.
     speed_limits: tuple[float, ...] = ()
@@ -408,7 +408,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathOffset:
-    """How far the path may give way to offsets that come while the arm moves."""
+    """The bounds of offsets to the path that come while the arm moves."""
 
     #: Along the path, across it and normal to both [m]; 0 = not at all. The controller's own
     #: offsets have the same bound by default.

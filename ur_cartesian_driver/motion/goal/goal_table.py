@@ -165,7 +165,7 @@ class GoalRows(Rows[T]):
         """
         Return objects as rows; rows themselves as they are.
 
-        :param name: the first part of the field in the error; '' = that of a goal.
+        :param name: the first part of the field in the error; '' = as in a goal.
         :raises WrongType: a value is not of its declared type; the text names the field.
         """
         if isinstance(objects, cls):
@@ -368,7 +368,7 @@ def _are_floats(vectors: Sequence[tuple[float, ...]], count: int) -> bool:
 
 
 def _vectors(rows: Floats) -> Iterable[Any]:
-    """Return rows (n, 6) as tuples; those of zeros share one."""
+    """Return rows (n, 6) as tuples; rows of zeros share one."""
     if not rows.any():
         return (ZERO6,) * len(rows)
     return (vector6(row) if any(row) else ZERO6 for row in rows.tolist())

@@ -30,7 +30,7 @@ QUATERNION_TOLERANCE = 1e-3
 
 
 def check_fields(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse what a field does not take, whatever the others say."""
+    """Refuse values that a field does not take, whatever the other fields say."""
     check_record('', goal, Goal)
     _check_rows(goal.waypoints, point_field, nan_in_rates=is_spline(goal))
     _check_rows(goal.segments, segment_field)
@@ -51,10 +51,10 @@ def check_record(
     where: str, record: Any, kind: type | None = None, nan_in_rates: bool = False
 ) -> None:
     """
-    Refuse what a field of a dataclass of the table does not take.
+    Refuse values that a field of a dataclass of the table does not take.
 
     :param where: its name in the refusal.
-    :param kind: the class that declares the fields; None = that of the record.
+    :param kind: the class that declares the fields; None = the class of the record.
     :param nan_in_rates: whether NaN lets the driver choose a rate.
     :raises InvalidGoal: names the field, the value and the bound.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What execution modes cannot do: a row for each field that needs a trait of the mode."""
+"""Limits of execution modes: a row for each field that needs a trait of the mode."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def switches_nothing(field: str) -> ModeRule:
     )
 
 
-#: Of the goal as a whole, by field; those of what happens at points are in ``point_events``.
+#: Of the goal as a whole, by field; the rows of events at points are in ``point_events``.
 GOAL_RULES = {
     rule.field: rule
     for rule in (

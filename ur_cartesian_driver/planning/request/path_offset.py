@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a goal may say of offsets that come while the arm moves (``path_offset``)."""
+"""Rules about offsets that come while the arm moves (``path_offset``)."""
 
 from __future__ import annotations
 

@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What happens at the points of a goal: a module for each kind, and a row in the registry."""
+"""Events at the points of a goal: a module for each kind, and a row in the registry."""

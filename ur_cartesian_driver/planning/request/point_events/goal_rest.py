@@ -57,7 +57,7 @@ class GoalRest:
         ]
 
     def with_last(self, events: Sequence[E]) -> list[E]:
-        """Return those ahead, and those of the last point before, where the path is resumed."""
+        """Return the events ahead, and at the path's begin the events of the last point before."""
         first, left = self.first, self.ahead(events)
         passed = [event for event in events if self.is_passed(*points_of(event).values())]
         if not passed or self.places[first] > self.begin + NO_FRACTION:  # no need to stop there
@@ -68,9 +68,9 @@ class GoalRest:
 
     def stretches(self, events: Sequence[E], begun: Callable[[E], E]) -> list[E]:
         """
-        Return what holds between two points on the rest of the path.
+        Return the events between two points, as far as they are on the rest of the path.
 
-        :param begun: makes of one that has begun before what it is from here on.
+        :param begun: turns an event that has begun before into its continuation from here on.
         """
         left = []
         for event in events:

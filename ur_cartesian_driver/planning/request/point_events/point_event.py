@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The interface of what happens at the points of a goal.
+The interface of events at the points of a goal.
 
-A kind of event is a subclass with an instance in the registry. What it needs in a goal, in
-messages and files is a dataclass of the table of the goal
-(:mod:`~ur_cartesian_driver.motion.goal.goal`); its fields are checked by their ranges before.
+A kind of event is a subclass with an instance in the registry. A dataclass of the table of the
+goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares its fields in goals, messages and
+files; they are checked by their ranges before.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ E = TypeVar('E')
 
 @dataclass(frozen=True, slots=True)
 class PlacedStop:
-    """What the robot program does at a waypoint where the arm stands, and a note on it."""
+    """A stop of the robot program at a waypoint where the arm stands, and a note on it."""
 
     waypoint: int
     stop: Stop
     note: str = ''
-    #: The order among those at one waypoint; of the same number they keep that of the registry.
+    #: The order among stops at one waypoint; equal ones keep the order of the registry.
     order: int = 0
 
 
@@ -90,14 +90,14 @@ class PointEvent(Generic[E]):
 
     def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
         """
-        Refuse what the robot of the goal cannot do.
+        Refuse events that the robot of the goal cannot carry out.
 
         :param T_tcp_controlled: the controlled frame behind the TCP of the motion.
         :raises NotAvailable: names the field and the reason.
         """
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield what the robot program does where the arm stands."""
+        """Yield the stops of the robot program, where the arm stands."""
         yield from ()
 
     def left(self, events: Sequence[E], rest: GoalRest) -> Sequence[E]:

@@ -41,7 +41,7 @@ from ur_cartesian_driver.planning.request.point_events.safe_outputs import check
 from ur_cartesian_driver.planning.request.point_events.script_calls import ScriptCalls
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import SwitchedOutputs
 
-#: What is done where the arm stops.
+#: Events where the arm stops.
 STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     Dwells(),
     InputWaits(),
@@ -49,7 +49,7 @@ STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     PayloadChanges(),
     Presses(),
 )
-#: What is done while the arm moves.
+#: Events while the arm moves.
 OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (SwitchedOutputs(), ProportionalOutputs())
 POINT_EVENTS: tuple[PointEvent[Any], ...] = (*OUTPUT_EVENTS, *STOP_EVENTS)
 #: Those that have a dataclass of their own, by it.
@@ -89,7 +89,7 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse what the robot cannot do at a point, or where the arm does not stop.
+    Refuse events that the robot cannot carry out at a point, or where the arm does not stop.
 
     :raises InvalidGoal: names the field, the value and the bound.
     :raises NotAvailable: the robot program is not ours, or the goal is kept open.

@@ -5,7 +5,7 @@ The planned motions over time, for outputs that are switched during them.
 
 The robot program reads a record when the motion before it returns, at its stop or where its blend
 begins, and switches the output when the tool reaches the trigger pose. So the time of a command
-(that of its point plus its offset) becomes a trigger pose on the planned path, and the record
+(the time of its point plus its offset) becomes a trigger pose on the planned path, and the record
 stands behind the last motion that has returned by then. A slower robot switches at the same poses.
 """
 
@@ -31,8 +31,8 @@ from ur_cartesian_driver.motion.plan.primitive import (
 SAME_TIME = 1e-6
 # Half of the time over which the trigger direction is measured [s], at first and at most.
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
-# A shorter motion has no direction [m], [rad]; one with less distance per turn has that of its
-# turn [m/rad].
+# A shorter motion has no direction [m], [rad]; with less distance per turn than this [m/rad] the
+# direction of the turn counts.
 _MIN_MOTION = 1e-7
 _TURNING = 0.01
 # Where the tool gets on by less than this part of its way, it turns back.
@@ -65,7 +65,7 @@ class TimedPath:
         """
         Compute when each motion ends, and when it returns.
 
-        :param reference: the path of the TCP; its times are those of the segments.
+        :param reference: the path of the TCP, with the times of the segments.
         :param blend_halves: the time in the first half of the blend after each segment [s]; None =
             no blends.
         :param start_time: when the first segment begins [s].
