@@ -24,7 +24,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -92,6 +92,9 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
 #: How far a CB3 arm may stand beside its target: 0.2 to 0.4 mrad were recorded of a UR10 [m].
 CB3_STATIC_ERROR = 3e-4
+#: Samples of the searches for rotations about a free axis, as multiples: the denser one sees
+#: singularities between those of the first.
+_SEARCH_DENSITIES = (1, 4)
 
 #: Plans a checked goal.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
@@ -139,14 +142,18 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
     Where no choice passes, the orientations that the goal names may.
     """
     refusal: GoalRefused | None = None
-    try:
-        chosen = choose_rotations(table, at_set_point(state, arm), arm, options)
-        plan = _plan_fixed(chosen.goal, state, arm, options)
-        return replace(plan, remarks=(*chosen.remarks, *plan.remarks))
-    except NoRotation:
-        found = 'no rotation about the free axis was found that leads along the whole path'
-    except GoalRefused as error:
-        refusal, found = error, 'no better rotation about the free axis was found'
+    for density in _SEARCH_DENSITIES:
+        try:
+            chosen = choose_rotations(table, at_set_point(state, arm), arm, options, density)
+            plan = _plan_fixed(chosen.goal, state, arm, options)
+            return replace(plan, remarks=(*chosen.remarks, *plan.remarks))
+        except NoRotation:
+            found = 'no rotation about the free axis was found that leads along the whole path'
+            break
+        except GoalRefused as error:
+            refusal, found = error, 'no better rotation about the free axis was found'
+            if not isinstance(error, NearSingularity):
+                break
     try:
         plan = _plan_fixed(as_named(table), state, arm, options)
     except GoalRefused as error:

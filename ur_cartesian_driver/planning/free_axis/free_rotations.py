@@ -132,15 +132,16 @@ class ChosenGoal:
 
 
 def choose_rotations(
-    goal: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions
+    goal: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions, density: int = 1
 ) -> ChosenGoal:
     """
     Return a checked goal with its rotations about the free axis chosen.
 
     :param state: where the arm is at the start.
+    :param density: so many times the samples; the arm may be near a singularity between two.
     :raises NoRotation: none leads along the path.
     """
-    path = _FreePath(goal, state, options)
+    path = _FreePath(goal, state, options, density)
     if not path.is_open.any():  # every range is a single rotation
         return ChosenGoal(as_named(goal))
     if not path.can_turn:
@@ -189,8 +190,10 @@ def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> Rot
 class _FreePath:
     """The path of a goal with a free axis, in base."""
 
-    def __init__(self, goal: GoalTable, state: RobotState, options: PlanningOptions) -> None:
-        self.goal, self.options = goal, options
+    def __init__(
+        self, goal: GoalTable, state: RobotState, options: PlanningOptions, density: int
+    ) -> None:
+        self.goal, self.options, self.density = goal, options, density
         T_flange_controlled = goal.T_flange_controlled or state.T_flange_tcp
         T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
         segments = goal.segments
@@ -277,7 +280,8 @@ class _FreePath:
         self.sizes = lengths / _LENGTH_PER_RADIAN + tilts
         self.knots = self._knots(lengths, tilts)
         counts = np.ceil(np.maximum(lengths / _SAMPLE_LENGTH, tilts / _SAMPLE_TILT))
-        counts = np.where(self.is_joint, 1, np.clip(counts, 1, _MAX_SAMPLES)).astype(np.intp)
+        counts = self.density * np.clip(counts, 1, _MAX_SAMPLES).astype(np.intp)
+        counts[self.is_joint] = 1
         row, number = counted(counts)
         u = number / counts[row]
         ends = np.concatenate([self.poses[:, :3], self.references], axis=1)
@@ -328,7 +332,7 @@ class _FreePath:
             if first:  # the arm comes to the first point as it stands
                 share = float(tilted[first : row + 1].max()) / whole[number]
                 change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
-            change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE)
+            change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE / self.density)
             if bound[row]:
                 change = max(change, float(commanded[row]) + _MAX_CHANGE_PER_SAMPLE)
             posture = postures.get(row)
