@@ -31,7 +31,6 @@ def test_offsets_of_a_client_move_the_tool_and_wrong_ones_say_why(single_cell):
 
     assert refusal(Vector3()) == 'No goal moves the arm.'
     goal = cell.goal((5.0, 0.05, 0.0, 0.0), execution=SERVO)  # time enough on a busy computer
-    goal.goal_time_tolerance.sec = 20
     goal.path_offset.limits.z = 0.004
     goal.path_offset.timeout = 5.0
     height = cell.sim.state().T_base_tcp.position[2]
