@@ -142,13 +142,13 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
     Where no choice passes, the orientations that the goal names may.
     """
     refusal: GoalRefused | None = None
+    found = 'no rotation about the free axis was found that leads along the whole path'
     for density in _SEARCH_DENSITIES:
         try:
             chosen = choose_rotations(table, at_set_point(state, arm), arm, options, density)
             plan = _plan_fixed(chosen.goal, state, arm, options)
             return replace(plan, remarks=(*chosen.remarks, *plan.remarks))
         except NoRotation:
-            found = 'no rotation about the free axis was found that leads along the whole path'
             break
         except GoalRefused as error:
             refusal, found = error, 'no better rotation about the free axis was found'
