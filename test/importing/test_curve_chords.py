@@ -8,7 +8,7 @@ from curve_distance import distances
 import numpy as np
 import pytest
 from random_cases import cases, random_of
-from scipy.interpolate import BSpline  # type: ignore[import-untyped]
+from scipy.interpolate import BSpline
 
 from ur_cartesian_driver.importing.dxf.curve_chords import (
     chords,

@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree  # type: ignore[import-untyped]
+from scipy.spatial import cKDTree
 
 #: Angles between points on arcs [degrees], and distances between those on lines [m].
 STEP, SPACING = 1.0, 2e-3
