@@ -45,7 +45,12 @@ READY_TIMEOUT = 10.0
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the markers."""
+    """Register the markers, and ignore what ROS 2 itself warns of."""
+    # lark 0.12, which generated messages load by way of rosidl_parser
+    config.addinivalue_line(
+        'filterwarnings',
+        "ignore:module 'sre_(parse|constants)' is deprecated:DeprecationWarning",
+    )
     config.addinivalue_line(
         'markers', 'ur_sim(**config): fields of the SimulatorConfig of the ur_sim fixture'
     )

@@ -59,8 +59,8 @@ class LinkStatus:
             status = replace(status, message=self._required_action(status.state))
         if status != self.current:
             before, self.current = self.current, status
+            self._log_change(before, status)  # first: who waits for a state goes on at once
             self._on_status(status)
-            self._log_change(before, status)
 
     def error(self, text: str) -> None:
         """Take a text as the last error, and log it."""
