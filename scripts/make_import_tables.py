@@ -17,7 +17,7 @@ import re
 from ur_cartesian_driver.importing import FORMATS, ImportFormat, Term, Treatment
 
 PAGE = Path(__file__).resolve().parents[1] / 'doc' / 'importing.md'
-_BEGIN, _END = '<!-- terms of {} -->', '<!-- end of terms -->'
+_TABLE = re.compile(r'(<!-- terms of (\w+) -->).*?(<!-- end of terms -->)', re.DOTALL)
 
 
 def table(form: ImportFormat) -> str:
@@ -70,17 +70,7 @@ def _next(name: str) -> str:
 
 def page_with_tables(page: str) -> str:
     """Return the page with each table between its marks made anew."""
-    return ''.join(_parts(page))
-
-
-def _parts(page: str) -> Iterator[str]:
-    for form in FORMATS.values():
-        begin = _BEGIN.format(form.name)
-        before, found, rest = page.partition(begin)
-        assert found, f'{PAGE.name} has no {begin}'
-        _, end, page = rest.partition(_END)
-        yield f'{before}{begin}\n\n{table(form)}\n{end}'
-    yield page
+    return _TABLE.sub(lambda found: f'{found[1]}\n\n{table(FORMATS[found[2]])}\n{found[3]}', page)
 
 
 if __name__ == '__main__':

@@ -125,6 +125,7 @@ def test_a_package_has_each_name_that_it_offers(package):
         ('driver.loop.loop_host', ('planning', 'path', 'ros', 'sim')),
         ('cli', ('planning', 'path', 'ros', 'driver', 'sim.controller', 'sim.simulated_robot')),
         ('path', ('planning.planner', 'driver', 'robot', 'sim')),
+        ('importing', ('importing.tables', 'importing.script', 'driver', 'planning', 'sim')),
     ],
 )
 def test_what_has_to_start_fast_imports_no_more_than_it_needs(start, without):

@@ -354,7 +354,7 @@ def _add_import(command: CommandParser) -> None:
     command.add_argument(
         '--format',
         default='',
-        choices=import_command.FORMATS,
+        choices=import_command.FORMATS.names(),
         help='by default as the suffix of the name says',
     )
     command.add_argument(
@@ -507,7 +507,8 @@ def _add_export(command: CommandParser) -> None:
         '-o',
         '--output',
         metavar='FILE',
-        help='its suffix is the format, .mcap or .csv; by default beside the recording, as .mcap',
+        help=f'its suffix is the format, {" or ".join(export_command.EXPORTERS.suffixes())}; by '
+        'default beside the recording, as .mcap',
     )
     command.add_argument(
         '--tf-prefix', default='', help='prefix for the names of frames and joints in MCAP'

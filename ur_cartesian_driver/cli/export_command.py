@@ -8,42 +8,47 @@ import argparse
 import os
 from pathlib import Path
 
-from ur_cartesian_driver.cli.progress import counted, timed
+from ur_cartesian_driver.cli.progress import counted
 from ur_cartesian_driver.cli.recording_plot import newest_recording
-from ur_cartesian_driver.driver.recordings.csv_export import write_csv
-from ur_cartesian_driver.driver.recordings.mcap_export import write_mcap
+from ur_cartesian_driver.driver.recordings.export_options import Exporter, ExportOptions
 from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.file_formats import FileFormats
 
-_MCAP, _CSV = '.mcap', '.csv'
+#: By their suffixes.
+EXPORTERS: FileFormats[Exporter] = FileFormats(
+    'ur_cartesian_driver.exporters',
+    {
+        'ur_cartesian_driver.driver.recordings.mcap_export:write_mcap': '.mcap',
+        'ur_cartesian_driver.driver.recordings.csv_export:write_csv': '.csv',
+    },
+    refusals=(ValueError, OSError),
+)
 
 
 def export(arguments: argparse.Namespace) -> int:
     """Write a recording in the format of the suffix; a file that is not whole is never there."""
     source = newest_recording(Path(arguments.file))
-    target = Path(arguments.output or source.with_suffix(_MCAP))
+    target = Path(arguments.output or source.with_suffix('.mcap'))
     suffix = target.suffix.lower()
-    if suffix not in (_MCAP, _CSV):
+    if suffix not in EXPORTERS:
         raise ValueError(
-            f'{target} has the suffix {target.suffix!r}, but a recording is written as {_MCAP} or '
-            f'{_CSV}'
+            f'{target} has the suffix {target.suffix!r}, but a recording is written as '
+            f'{" or ".join(EXPORTERS.suffixes())}'
         )
     recording = Recording.load(source)
+    count = len(recording.time)
     unfinished = target.with_name(f'{target.name}.unfinished')
     try:
-        if suffix == _CSV:
-            with timed('writing the table'), unfinished.open('w', encoding='utf-8') as table:
-                write_csv(recording, table)
-        else:
-            with (
-                counted('writing the packets', len(recording.time)) as progress,
-                unfinished.open('wb') as file,
-            ):
-                write_mcap(recording, file, arguments.tf_prefix, progress)
+        with (
+            EXPORTERS.using(suffix) as write,
+            counted('writing the packets', count) as progress,
+            unfinished.open('wb') as file,
+        ):
+            write(recording, file, ExportOptions(tf_prefix=arguments.tf_prefix, progress=progress))
         os.replace(unfinished, target)
     except ImportError as error:
         raise ValueError(f'{target}: {error}') from None
     finally:
         unfinished.unlink(missing_ok=True)
-    count = len(recording.time)
     print(f'{count} packet{"s" * (count != 1)}: {target}')
     return 0

@@ -5,63 +5,79 @@ Goals from files of others: CSV, G-code, DXF, messages of ROS, recordings, URScr
 
 Each format has a module that collects points; `imported_goal` makes a goal of them, the same for
 all. What the goal has not is said, with the lines of the file: nothing is dropped in silence.
+Other packages add formats: doc/adding_a_format.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import os
 from pathlib import Path
 from typing import Any
 
+from ur_cartesian_driver.file_formats import FileFormats
 from ur_cartesian_driver.goal_files.garbage import uncollected
-from ur_cartesian_driver.importing import recording_file
-from ur_cartesian_driver.importing.dxf import dxf_file
-from ur_cartesian_driver.importing.gcode import gcode_file
-from ur_cartesian_driver.importing.import_format import ImportFormat, Term, Treatment
+from ur_cartesian_driver.importing.import_format import (
+    honoured,
+    ImportFormat,
+    left_out,
+    refused,
+    Term,
+    term_table,
+    Treatment,
+)
 from ur_cartesian_driver.importing.import_options import (
     CodeOutput,
     ImportOptions,
+    LENGTH_UNITS,
     parse_code_output,
     parse_length,
     ToolOrientation,
 )
 from ur_cartesian_driver.importing.imported_goal import goal_of_path, ImportedGoal
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNote, PathCollector
-from ur_cartesian_driver.importing.messages import ros_messages_file
-from ur_cartesian_driver.importing.script import urscript_file
-from ur_cartesian_driver.importing.tables import csv_file
+from ur_cartesian_driver.importing.text_file import file_lines, file_text
 
 __all__ = [
     'FORMATS',
+    'LENGTH_UNITS',
     'BrokenFile',
     'CodeOutput',
     'ImportFormat',
     'ImportNote',
     'ImportOptions',
     'ImportedGoal',
+    'PathCollector',
     'Term',
     'ToolOrientation',
     'Treatment',
+    'file_lines',
+    'file_text',
+    'honoured',
     'import_file',
     'import_message',
+    'left_out',
     'parse_code_output',
     'parse_length',
+    'refused',
+    'term_table',
 ]
 
-#: The formats by their names.
-FORMATS: Mapping[str, ImportFormat] = {
-    module.FORMAT.name: module.FORMAT
-    for module in (
-        csv_file,
-        gcode_file,
-        dxf_file,
-        ros_messages_file,
-        urscript_file,
-        recording_file,
-    )
-}
-_BY_SUFFIX = {suffix: form for form in FORMATS.values() for suffix in form.suffixes}
+#: The formats by their names and suffixes.
+FORMATS: FileFormats[ImportFormat] = FileFormats(
+    'ur_cartesian_driver.importers',
+    {
+        f'{__name__}.{reader}:FORMAT': names
+        for reader, names in {
+            'tables.csv_file': 'csv .csv .tsv .txt',
+            'gcode.gcode_file': 'gcode .gcode .nc .ngc .gco .gc .g .tap .cnc .mpf',
+            'dxf.dxf_file': 'dxf .dxf',
+            'messages.ros_messages_file': 'ros .yaml .yml',
+            'script.urscript_file': 'urscript .script .urscript',
+            'recording_file': 'recording .npz .part',
+        }.items()
+    },
+    refusals=(BrokenFile, OSError),
+)
 
 
 @uncollected()
@@ -71,22 +87,23 @@ def import_file(
     """
     Read a file.
 
-    :param form: one of :data:`FORMATS`; empty = as the suffix of its name says.
+    :param form: one of the names of :data:`FORMATS`; empty = as the suffix of its name says.
     :raises BrokenFile: it cannot be read; the sentence has the line.
-    :raises ImportError: a package for this format is not installed.
+    :raises ImportError: a package for this format is not installed, or broken.
     :raises OSError: the file cannot be opened.
     """
     path, options = Path(file), options or ImportOptions()
-    found = FORMATS.get(form) if form else _BY_SUFFIX.get(path.suffix.lower())
-    if found is None:
+    name = form or path.suffix.lower()
+    if name not in FORMATS:
         raise BrokenFile(
             0,
             f'{form or path.suffix!r} is no {"" if form else "suffix of a "}known format; '
-            f'give one of {", ".join(FORMATS)}',
+            f'give one of {", ".join(FORMATS.names())}',
         )
     into = PathCollector()
-    found.collect(path, options, into)
-    return goal_of_path(into.path(), options, into.remarks)
+    with FORMATS.using(name) as found:
+        found.collect(path, options, into)
+        return goal_of_path(into.path(), options, into.remarks)
 
 
 def import_message(message: Any, options: ImportOptions | None = None) -> ImportedGoal:
@@ -97,6 +114,8 @@ def import_message(message: Any, options: ImportOptions | None = None) -> Import
 
     :raises BrokenFile: it has no path, or a value is none of its field.
     """
+    from ur_cartesian_driver.importing.messages.ros_messages_file import collect_message
+
     into, options = PathCollector(), options or ImportOptions()
-    ros_messages_file.collect_message(message, options, into)
+    collect_message(message, options, into)
     return goal_of_path(into.path(), options, into.remarks)

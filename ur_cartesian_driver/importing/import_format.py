@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A format of files: its suffixes, its reader, and the treatment of each term that it knows.
+A format of files: its reader, and the treatment of each term that it knows.
 
 Reader and documentation use the same table of terms, so that what the page promises is what the
 reader does. Nothing is read as something else, and nothing is dropped in silence.
@@ -10,7 +10,7 @@ reader does. Nothing is read as something else, and nothing is dropped in silenc
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
@@ -46,16 +46,13 @@ class Term:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportFormat:
-    """A format, as :func:`~ur_cartesian_driver.importing.import_file` finds it."""
+    """A format, as :func:`~ur_cartesian_driver.importing.import_file` uses it."""
 
-    name: str
-    #: In lower case, with their dot.
-    suffixes: tuple[str, ...]
-    terms: Mapping[str, Term]
-    #: The treatment of terms that the table does not have, a sentence for the documentation.
-    others: str
     #: Reads a file; raises BrokenFile, ImportError where a package is missing, or OSError.
     collect: Callable[[Path, ImportOptions, PathCollector], None]
+    #: The terms that the reader knows, and a sentence on all others: for the documentation.
+    terms: Mapping[str, Term] = field(default_factory=dict)
+    others: str = ''
 
 
 _T = TypeVar('_T', bound=Term)

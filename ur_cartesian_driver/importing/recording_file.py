@@ -134,8 +134,6 @@ def _refuse_first(wrong: ArrayLike, why: str) -> None:
 
 
 FORMAT = ImportFormat(
-    name='recording',
-    suffixes=('.npz', '.part'),
     terms=TERMS,
     others='A file of other arrays is no recording, and refused.',
     collect=collect_recording,

@@ -9,10 +9,12 @@ The titles are the names of the columns with their units, in the form that the i
 from __future__ import annotations
 
 import csv
-from typing import Any, TextIO
+from io import TextIOWrapper
+from typing import Any, BinaryIO
 
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.driver.recordings.export_options import ExportOptions
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYPE
 
@@ -31,7 +33,7 @@ _PARTS = {
 _SECONDS = ('time', 'lag', 'buffered')
 
 
-def write_csv(recording: Recording, file: TextIO) -> None:
+def write_csv(recording: Recording, file: BinaryIO, options: ExportOptions) -> None:
     """Write all packets."""
     columns: dict[str, NDArray[Any]] = {}
     for name in EXECUTED_DTYPE.names or ():
@@ -47,6 +49,10 @@ def write_csv(recording: Recording, file: TextIO) -> None:
         'deviation_angle [rad]': deviation.angle,
         'planned_time [s]': deviation.planned_time,
     }
-    writer = csv.writer(file, lineterminator='\n')
+    text = TextIOWrapper(file, encoding='utf-8', newline='')
+    writer = csv.writer(text, lineterminator='\n')
     writer.writerow(columns)
-    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    for row in zip(*(column.tolist() for column in columns.values()), strict=True):
+        writer.writerow(row)
+        options.progress()
+    text.detach()  # else the file would be closed with it

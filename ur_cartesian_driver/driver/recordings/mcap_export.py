@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.driver.recordings.export_options import ExportOptions
 from ur_cartesian_driver.driver.recordings.message_definitions import message_definition
 from ur_cartesian_driver.driver.recordings.recording import Floats, Recording
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -48,17 +49,10 @@ _Message: TypeAlias = dict[str, Any]
 _Record: TypeAlias = tuple[int, str, str, _Message]
 
 
-def write_mcap(
-    recording: Recording,
-    file: BinaryIO,
-    tf_prefix: str = '',
-    progress: Callable[[], object] = lambda: None,
-) -> None:
+def write_mcap(recording: Recording, file: BinaryIO, options: ExportOptions) -> None:
     """
     Write all packets, the plan and the events.
 
-    :param tf_prefix: of the names of frames and joints.
-    :param progress: called after each packet.
     :raises ImportError: the packages for MCAP are not installed.
     :raises OSError: the definition of a message is not installed, or the file cannot be written.
     :raises ValueError: the recording does not say when it was made.
@@ -70,7 +64,7 @@ def write_mcap(
             'MCAP needs mcap and mcap-ros2-support, which are not installed; install them by pip '
             "install mcap-ros2-support, or the extra 'export' of this package"
         ) from None
-    messages = _Messages(recording, tf_prefix)
+    messages = _Messages(recording, options.tf_prefix)
     schemas: dict[str, Any] = {}
     with Writer(file) as writer:
         writer.add_metadata(
@@ -81,7 +75,10 @@ def write_mcap(
             },
         )
         for time, topic, kind, message in heapq.merge(
-            messages.single(), messages.numbers(), messages.packets(progress), key=_log_time
+            messages.single(),
+            messages.numbers(),
+            messages.packets(options.progress),
+            key=_log_time,
         ):
             if kind not in schemas:
                 schemas[kind] = writer.register_msgdef(

@@ -89,8 +89,6 @@ def _add(contour: list[Stretch], into: PathCollector) -> None:
 
 
 FORMAT = ImportFormat(
-    name='dxf',
-    suffixes=('.dxf',),
     terms=TERMS,
     others='Every other entity is left out, and said, and so is every other group code of an '
     'entity that is followed. All else in a drawing is for showing, editing and plotting it.',

@@ -24,8 +24,6 @@ def collect_gcode(file: Path, options: ImportOptions, into: PathCollector) -> No
 
 
 FORMAT = ImportFormat(
-    name='gcode',
-    suffixes=('.gcode', '.nc', '.ngc', '.gco', '.gc', '.g', '.tap', '.cnc', '.mpf'),
     terms=CODES,
     others='Every other code and word refuses the file.',
     collect=collect_gcode,

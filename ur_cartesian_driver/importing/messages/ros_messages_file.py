@@ -374,8 +374,6 @@ def _joint_order(names: Sequence[str], line: int, remarks: ImportNotes) -> list[
 
 
 FORMAT = ImportFormat(
-    name='ros',
-    suffixes=('.yaml', '.yml'),
     terms=TERMS,
     others='Every other field is left out, and said; every other message is refused.',
     collect=collect_yaml,

@@ -91,8 +91,6 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
 
 
 FORMAT = ImportFormat(
-    name='urscript',
-    suffixes=('.script', '.urscript'),
     terms=TERMS,
     others='Every other function refuses the file, unless the file defines it.',
     collect=collect_urscript,

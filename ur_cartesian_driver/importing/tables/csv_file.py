@@ -119,8 +119,6 @@ def _orientations(values: Mapping[str, Floats], lines: Sequence[int]) -> Floats 
 
 
 FORMAT = ImportFormat(
-    name='csv',
-    suffixes=('.csv', '.tsv', '.txt'),
     terms=TERMS,
     others='Every other column is left out, and said, unless it could be an orientation.',
     collect=collect_csv,

@@ -1,0 +1,117 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Formats of files by name and suffix: ours, and those of other packages.
+
+Another package declares its formats as entry points, so their names are known without importing
+it. A format is imported when a file needs it: a broken package disturbs only those who ask for its
+format, and they get a sentence that names it. Ours are a table and no entry points, because a
+checkout on PYTHONPATH has no metadata.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from importlib.metadata import entry_points, EntryPoint
+import logging
+from typing import Generic, TypeVar
+
+_Format = TypeVar('_Format')
+_LOG = logging.getLogger(__name__)
+
+
+class FileFormats(Generic[_Format]):
+    """The formats that are read, or those that are written."""
+
+    def __init__(
+        self, group: str, built_in: Mapping[str, str], refusals: tuple[type[Exception], ...]
+    ) -> None:
+        """
+        Take our formats.
+
+        :param group: the group of the entry points of other packages.
+        :param built_in: names and suffixes, separated by spaces, by ``module:object``.
+        :param refusals: exceptions that tell what is wrong with a file; all others are faults of
+            the package.
+        """
+        self.built_in = {
+            name: EntryPoint(name, value, group)
+            for value, names in built_in.items()
+            for name in names.split()
+        }
+        self._group = group
+        self._refusals = refusals
+
+    @cached_property
+    def _of_others(self) -> Mapping[str, list[EntryPoint]]:
+        found: dict[str, list[EntryPoint]] = {}
+        for entry in entry_points(group=self._group):
+            found.setdefault(entry.name.lower(), []).append(entry)
+        return found
+
+    def __contains__(self, name: str) -> bool:
+        """Tell whether there is a format of this name or suffix."""
+        return name in self.built_in or name in self._of_others
+
+    def names(self) -> list[str]:
+        """Return the names of the formats, ours first."""
+        return [name for name in self._declared() if not name.startswith('.')]
+
+    def suffixes(self) -> list[str]:
+        """Return the suffixes with their dots, ours first."""
+        return [name for name in self._declared() if name.startswith('.')]
+
+    def _declared(self) -> list[str]:
+        return [*self.built_in, *sorted(self._of_others.keys() - self.built_in.keys())]
+
+    @contextmanager
+    def using(self, name: str) -> Iterator[_Format]:
+        """
+        Yield the format of a name or suffix; blame its package for what fails meanwhile.
+
+        :raises ImportError: the package is broken, or two packages declare this name.
+        """
+        others = self._of_others.get(name, [])
+        if name in self.built_in:
+            for entry in others:
+                _LOG.warning(
+                    '%s is not used: %s is built in; it needs another name', _source(entry), name
+                )
+            yield self.built_in[name].load()
+            return
+        if len(others) > 1:
+            raise ImportError(
+                f'{name} is declared by {" and by ".join(map(_source, others))}; uninstall one of '
+                'these packages'
+            )
+        with _blaming(others[0]):
+            found = others[0].load()
+        with _blaming(others[0], self._refusals):
+            yield found
+
+    def __getitem__(self, name: str) -> _Format:
+        """Return the format of a name or suffix."""
+        with self.using(name) as found:
+            return found
+
+
+@contextmanager
+def _blaming(entry: EntryPoint, but: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Turn exceptions, but for some, into a sentence that names the package of a format."""
+    try:
+        yield
+    except but:
+        raise
+    except (Exception, SystemExit) as error:
+        reason = ' '.join(f'{type(error).__name__}: {error}'.split())
+        raise ImportError(
+            f'{_source(entry)} failed with {reason}; update or uninstall this package'
+        ) from error
+
+
+def _source(entry: EntryPoint) -> str:
+    """Return the declaration of a format, and its package."""
+    assert entry.dist is not None  # it was found there
+    return f"'{entry.name} = {entry.value}' of {entry.dist.name} {entry.dist.version}"
