@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Formats of other packages: found by name and suffix, and harmless where they are broken."""
 
+from importlib.util import find_spec
 import os
 import subprocess
 import sys
 
+from pages import CHECKOUT, save_files
 import pytest
 from synthetic_recording import only_file, packet, record
 import yaml
@@ -14,6 +16,7 @@ from ur_cartesian_driver.cli.export_command import EXPORTERS
 from ur_cartesian_driver.file_formats import FileFormats
 from ur_cartesian_driver.importing import FORMATS, ImportFormat
 
+PAGE = CHECKOUT / 'doc' / 'adding_a_format.md'
 CSV = 'x [m],y [m],z [m]\n0.1,0.2,0.3\n0.4,0.2,0.3\n'
 READER = """
 from ur_cartesian_driver.importing import ImportFormat
@@ -258,3 +261,34 @@ def test_an_export_that_fails_leaves_no_file(folder, recording):
         "KeyError: 'x'; update or uninstall this package\n"
     )
     assert list(folder.glob('seam*')) == []
+
+
+# ---- the page ------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the page')
+def test_the_package_of_the_page_is_installed_and_works(tmp_path, recording):
+    if not (find_spec('pip') and find_spec('setuptools')):
+        pytest.skip('needs pip and setuptools')
+    source, site = tmp_path / 'source', tmp_path / 'site'
+    source.mkdir()
+    save_files(PAGE, source)
+    offline = ('--no-deps', '--no-build-isolation', '--no-index', '--quiet', '--target', site)
+    status, _, said = run(source, '-m', 'pip', 'install', *offline, source)
+    assert status == 0, said
+    test = tmp_path / 'test_point_list.py'
+    test.write_text((source / test.name).read_text())
+    status, shown, _ = run(site, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', test)
+    assert status == 0, shown
+    assert '2 passed' in shown
+
+    assert command(site, 'export', recording, '-o', 'seam.xyz') == (
+        0,
+        '20 packets: seam.xyz\n',
+        '',
+    )
+    status, goal, said = command(site, 'import', 'seam.xyz', '--unit', 'm', '--format', 'points')
+    assert status == 0, said
+    assert positions(goal)[5] == [0.001, 0.001, 0.0]
+    assert len(positions(goal)) == 20
