@@ -95,7 +95,9 @@ def test_our_exporters_are_there():
 def formats(folder, monkeypatch):
     """Return a table that has seen no other packages yet."""
     monkeypatch.syspath_prepend(folder)
-    return FileFormats('ur_cartesian_driver.importers', {'io:StringIO': 'text .txt'}, ())
+    yield FileFormats('ur_cartesian_driver.importers', {'io:StringIO': 'text .txt'}, ())
+    for module in ('alphabet', 'newer'):
+        sys.modules.pop(module, None)
 
 
 def test_names_are_known_without_importing_the_package(formats):
@@ -105,7 +107,6 @@ def test_names_are_known_without_importing_the_package(formats):
     assert '.xyz' not in formats
     assert 'alphabet' not in sys.modules
     assert isinstance(formats['.abc'], ImportFormat)
-    del sys.modules['alphabet']
 
 
 def test_case_makes_no_difference(formats, folder):
@@ -240,6 +241,18 @@ def test_of_two_packages_with_one_suffix_none_is_taken(formats, folder):
         "'.abc = alphabet:FORMAT' of alphabet 1.5 and",
         "'.abc = letters:FORMAT' of letters 1.5",
     }
+
+
+def test_damaged_metadata_of_a_package_hides_no_other_one(formats, folder, caplog):
+    install(folder, 'damaged', 'nonsense')
+    assert isinstance(formats['.abc'], ImportFormat)
+    assert caplog.messages == ['the entry points of damaged are damaged; reinstall it']
+
+
+def test_a_package_that_is_installed_twice_counts_once(formats, folder, monkeypatch):
+    install(folder / 'overlay', 'alphabet', '.abc = newer:FORMAT', newer=READER)
+    monkeypatch.syspath_prepend(folder / 'overlay')
+    assert isinstance(formats['.abc'], ImportFormat)
 
 
 @pytest.fixture

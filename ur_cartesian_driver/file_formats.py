@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
-from importlib.metadata import entry_points, EntryPoint
+from importlib.metadata import distributions, EntryPoint
 import logging
 from typing import Generic, TypeVar
 
@@ -45,10 +45,18 @@ class FileFormats(Generic[_Format]):
         self._refusals = refusals
 
     @cached_property
-    def _of_others(self) -> Mapping[str, list[EntryPoint]]:
-        found: dict[str, list[EntryPoint]] = {}
-        for entry in entry_points(group=self._group):
-            found.setdefault(entry.name.lower(), []).append(entry)
+    def _of_others(self) -> Mapping[str, Mapping[str, EntryPoint]]:
+        """Return the declarations of each name by their packages."""
+        found: dict[str, dict[str, EntryPoint]] = {}
+        for package in distributions():
+            try:
+                entries = package.entry_points.select(group=self._group)
+            except Exception:  # each malformed line raises its own
+                _LOG.warning('the entry points of %s are damaged; reinstall it', package.name)
+                continue
+            for entry in entries:
+                # A package that is installed twice, as under an overlay, counts once: the first.
+                found.setdefault(entry.name.lower(), {}).setdefault(package.name, entry)
         return found
 
     def __contains__(self, name: str) -> bool:
@@ -73,7 +81,7 @@ class FileFormats(Generic[_Format]):
 
         :raises ImportError: the package is broken, or two packages declare this name.
         """
-        others = self._of_others.get(name, [])
+        others = list(self._of_others.get(name, {}).values())
         if name in self.built_in:
             for entry in others:
                 _LOG.warning(
