@@ -1,60 +1,57 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write ``config/driver.yaml``: each parameter with its description, choices and default.
+Bring ``config/driver.yaml`` up to date: each parameter's description, values and default.
 
-A test compares the file with the declarations; this script brings it up to date::
+The file itself has the sections, and the order of the parameters. So a new parameter is written
+into its section as ``NAME:``, and this script does the rest::
 
     python scripts/make_parameter_file.py
+
+A test compares the file with the declarations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+import re
 import textwrap
 
 import yaml
 
-from ur_cartesian_driver.ros.parameters.node_parameters import defaults
-from ur_cartesian_driver.ros.parameters.parameter_table import ParameterDeclaration, SECTIONS
+from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterDeclaration
 
 FILE = Path(__file__).resolve().parents[1] / 'config' / 'driver.yaml'
 
 _WRAPPER = textwrap.TextWrapper(93, break_on_hyphens=False)
-_HEAD = """\
-# All parameters of the node ur_cartesian_driver, with their defaults.
-# ros2 run ur_cartesian_driver driver --ros-args --params-file driver.yaml
-# `ros2 param describe /ur_cartesian_driver NAME` explains a parameter too.
-
-/**:
-  ros__parameters:
-"""
+_KEPT, _NAME = re.compile(r'#|/|  ros__|    # ---|$'), re.compile(r'    (\w+):')
 
 
 def text() -> str:
     """Return the text of the file."""
-    return _HEAD + '\n'.join(_lines())
+    lines = FILE.read_text(encoding='utf-8').splitlines()
+    return ''.join(f'{line}\n' for each in lines for line in _renewed(each))
 
 
-def _lines() -> Iterator[str]:
-    values = defaults()
-    for title, declarations in SECTIONS.items():
-        yield f'    # --- {title} {"-" * (87 - len(title))}\n'
-        for declaration in declarations:
-            for paragraph in _remark(declaration).splitlines():
-                yield from (f'    # {line}' for line in _WRAPPER.wrap(paragraph))
-            value, *_ = yaml.safe_dump(
-                values[declaration.name], default_flow_style=True
-            ).splitlines()
-            yield f'    {declaration.name}: {value}'
-        yield ''
+def _renewed(line: str) -> Iterator[str]:
+    """Yield a line as it is, or a parameter anew; nothing for the comments of parameters."""
+    if _KEPT.match(line):
+        yield line
+    elif found := _NAME.match(line):
+        for each in DECLARATIONS:
+            if each.name == found[1]:  # none, if it is a parameter no longer
+                yield from _lines(each)
 
 
-def _remark(declaration: ParameterDeclaration) -> str:
-    if not declaration.choices:
-        return declaration.description
-    return f'{declaration.description} One of: {", ".join(declaration.choices)}.'
+def _lines(declaration: ParameterDeclaration) -> Iterator[str]:
+    remark = declaration.description
+    if values := declaration.values:
+        remark += f' {values[0].upper()}{values[1:]}.'
+    for paragraph in remark.splitlines():
+        yield from (f'    # {line}' for line in _WRAPPER.wrap(paragraph))
+    value, *_ = yaml.safe_dump(declaration.default, default_flow_style=True).splitlines()
+    yield f'    {declaration.name}: {value}'
 
 
 if __name__ == '__main__':

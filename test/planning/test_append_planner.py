@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.planning.options import MAX_POINTS
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))
@@ -195,6 +196,21 @@ def test_parts_become_what_the_whole_goal_is(goal, sizes):
     assert rows.time[passed] == pytest.approx(whole.reference.time[passed], abs=1e-4)
     assert part.next_goal.points == COUNT
     assert part.ending_records == 0
+
+
+def test_points_are_appended_where_the_limit_of_points_is_the_largest():
+    """The points that are planned again with them come on top."""
+    options = replace(OPTIONS, max_points=MAX_POINTS)
+    goal = moves(1)
+    first = plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, options)
+    part = plan_append(
+        plan_first_part(first, ARM, options).next_goal,
+        AppendedPoints(**of(goal, 4, COUNT), last=True),
+        ARM,
+        options,
+        from_rest=False,
+    )
+    assert part.next_goal.points == COUNT
 
 
 def unsigned(path):

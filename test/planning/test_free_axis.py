@@ -28,6 +28,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.options import MAX_CLEARANCE
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
 #: How many random paths: 300 for development.
@@ -152,6 +153,14 @@ def test_nothing_turns_without_a_reason():
     goal = line(20, dy=0.1, free_axis=FreeAxis.Z, free_min=-0.5, free_max=0.5)
     made = plan(goal, STATE, ARM, PlanningOptions())
     assert max(map(abs, rotations(goal, made))) < 0.05
+
+
+@pytest.mark.slow
+def test_the_widest_clearance_is_looked_for_too():
+    """The search looks a little farther than a goal needs."""
+    options = PlanningOptions(min_clearance=MAX_CLEARANCE, self_collision='warn')
+    made = plan(line(2, dy=0.04, free_axis=FreeAxis.Z), STATE, ARM, options)
+    assert 'less than min_clearance = 1.0000 m' in ' '.join(made.report)
 
 
 def test_fixed_points_keep_their_orientation():

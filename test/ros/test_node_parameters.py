@@ -1,6 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import fields
+from math import inf, nextafter
 import re
 from typing import get_args, get_origin, get_type_hints, Literal
 
@@ -13,6 +14,7 @@ import yaml
 
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.motion.goal.parameter_fields import parameter_fields
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 from ur_cartesian_driver.resources import share_path
@@ -20,11 +22,12 @@ from ur_cartesian_driver.ros.parameters.node_parameters import (
     as_overrides,
     declare_parameters,
     defaults,
-    NodeSettings,
 )
+from ur_cartesian_driver.ros.parameters.node_settings import NodeSettings
 from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterError
 
 FILE = share_path() / 'config' / 'driver.yaml'
+OWNERS = (DriverConfig, PlanningOptions, NodeSettings)
 
 
 @pytest.fixture(scope='module')
@@ -63,16 +66,24 @@ def test_the_file_holds_all_parameters_with_their_defaults():
 
 
 def test_choices_are_those_of_the_tables_and_types_that_use_them():
-    choices = {declaration.name: declaration.choices for declaration in DECLARATIONS}
-    assert choices['ur_type'] == list(MODELS)
-    assert choices['wire_dialect'] == list(DIALECTS)
+    choices = {declaration.name: declaration.field.choices for declaration in DECLARATIONS}
+    assert choices['ur_type'] == tuple(MODELS)
+    assert choices['wire_dialect'] == tuple(DIALECTS)
     for name, kind in get_type_hints(PlanningOptions).items():
         if get_origin(kind) is Literal:
             assert set(choices[name]) == set(get_args(kind)), name
 
 
-def test_the_file_has_the_order_of_the_declarations():
-    assert list(in_the_file()) == [declaration.name for declaration in DECLARATIONS]
+def test_the_file_has_every_parameter_once():
+    names = re.findall(r'^    (\w+):', FILE.read_text(), re.MULTILINE)
+    assert sorted(names) == sorted(declaration.name for declaration in DECLARATIONS)
+
+
+def test_the_file_tells_the_values_of_a_parameter():
+    text = ' '.join(FILE.read_text().replace('    #', ' ').split())
+    assert 'at 500 Hz. Range: 20 to 1000. servo_buffer_depth: 250' in text
+    assert 'CB3: 125). Range: 0 or 10 to 500. rtde_frequency: 0.0' in text
+    assert 'or slow it down. One of: refuse, slow. on_too_fast: refuse' in text
 
 
 def test_every_parameter_is_declared_once():
@@ -97,7 +108,86 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
 
 def test_every_default_is_in_its_range():
     for declaration in DECLARATIONS:
-        declaration.check(defaults()[declaration.name], defaults()[declaration.name])
+        declaration.check(defaults()[declaration.name])
+
+
+def ranges(kind):
+    """Return the least and the largest value of each number of a dataclass, by its name."""
+    return {
+        each.name: [type(each.default)(bound) for bound in (each.range.low, each.range.high)]
+        for each in parameter_fields(kind)
+        if each.range is not None
+    }
+
+
+def beside(bound, direction):
+    return bound + direction if type(bound) is int else nextafter(bound, direction * inf)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', OWNERS)
+def test_a_number_is_refused_just_outside_its_range_in_ros_and_in_python(declared, kind):
+    refused = 0
+    for name, (low, high) in ranges(kind).items():
+        for value in (beside(low, -1), beside(high, 1)):
+            fault = f'{name} is {value}, but must .*lie between {low:.10g} and {high:.10g}\\.$'
+            with pytest.raises(ValueError, match=f'^{fault}'):
+                kind(**{name: value})
+            with pytest.raises(ParameterError, match=f'^Parameter {fault}'):
+                declared({name: value})
+            refused += 1
+    assert refused >= {DriverConfig: 46, PlanningOptions: 90, NodeSettings: 10}[kind]
+
+
+@pytest.mark.parametrize('end', [0, 1])
+def test_the_ends_of_all_ranges_are_taken_in_ros_and_in_python(declared, end):
+    """All at once, because some parameters bound each other."""
+    ends = {kind: {name: both[end] for name, both in ranges(kind).items()} for kind in OWNERS}
+    driver, planning, node = (kind(**values) for kind, values in ends.items())
+    settings, _ = declared({name: value for each in ends.values() for name, value in each.items()})
+    assert (settings.driver, settings.planning, settings.node) == (driver, planning, node)
+    assert driver.servoj_gain == (100.0, 2000.0)[end]
+    assert planning.max_points == (1, 1_000_000)[end]
+    assert node.tf_max_age == (0.001, 3600.0)[end]
+
+
+def test_descriptors_show_ranges_and_choices(declared):
+    _, descriptors = declared()
+    shown = 0
+    for name, bounds in {n: b for kind in OWNERS for n, b in ranges(kind).items()}.items():
+        descriptor = descriptors[name]
+        (found,) = descriptor.integer_range or descriptor.floating_point_range
+        if name == 'rtde_frequency':
+            bounds = [0.0, 500.0]
+            assert descriptor.additional_constraints == 'range: 0 or 10 to 500'
+        assert [found.from_value, found.to_value] == bounds, name
+        shown += 1
+    assert shown >= 70
+    assert descriptors['on_too_fast'].additional_constraints == 'one of: refuse, slow'
+
+
+def test_0_is_a_rate_beside_its_range(declared):
+    assert DriverConfig(rtde_frequency=0.0) == declared({'rtde_frequency': 0.0})[0].driver
+    with pytest.raises(ValueError, match=r'^rtde_frequency is 9\.9, but must be 0 \(as often as'):
+        DriverConfig(rtde_frequency=9.9)
+
+
+@pytest.mark.parametrize('kind', OWNERS)
+def test_other_texts_than_the_choices_are_refused_in_python_too(kind):
+    names = [each.name for each in parameter_fields(kind) if each.choices]
+    assert len(names) >= 1
+    for name in names:
+        with pytest.raises(ValueError, match=f"^{name} is 'other', but must be one of "):
+            kind(**{name: 'other'})
+
+
+def test_a_description_is_the_comment_of_the_field(declared):
+    _, descriptors = declared()
+    assert descriptors['tf_prefix'].description == (
+        'Prefix of joint and frame names, for two robots in one description, for example left_.'
+    )
+    *_, example = descriptors['safe_outputs'].description.split('\n')
+    assert example == "Example: ['standard_digital 3 0', 'standard_analog 0 0.0 current']"
 
 
 def test_nothing_given_means_the_defaults(declared):

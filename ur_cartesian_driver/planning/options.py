@@ -5,42 +5,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
-from typing import get_args, Literal, TypeAlias
+from typing import Annotated, Literal
 
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
-from ur_cartesian_driver.motion.goal.declared_types import declare_types
+from ur_cartesian_driver.motion.goal.field_table import Range
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
+from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
-#: The wire carries joint positions no finer than this [m].
-MIN_SPLINE_TOLERANCE = 1e-6
-
-Choice: TypeAlias = Literal['refuse', 'slow']
-PostureChoice: TypeAlias = Literal['refuse', 'movej']
-CollisionChoice: TypeAlias = Literal['off', 'warn', 'refuse', 'auto']
-_CHOICES = {
-    'on_too_fast': Choice,
-    'on_posture_change': PostureChoice,
-    'self_collision': CollisionChoice,
-}
-#: Options that must not be 0.
-_POSITIVE = (
-    *(
-        f'{quantity}_{rate}'
-        for quantity in ('linear', 'angular', 'joint', 'optimized')
-        for rate in ('velocity', 'acceleration')
-    ),
-    'keep_open_deceleration',
-    'live_target_linear_velocity',
-    'live_target_linear_acceleration',
-    'live_target_angular_velocity',
-    'live_target_angular_acceleration',
-    'live_target_joint_velocity',
-    'live_target_max_age',
-    'live_target_timeout',
-)
+#: The longest path, and the widest clearance [m], that make sense.
+MAX_POINTS, MAX_CLEARANCE = 1_000_000, 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,141 +26,177 @@ class PlanningOptions:
     :raises ValueError: an option is not in its range.
     """
 
-    #: Maximum number of points.
-    max_points: int = 100_000
-    #: Maximum age of ``header.stamp`` on receipt [s].
-    stamp_tolerance: float = 1.0
-    #: How far the robot may be from a first point at time 0 [m], [rad].
-    start_tolerance_position: float = 0.001
-    start_tolerance_angle: float = 0.01
-    #: Maximum distance of the tool to the first point [m]; 0 = no bound.
-    max_approach_distance: float = 0.5
-    #: Maximum speed of the TCP [m/s]; 0 = no bound.
-    max_tool_speed: float = 0.25
-    #: What to do with a goal whose times need more speed than the limits allow.
-    on_too_fast: Choice = 'refuse'
-    #: What to do with a line or an arc that cannot arrive in the requested posture, or that the
-    #: arm cannot follow although it can reach the end.
-    on_posture_change: PostureChoice = 'refuse'
-    #: What to do where the arm comes too close to itself; auto: refuse for the models that have
-    #: meshes, warn for the others.
-    self_collision: CollisionChoice = 'auto'
-    #: Minimum distance of the arm to itself [m].
-    min_clearance: float = 0.005
-    #: Radius of a tool between the flange and the TCP, for these checks [m]; 0 = none.
-    tool_radius: float = 0.0
-    #: Planes that the arm must not cross, each 'name x y z nx ny nz [margin]' in base [m].
+    #: Largest number of points. 20,000 in flat arrays (packed) arrive within milliseconds, as
+    #: messages of their own within 2 s.
+    max_points: Annotated[int, Range(1, MAX_POINTS)] = 100_000
+    #: Largest age of a goal's header.stamp on arrival [s].
+    stamp_tolerance: Annotated[float, Range(0.0, 3600.0)] = 1.0
+    #: Largest distance of the TCP from a first point at time 0, which is where the robot stands
+    #: [m].
+    start_tolerance_position: Annotated[float, Range(0.0, 1.0)] = 0.001
+    #: Largest angle of the TCP from a first point at time 0 [rad].
+    start_tolerance_angle: Annotated[float, Range(0.0, 3.2)] = 0.01
+    #: Largest distance of the tool to the first point [m]; 0.0: no limit. Catches poses in a wrong
+    #: frame or unit.
+    max_approach_distance: Annotated[float, Range(0.0, 10.0)] = 0.5
+    #: Largest speed of the TCP [m/s]; 0.0: no limit. Motions without times are slowed down to it;
+    #: for timed ones that need more, see on_too_fast. 0.25 m/s is the usual limit for working next
+    #: to an arm; raise it when you know your cell.
+    max_tool_speed: Annotated[float, Range(0.0, 10.0)] = 0.25
+    #: The times of a goal need more speed than the limits allow: refuse it, or slow it down.
+    on_too_fast: Literal['refuse', 'slow'] = 'refuse'
+    #: A line or arc cannot arrive in the required posture, or passes a singularity, the end of a
+    #: joint's range or poses out of reach. refuse: refuse the goal. movej: go to its end by a
+    #: joint motion; the path is then not straight.
+    on_posture_change: Literal['refuse', 'movej'] = 'refuse'
+    #: The arm comes closer to itself than min_clearance: 'off' (in quotes: YAML reads the bare
+    #: word as false), warn (in the report), refuse, or auto: refuse for the models that have
+    #: meshes (UR3, UR5, UR10, UR3e, UR5e, UR7e), warn for the others. Cylinders that contain the
+    #: arm are measured where there are no meshes or the extra `collision` is not installed.
+    self_collision: Literal['auto', 'off', 'warn', 'refuse'] = 'auto'
+    #: Smallest distance of the arm to itself [m]. An arm differs from its model by some
+    #: millimetres.
+    min_clearance: Annotated[float, Range(0.0, MAX_CLEARANCE)] = 0.005
+    #: Radius of a cylinder from flange to TCP that stands for the tool, for self_collision and
+    #: workspace_planes [m]; 0.0: no tool.
+    tool_radius: Annotated[float, Range(0.0, 1.0)] = 0.0
+    #: Each 'name x y z nx ny nz [margin]' [m]: planes that neither the arm beyond its base, nor
+    #: the tool, nor the TCP may cross; a point on the plane, its normal, which points to the
+    #: allowed side (both in base, not base_link), and the distance to keep. Goals that cross one
+    #: are refused. Empty texts are skipped.
+    #:
+    #: Example: ['table 0 0 0 0 0 1', 'wall 0 0.6 0 0 -1 0 0.05']
     workspace_planes: tuple[str, ...] = ()
-    #: Values that outputs take when a motion does not go on as planned, each 'kind pin value
-    #: [current | voltage] [restore]'.
+    #: Each 'kind pin value [current | voltage] [restore]': the value that an output takes when a
+    #: goal or live session ends other than by success, and when the arm stops in a pause or a
+    #: protective stop. kind is standard_digital, configurable_digital, tool_digital or
+    #: standard_analog (value: fraction of the range). restore: it gets its value back after a
+    #: pause; without it, a pause that changed the output ends the goal. A goal may name others.
+    #: Empty texts are skipped.
+    #:
+    #: Example: ['standard_digital 3 0', 'standard_analog 0 0.0 current']
     safe_outputs: tuple[str, ...] = ()
-    #: How close a line or an arc may come to a singularity: angle of wrist 2 [rad], angle of the
-    #: elbow [rad], distance of the wrist centre from the plane of axes 1 and 2 [m]; 0 = off.
-    singularity_margin_wrist: float = 0.05
-    singularity_margin_elbow: float = 0.05
-    singularity_margin_shoulder: float = 0.02
-    #: Whether a goal may set a temporary TCP.
+    #: Smallest angle between wrist 2 and the straight wrist on lines and arcs [rad]; 0.0: no
+    #: limit. Near a singularity joints move fast or have to flip. Does not apply to joint motions,
+    #: nor where the arm starts there and moves away.
+    singularity_margin_wrist: Annotated[float, Range(0.0, 1.0)] = 0.05
+    #: Smallest angle between the elbow and the stretched arm on lines and arcs [rad]; 0.0: no
+    #: limit.
+    singularity_margin_elbow: Annotated[float, Range(0.0, 1.0)] = 0.05
+    #: Smallest distance of the wrist centre from the point above or below the shoulder, measured
+    #: along the arm, on lines and arcs [m]; 0.0: no limit.
+    singularity_margin_shoulder: Annotated[float, Range(0.0, 1.0)] = 0.02
+    #: The controlled_frame of a goal is not the robot's active TCP. true: the TCP is set to that
+    #: frame until the goal ends. false: only goals that do not rotate it on straight or circular
+    #: segments are accepted.
     allow_tcp_change: bool = True
     #: Whether the kinematics is the robot's calibrated one; if not, arcs are sent as poses.
-    calibration_known: bool = True
+    calibration_known: Detected[bool] = True
     #: Whether the robot's software has OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
-    optimove_known: bool = True
+    optimove_known: Detected[bool] = True
     #: Whether it has path offsets of its own (PolyScope 5 from 5.6 on).
-    path_offset_known: bool = True
+    path_offset_known: Detected[bool] = True
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
-    acceleration_known: bool = True
+    acceleration_known: Detected[bool] = True
     #: The wire dialect of the robot program.
-    dialect: Dialect = NEWEST_DIALECT
+    dialect: Detected[Dialect] = NEWEST_DIALECT
     #: The functions of others that it contains.
-    prelude: Prelude = NO_PRELUDE
-    #: Prefix of the joint names in postures.
+    prelude: Detected[Prelude] = NO_PRELUDE
+    #: Prefix of joint and frame names, for two robots in one description, for example left_.
     tf_prefix: str = ''
 
-    #: Path tolerances on axes for which the goal gives none; 0 = no limit: [m], [rad], [m/s],
-    #: [rad/s], [m/s^2], [rad/s^2].
-    path_tolerance_position: float = 0.0
-    path_tolerance_orientation: float = 0.0
-    path_tolerance_linear_velocity: float = 0.0
-    path_tolerance_angular_velocity: float = 0.0
-    path_tolerance_linear_acceleration: float = 0.0
-    path_tolerance_angular_acceleration: float = 0.0
-    #: The same of the goal tolerances.
-    goal_tolerance_position: float = 0.0
-    goal_tolerance_orientation: float = 0.0
-    goal_tolerance_linear_velocity: float = 0.0
-    goal_tolerance_angular_velocity: float = 0.0
-    goal_tolerance_linear_acceleration: float = 0.0
-    goal_tolerance_angular_acceleration: float = 0.0
+    #: Largest position error on the path, where the goal does not specify one [m]; 0.0: no limit.
+    path_tolerance_position: Annotated[float, Range(0.0, 10.0)] = 0.0
+    #: Largest orientation error on the path, where the goal does not specify one [rad]; 0.0: no
+    #: limit.
+    path_tolerance_orientation: Annotated[float, Range(0.0, 3.2)] = 0.0
+    #: Largest velocity error on the path, where the goal does not specify one [m/s]; 0.0: no
+    #: limit.
+    path_tolerance_linear_velocity: Annotated[float, Range(0.0, 10.0)] = 0.0
+    #: Largest angular velocity error on the path, where the goal does not specify one [rad/s];
+    #: 0.0: no limit.
+    path_tolerance_angular_velocity: Annotated[float, Range(0.0, 50.0)] = 0.0
+    #: Largest acceleration error on the path, where the goal does not specify one [m/s^2]; 0.0: no
+    #: limit.
+    path_tolerance_linear_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
+    #: Largest angular acceleration error on the path, where the goal does not specify one
+    #: [rad/s^2]; 0.0: no limit.
+    path_tolerance_angular_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
+    #: Largest position error at the end, where the goal does not specify one [m]; 0.0: no limit.
+    goal_tolerance_position: Annotated[float, Range(0.0, 10.0)] = 0.0
+    #: Largest orientation error at the end, where the goal does not specify one [rad]; 0.0: no
+    #: limit.
+    goal_tolerance_orientation: Annotated[float, Range(0.0, 3.2)] = 0.0
+    #: Largest velocity error at the end, where the goal does not specify one [m/s]; 0.0: no limit.
+    goal_tolerance_linear_velocity: Annotated[float, Range(0.0, 10.0)] = 0.0
+    #: Largest angular velocity error at the end, where the goal does not specify one [rad/s]; 0.0:
+    #: no limit.
+    goal_tolerance_angular_velocity: Annotated[float, Range(0.0, 50.0)] = 0.0
+    #: Largest acceleration error at the end, where the goal does not specify one [m/s^2]; 0.0: no
+    #: limit.
+    goal_tolerance_linear_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
+    #: Largest angular acceleration error at the end, where the goal does not specify one
+    #: [rad/s^2]; 0.0: no limit.
+    goal_tolerance_angular_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
 
-    #: How fast the robot turns the tool on a line for each m/s of its speed [rad/s]: 4 was
-    #: recorded once, 1 is the manual's word. Limits hold for both where a time is sent.
-    turn_ratio: float = 4.0
+    #: How fast the robot turns the tool on lines for each m/s of their speed [rad/s]: 4 was
+    #: recorded once, 1 is the manual's word.
+    turn_ratio: Annotated[float, Range(1.0, 4.0)] = 4.0
 
-    #: Defaults of speed and acceleration: tool [m/s], [m/s^2],
-    linear_velocity: float = 0.1
-    linear_acceleration: float = 0.5
-    #: rotation of the tool [rad/s], [rad/s^2],
-    angular_velocity: float = 0.5
-    angular_acceleration: float = 1.0
-    #: leading joint of joint moves [rad/s], [rad/s^2],
-    joint_velocity: float = 0.5
-    joint_acceleration: float = 1.0
-    #: fractions of the robot's limits in OPTIMIZED moves, (0, 1].
-    optimized_velocity: float = 0.3
-    optimized_acceleration: float = 0.3
+    #: Speed of the tool on lines and arcs [m/s].
+    linear_velocity: Annotated[float, Range(0.0001, 10.0)] = 0.1
+    #: Acceleration of the tool on lines and arcs [m/s^2].
+    linear_acceleration: Annotated[float, Range(0.001, 100.0)] = 0.5
+    #: Angular speed of the tool on segments that only rotate it [rad/s].
+    angular_velocity: Annotated[float, Range(0.001, 20.0)] = 0.5
+    #: Angular acceleration of the tool on segments that only rotate it [rad/s^2].
+    angular_acceleration: Annotated[float, Range(0.01, 400.0)] = 1.0
+    #: Speed of the leading axis in joint motions [rad/s].
+    joint_velocity: Annotated[float, Range(0.001, 10.0)] = 0.5
+    #: Acceleration of the leading axis in joint motions [rad/s^2].
+    joint_acceleration: Annotated[float, Range(0.01, 400.0)] = 1.0
+    #: Speed of OPTIMIZED_* segments, as a fraction of the robot's limits.
+    optimized_velocity: Annotated[float, Range(0.001, 1.0)] = 0.3
+    #: Acceleration of OPTIMIZED_* segments, as a fraction of the robot's limits.
+    optimized_acceleration: Annotated[float, Range(0.001, 1.0)] = 0.3
 
-    #: Live targets: limits of the tool [m/s], [m/s^2], [rad/s], [rad/s^2] and of every joint
-    #: [rad/s],
-    live_target_linear_velocity: float = 0.25
-    live_target_linear_acceleration: float = 1.0
-    live_target_angular_velocity: float = 1.0
-    live_target_angular_acceleration: float = 4.0
-    live_target_joint_velocity: float = 1.5
-    #: maximum age of a target, and time after the last one at which the session ends [s].
-    live_target_max_age: float = 0.2
-    live_target_timeout: float = 2.0
+    #: Largest speed of the tool when it follows live targets [m/s]; not above max_tool_speed.
+    live_target_linear_velocity: Annotated[float, Range(0.0001, 10.0)] = 0.25
+    #: Acceleration of the tool when it follows live targets [m/s^2].
+    live_target_linear_acceleration: Annotated[float, Range(0.001, 100.0)] = 1.0
+    #: Largest angular speed of the tool when it follows live targets [rad/s].
+    live_target_angular_velocity: Annotated[float, Range(0.001, 20.0)] = 1.0
+    #: Angular acceleration of the tool when it follows live targets [rad/s^2].
+    live_target_angular_acceleration: Annotated[float, Range(0.01, 400.0)] = 4.0
+    #: Largest speed of a joint when the tool follows live targets [rad/s].
+    live_target_joint_velocity: Annotated[float, Range(0.001, 10.0)] = 1.5
+    #: Largest age of a live target, by its stamp or else since its receipt [s]; then the arm stops
+    #: smoothly until a newer one arrives.
+    live_target_max_age: Annotated[float, Range(0.01, 10.0)] = 0.2
+    #: Time after the last live target at which the session ends [s].
+    live_target_timeout: Annotated[float, Range(0.1, 3600.0)] = 2.0
 
-    #: Maximum accelerations that follow from times [m/s^2], [rad/s^2], [rad/s^2].
-    max_linear_acceleration: float = 10.0
-    max_angular_acceleration: float = 40.0
-    max_joint_acceleration: float = 40.0
-    #: SPLINE and SERVO: how far the tool may deviate from the curve through the points [m]; a turn
-    #: counts as its arc at 0.1 m.
-    spline_tolerance: float = 0.00005
-    #: Deceleration of the fastest joint where no more points are appended [rad/s^2].
-    keep_open_deceleration: float = 4.0
-    #: Maximum time of a segment [s]; the wire carries (2^31 - 1) us.
-    max_segment_time: float = 2147.483647
+    #: Largest acceleration of the tool that the times of a goal, or the arcs in which PROCESS
+    #: rounds its corners, may need [m/s^2].
+    max_linear_acceleration: Annotated[float, Range(0.1, 100.0)] = 10.0
+    #: Largest angular acceleration of the tool that the times of a goal may need [rad/s^2].
+    max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
+    #: Largest acceleration of a joint that the times of a goal may need [rad/s^2].
+    max_joint_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
+    # The wire carries joint positions no finer than the least tolerance.
+    #: Largest distance of the tool from the curve through the points of SPLINE and SERVO goals
+    #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value takes more
+    #: pieces on the wire.
+    spline_tolerance: Annotated[float, Range(1e-6, 0.01)] = 0.00005
+    #: Deceleration of the fastest joint where a goal with keep_open runs out of points [rad/s^2].
+    keep_open_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
+    #: Longest duration of one segment [s]; the default is the largest that the robot accepts.
+    max_segment_time: Annotated[float, Range(0.1, NEWEST_DIALECT.max_duration)] = (
+        NEWEST_DIALECT.max_duration
+    )
 
     def __post_init__(self) -> None:
         """Check types and ranges."""
-        declare_types(self)
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, float) and (not isfinite(value) or value < 0.0):
-                raise ValueError(f'{name} is {value}; it must be finite and not negative')
-        for name in _POSITIVE:
-            if getattr(self, name) == 0.0:
-                raise ValueError(f'{name} is 0; it must be positive')
-        for name in ('optimized_velocity', 'optimized_acceleration'):
-            if getattr(self, name) > 1.0:
-                raise ValueError(f'{name} is {getattr(self, name)}; it must not exceed 1')
-        for name, choices in _CHOICES.items():
-            value = getattr(self, name)
-            if value not in get_args(choices):
-                *others, last = (repr(choice) for choice in get_args(choices))
-                raise ValueError(f'{name} is {value!r}; it must be {", ".join(others)} or {last}')
-        if self.spline_tolerance < MIN_SPLINE_TOLERANCE:
-            raise ValueError(
-                f'spline_tolerance is {self.spline_tolerance}; it must be at least '
-                f'{MIN_SPLINE_TOLERANCE:g} m'
-            )
-        if self.max_segment_time > NEWEST_DIALECT.max_duration:
-            raise ValueError(
-                f'max_segment_time is {self.max_segment_time}; at most '
-                f'{NEWEST_DIALECT.max_duration} s can be sent'
-            )
+        check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
-        if self.max_points < 1:
-            raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

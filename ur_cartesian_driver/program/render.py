@@ -181,7 +181,7 @@ class ProgramSettings:
     stop_deceleration: float = 4.0
     #: Timeout of the next trajectory point [s].
     point_timeout: float = 0.5
-    #: Stiffness of ``servoj`` (100 to 2000), and its lookahead time [s] (0.03 to 0.2).
+    #: Stiffness of ``servoj``, and its lookahead time [s].
     servoj_gain: float = 1000.0
     servoj_lookahead_time: float = 0.06
     #: Capacity of the buffered servo [set-points].

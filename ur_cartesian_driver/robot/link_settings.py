@@ -4,73 +4,104 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 import ipaddress
-from math import isfinite
+from typing import Annotated, TypeAlias
 
-from ur_cartesian_driver.motion.goal.declared_types import declare_types
+from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.motion.goal.field_table import Range
+from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, Detected, OneOf
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
-#: A robot that reports less often cannot be monitored, nor be told from a lost one [Hz].
-MIN_RTDE_FREQUENCY = 10.0
+Port: TypeAlias = Annotated[int, Range(0, 65535)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
     """The connections to one robot; the defaults fit a real one."""
 
+    #: Address of the robot.
     robot_ip: str = '127.0.0.1'
-    #: Model that is expected, for example ``ur5e``; a robot that reports another is refused.
-    ur_type: str = 'ur5e'
-    rtde_port: int = 30004
-    primary_port: int = 30001
-    #: Where we listen for the robot program; 0 = any free port.
-    reverse_port: int = 50001
-    script_sender_port: int = 50002
-    trajectory_port: int = 50003
-    script_command_port: int = 50004
-    #: Address to listen on; empty = the local address of the RTDE connection.
+    #: Model of the robot. A robot that reports another model is refused: nothing moves.
+    ur_type: Annotated[str, OneOf(tuple(MODELS))] = 'ur5e'
+    #: RTDE port of the robot.
+    rtde_port: Port = 30004
+    #: Port of the primary interface of the robot.
+    primary_port: Port = 30001
+    #: Port on this computer to which the robot program connects for control messages; 0: any free
+    #: port. Two drivers on one computer need different ones, also of the next three.
+    reverse_port: Port = 50001
+    #: Port that serves the robot program to the External Control URCap; 0: any free port.
+    script_sender_port: Port = 50002
+    #: Port to which the robot program connects for trajectory points; 0: any free port.
+    trajectory_port: Port = 50003
+    #: Port to which the robot program connects for single commands; 0: any free port.
+    script_command_port: Port = 50004
+    #: Address at which the ports on this computer listen; empty: the local address of the
+    #: connection to the robot.
     bind_address: str = ''
-    #: Address that the robot program dials; empty = the one we listen on.
+    #: Address to which the robot program connects, where that is another one (NAT, containers);
+    #: empty: the same.
     reverse_ip: str = ''
-    #: Addresses that may connect; empty = robot_ip only.
+    #: Addresses that may connect to the ports on this computer; ['']: robot_ip.
     allowed_peers: tuple[str, ...] = ()
-    #: Upload the robot program ourselves; else a program on the robot asks for it.
+    #: true: the driver sends its program to the robot, which must be in remote control (no pendant
+    #: needed; the simulator always is): once, on the first connection, if the arm is ready and no
+    #: other program runs; later when ~/resend_robot_program is called. false: the robot fetches
+    #: the program when a person plays one with the External Control URCap on the pendant.
     headless_mode: bool = False
-    #: Which messages the robot program understands, by the version of the library that it came
-    #: with; other than the newest for a program that was saved on the robot.
-    wire_dialect: str = NEWEST_DIALECT.name
-    #: Without a keepalive for that long [s] the robot program stops the arm and ends.
-    robot_receive_timeout: float = 0.2
-    #: Where the newest state of the robot is older than this [s], the driver stops the arm and
-    #: takes no goal; 0 = never.
-    max_state_age: float = 0.2
-    #: Switch the arm on and release its brakes on the first connection (headless mode only).
+    #: Message version of the robot program: 2.14 for ours. For a robot that runs a saved, older
+    #: External Control program: the version of its client library, rounded down to 2.0, 2.10 or
+    #: 2.12 (in quotes). What such a program cannot do is refused, or done in another way that the
+    #: report explains. Not with headless_mode.
+    wire_dialect: Annotated[str, OneOf(tuple(DIALECTS))] = NEWEST_DIALECT.name
+    #: Time without a keepalive after which the robot program stops the arm [s].
+    robot_receive_timeout: Annotated[float, Range(0.02, 10.0)] = 0.2
+    #: Largest age of the newest state of the robot [s]. Where the states are older, because the
+    #: network or this computer is overloaded, a violated tolerance is seen that much later: a
+    #: motion is stopped with CONNECTION_LOST, and no goal is taken until they have been younger
+    #: than half of it for 1 s. At least two periods of rtde_frequency; 0.0: any age.
+    max_state_age: Annotated[float, Range(0.0, 10.0)] = 0.2
+    #: true: with headless_mode, power on the arm and release its brakes on the first connection of
+    #: this driver, and never again. Releasing the brakes moves the arm a little. false: a person
+    #: does it, or the services ~/dashboard/power_on and ~/dashboard/brake_release, or ~/recover.
     auto_power: bool = False
-    #: A recovery unlocks protective stops without being asked to each time.
+    #: true: ~/recover unlocks a protective stop also where its request does not say
+    #: unlock_protective_stop. Whoever sets it answers for that: the manufacturer forbids to reset
+    #: protective stops automatically, because the cause has to be looked for each time.
     unlock_protective_stops: bool = False
-    #: Time between two messages on the reverse socket [s].
-    keepalive_period: float = 0.02
-    #: Packets per second from the robot, at least :data:`MIN_RTDE_FREQUENCY`; 0 = as many as it
-    #: can.
-    rtde_frequency: float = 0.0
-    #: How often inputs, outputs and tool are reported [Hz]; 0 = never.
-    io_publish_rate: float = 25.0
-    #: Deceleration of the leading axis for every stop [rad/s^2].
-    stop_deceleration: float = 4.0
-    #: SERVO: how stiff ``servoj`` holds a set-point (100 to 2000), how far it looks ahead [s]
-    #: (0.03 to 0.2), and how many set-points the buffer of the robot program holds.
-    servoj_gain: float = 1000.0
-    servoj_lookahead_time: float = 0.06
-    servo_buffer_depth: int = 250
-    #: Whether scripts of others are run on the robot.
+    #: Period of the keepalive to the robot program [s].
+    keepalive_period: Annotated[float, Range(0.002, 1.0)] = 0.02
+    # A robot that reports less often than at the least rate cannot be monitored, nor be told from
+    # a lost one.
+    #: Rate of the robot's RTDE reports [Hz]; 0.0: the largest that it supports (500, CB3: 125).
+    rtde_frequency: Annotated[float, Range(10.0, 500.0, zero='as often as the robot can')] = 0.0
+    #: Rate at which ~/io_states and ~/tool_data are checked for changes [Hz]; 0.0: never.
+    io_publish_rate: Annotated[float, Range(0.0, 125.0)] = 25.0
+    #: Deceleration of the leading axis when a goal is stopped [rad/s^2].
+    stop_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
+    #: SERVO: proportional gain of servoj. 1000 is what the manufacturer's guide uses. Higher
+    #: follows more closely; where the arm hums or shakes, lower it, or raise
+    #: servoj_lookahead_time.
+    servoj_gain: Annotated[float, Range(100.0, 2000.0)] = 1000.0
+    #: SERVO: time that servoj looks ahead, and by which the arm lags behind [s]. 0.06 is that of
+    #: the guide. Lower it, step by step and with the tool that is mounted, where corners have to
+    #: be sharper.
+    servoj_lookahead_time: Annotated[float, Range(0.03, 0.2)] = 0.06
+    #: SERVO: set-points in the robot program's buffer; servo_target_lag has to fit in at 500 Hz.
+    servo_buffer_depth: Annotated[int, Range(20, 1000)] = 250
+    #: true: ~/run_script runs URScript of others on the robot, and script_prelude may name a file.
+    #: What it does is outside all checks of the driver, and whoever can call the service can move
+    #: the arm.
     allow_scripts: bool = False
-    #: File with URScript functions that goals call; empty = none.
+    #: File of URScript functions (def) that goals may call at points, script_calls: a gripper. It
+    #: becomes part of the robot program, and needs allow_scripts. A relative path begins where the
+    #: driver was started. Empty: none.
     script_prelude: str = ''
     #: Its functions, read once, so that planner and robot have the same.
-    prelude: Prelude = field(init=False, default=NO_PRELUDE)
-    #: Whether a person may guide the arm by hand (freedrive).
+    prelude: Detected[Prelude] = field(init=False, default=NO_PRELUDE)
+    #: true: offer ~/freedrive_mode, in which a person guides the arm by hand.
     allow_freedrive: bool = False
 
     def __post_init__(self) -> None:
@@ -79,11 +110,8 @@ class LinkSettings:
 
         :raises ValueError: names the field, its value and the bound.
         """
-        self._check_numbers()
+        check_parameters(self)
         self._check_dialect()
-        self._require_within('servoj_gain', 100.0, 2000.0)
-        self._require_within('servoj_lookahead_time', 0.03, 0.2)
-        self._require_within('servo_buffer_depth', 20, 1000)
         if self.script_prelude and not self.allow_scripts:
             raise ValueError(
                 f'script_prelude is {self.script_prelude!r}, but allow_scripts is false; its '
@@ -97,13 +125,6 @@ class LinkSettings:
             object.__setattr__(self, 'prelude', read_prelude(self.script_prelude))
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
-        self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
-        self._require_not_negative('io_publish_rate', 'max_state_age')
-        if self.rtde_frequency != 0.0 and not self.rtde_frequency >= MIN_RTDE_FREQUENCY:
-            raise ValueError(
-                f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
-                f'robot can) or at least {MIN_RTDE_FREQUENCY:g} Hz.'
-            )
         if 0.0 < self.max_state_age * self.rtde_frequency < 2.0:
             raise ValueError(
                 f'max_state_age is {self.max_state_age:g} s, it has to be 0 (any age) or at least '
@@ -120,22 +141,7 @@ class LinkSettings:
         """The messages that the robot program understands."""
         return DIALECTS[self.wire_dialect]
 
-    def _check_numbers(self) -> None:
-        """Convert all fields to their types; refuse numbers that no setting takes."""
-        declare_types(self)
-        for name in (each.name for each in fields(self)):
-            value = getattr(self, name)
-            if isinstance(value, float) and not isfinite(value):
-                raise ValueError(f'{name} is {value}, it has to be finite.')
-            if name.endswith('_port'):
-                self._require_within(name, 0, 65535)
-
     def _check_dialect(self) -> None:
-        if self.wire_dialect not in DIALECTS:
-            raise ValueError(
-                f'wire_dialect is {self.wire_dialect!r}, it has to be one of '
-                f'{", ".join(DIALECTS)}.'
-            )
         if self.headless_mode and self.dialect is not NEWEST_DIALECT:
             raise ValueError(
                 f"wire_dialect is '{self.wire_dialect}' and headless_mode is true, but "
@@ -144,23 +150,6 @@ class LinkSettings:
                 'leave wire_dialect out, or set headless_mode to false and start the program that '
                 'is saved on the robot.'
             )
-
-    def _require_within(self, name: str, low: float, high: float) -> None:
-        value = getattr(self, name)
-        if not low <= value <= high:
-            raise ValueError(f'{name} is {value:g}, it has to be within {low:g} and {high:g}.')
-
-    def _require_not_negative(self, *names: str) -> None:
-        for name in names:
-            value = getattr(self, name)
-            if value < 0.0:
-                raise ValueError(f'{name} is {value}, it must not be negative.')
-
-    def _require_positive(self, *names: str) -> None:
-        for name in names:
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise ValueError(f'{name} is {value}, it has to be greater than 0.')
 
 
 def _require_address(name: str, text: str) -> None:

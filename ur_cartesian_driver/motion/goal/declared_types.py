@@ -16,7 +16,7 @@ from enum import IntEnum
 from functools import cache
 from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
+from typing import Annotated, Any, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
 
 import numpy as np
 
@@ -90,6 +90,8 @@ def _converter(kind: Hashable) -> Convert:
     origin, arguments = get_origin(kind), get_args(kind)
     if kind in _PLAIN:
         return _PLAIN[kind]
+    if origin is Annotated:
+        return _converter(arguments[0])
     if origin is tuple:
         parts = [_converter(part) for part in arguments if part is not Ellipsis]
         return _tuple_of_any(parts[0]) if Ellipsis in arguments else _tuple_of(parts)
@@ -106,8 +108,14 @@ def _converter(kind: Hashable) -> Convert:
 
 
 @cache
+def declared_hints(kind: type) -> dict[str, Any]:
+    """Return the annotations of a dataclass; to evaluate them is slow, so it is done once."""
+    return get_type_hints(kind, include_extras=True)
+
+
+@cache
 def _field_converters(kind: type) -> tuple[tuple[str, Convert], ...]:
-    hints = get_type_hints(kind)
+    hints = declared_hints(kind)
     return tuple((field.name, _converter(hints[field.name])) for field in fields(kind))
 
 

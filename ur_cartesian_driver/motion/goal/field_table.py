@@ -16,13 +16,11 @@ from enum import auto, Enum, IntEnum
 from functools import cache
 from math import inf, isfinite
 from types import NoneType, UnionType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints, TypeVar, Union
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Annotated, Any, get_args, get_origin, TypeVar, Union
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.goal.declared_types import declared_hints
 
 E = TypeVar('E')
 R = TypeVar('R', 'GoalField', 'GoalColumn')
@@ -70,7 +68,7 @@ class Sent:
 class Mark(Enum):
     """Further properties of a field."""
 
-    #: The driver fills it in; messages do not have it.
+    #: The driver fills it in; neither messages nor parameters have it.
     NOT_SENT = auto()
     #: It says something of the point where a segment ends, and not of the motion to there.
     OF_POINT = auto()
@@ -78,7 +76,7 @@ class Mark(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The numbers that a field takes, whatever the rest of the goal says; all are finite."""
+    """The numbers that a field takes, whatever the other fields say; all are finite."""
 
     low: float = -inf
     high: float = inf
@@ -92,10 +90,10 @@ class Range:
     #: Whether the driver chooses the number where a spline has NaN.
     nan_in_splines: bool = False
 
-    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell of each number whether it is in the range."""
+    def holds(self, values: Any) -> Any:
+        """Tell whether a number is in the range; of an array, tell it of each number."""
         least = values > self.low if self.above else values >= self.low
-        in_range: NDArray[np.bool_] = least & (values <= self.high) & np.isfinite(values)
+        in_range = least & (values <= self.high) & (abs(values) < inf)
         return in_range | (values == 0.0) if self.zero else in_range
 
     def refusal(self, value: float) -> tuple[str, str]:
@@ -171,7 +169,7 @@ class GoalField:
 @cache
 def goal_fields(kind: type) -> tuple[GoalField, ...]:
     """Return the fields of a dataclass that messages have, in its order."""
-    hints = get_type_hints(kind, include_extras=True)
+    hints = declared_hints(kind)
     rows = []
     for each in fields(kind):
         hint, *notes = _parts(hints[each.name])
@@ -244,7 +242,7 @@ class GoalColumn:
 @cache
 def goal_columns(arrays: type, kind: type) -> tuple[GoalColumn, ...]:
     """Return the columns of a dataclass of arrays that hold the fields of a kind of objects."""
-    hints = get_type_hints(arrays, include_extras=True)
+    hints = declared_hints(arrays)
     table = {each.name: each for each in goal_fields(kind)}
     return tuple(
         GoalColumn(name=each.name, column=note, field=table[note.field])

@@ -43,7 +43,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
 from ur_cartesian_driver.planning.append.planned_part import PlannedPart
 from ur_cartesian_driver.planning.append.replaced_tail import cut_tail, cut_time, state_at
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
-from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.options import MAX_POINTS, PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
 from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
@@ -147,7 +147,9 @@ def _plan_behind(
     """Return the plan of points behind the last one of a goal."""
     check_appended_points(appendable, appended, options)
     options = replace(
-        options, max_approach_distance=0.0, max_points=options.max_points + REPLANNED_POINTS
+        options,
+        max_approach_distance=0.0,
+        max_points=min(options.max_points + REPLANNED_POINTS, MAX_POINTS),
     )
     time, records_before = appendable.time, appendable.committed_records
     if from_rest:

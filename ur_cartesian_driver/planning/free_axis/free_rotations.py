@@ -51,7 +51,7 @@ from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
 )
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.samples import counted
-from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.options import MAX_CLEARANCE, PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import named_joints
 from ur_cartesian_driver.planning.request.controlled_frame import SAME_TCP
@@ -166,7 +166,7 @@ def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> Rot
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
-        options = replace(path.options, min_clearance=least + more)
+        options = replace(path.options, min_clearance=min(least + more, MAX_CLEARANCE))
         checks = (Clearance(lattice.arm, T_flange_tip, options) for T_flange_tip in path.tool_tips)
         close: Flags = np.any([check.too_close(q) for check in checks], axis=0)
         return close

@@ -1,17 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The parameters of the node: their defaults, declaration and values.
+The values of all parameters: declared on a node, or given without one.
 
-Defaults come from the dataclasses that use the values, :class:`DriverConfig`,
-:class:`PlanningOptions` and :class:`NodeSettings`, so a program without ROS has the same. All
-parameters are read-only: robot and limits must not change under a running goal.
+All parameters are read-only: robot and limits must not change under a running goal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
@@ -22,39 +20,18 @@ from rclpy.parameter import Parameter
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal.known_frames import Frames, StaticFrame
+from ur_cartesian_driver.motion.goal.parameter_fields import parameter_fields
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.ros.parameters.node_settings import NodeSettings
 from ur_cartesian_driver.ros.parameters.parameter_table import (
     DECLARATIONS,
     ParameterError,
     ParameterValue,
+    plain_value,
 )
 
-#: Fields that the driver detects; they are no parameters.
-_DETECTED_OPTIONS = (
-    'calibration_known',
-    'optimove_known',
-    'path_offset_known',
-    'acceleration_known',
-    'dialect',
-    'prelude',
-)
 #: Parameters that rclpy declares itself.
 _RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NodeSettings:
-    """The parameters that the node itself uses."""
-
-    on_new_goal: str = 'preempt'
-    goal_time_tolerance: float = 1.0
-    state_publish_rate: float = 50.0
-    diagnostics_rate: float = 1.0
-    publish_link_frames: bool = False
-    static_frames: tuple[str, ...] = ()
-    tf_max_age: float = 1.0
-    live_target_enabled: bool = False
-    servo_state_rate: float = 25.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,12 +51,7 @@ class Settings:
 
 def defaults() -> dict[str, ParameterValue]:
     """Return the default of every parameter, by name."""
-    values: dict[str, ParameterValue] = {}
-    for options in (DriverConfig(), PlanningOptions(), NodeSettings()):
-        for name in _names(type(options)):
-            value = getattr(options, name)
-            values[name] = _texts(value) if isinstance(value, tuple) else value
-    return values
+    return {declaration.name: declaration.default for declaration in DECLARATIONS}
 
 
 def declare_parameters(node: Node) -> Settings:
@@ -90,22 +62,20 @@ def declare_parameters(node: Node) -> Settings:
         unknown names visible, for example mistyped ones.
     :raises ParameterError: a name is unknown or a value invalid.
     """
-    by_name = defaults()
-    _refuse_unknown(node.list_parameters([], 0).names, by_name)
-    values: dict[str, ParameterValue] = {}
+    values = defaults()
+    _refuse_unknown(node.list_parameters([], 0).names, values)
     for declaration in DECLARATIONS:
-        default = by_name[declaration.name]
         if node.has_parameter(declaration.name):
-            declaration.check(_plain(node.get_parameter(declaration.name).value), default)
+            declaration.check(plain_value(node.get_parameter(declaration.name).value))
             node.undeclare_parameter(declaration.name)
         try:
             parameter = node.declare_parameter(
-                declaration.name, default, declaration.descriptor(default)
+                declaration.name, declaration.default, declaration.descriptor()
             )
         # What check() does not cover.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
-        values[declaration.name] = _plain(parameter.value)
+        values[declaration.name] = plain_value(parameter.value)
     return settings(values)
 
 
@@ -119,9 +89,8 @@ def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
     _refuse_unknown(given, values)
     for declaration in DECLARATIONS:
         if declaration.name in given:
-            value = given[declaration.name]
-            declaration.check(value, values[declaration.name])
-            values[declaration.name] = value
+            declaration.check(given[declaration.name])
+            values[declaration.name] = given[declaration.name]
     return settings(values)
 
 
@@ -165,25 +134,10 @@ def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
         raise ParameterError(f'There is no parameter {name}; {hint}')
 
 
-def _names(options: type[Any]) -> list[str]:
-    return [field.name for field in fields(options) if field.name not in _DETECTED_OPTIONS]
-
-
-def _fields_of(options: type[Any], values: Mapping[str, ParameterValue]) -> dict[str, Any]:
-    return {name: _without_blanks(values[name]) for name in _names(options)}
+def _fields_of(options: type, values: Mapping[str, ParameterValue]) -> dict[str, Any]:
+    return {each.name: _without_blanks(values[each.name]) for each in parameter_fields(options)}
 
 
 def _without_blanks(value: ParameterValue) -> object:
     """Return a list as a tuple without empty texts."""
     return tuple(text for text in value if text.strip()) if isinstance(value, list) else value
-
-
-def _texts(value: object) -> list[str]:
-    """Return a list of texts, never empty: YAML and ROS have no type for an empty list."""
-    assert isinstance(value, (list, tuple))
-    return [str(text) for text in value] or ['']
-
-
-def _plain(value: Any) -> ParameterValue:
-    """Return a parameter's value as plain Python; arrays arrive as other sequences."""
-    return value if isinstance(value, (bool, int, float, str)) else _texts(value)

@@ -1,23 +1,28 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Every parameter of the node but its default: description, range and choices.
+Every parameter of the node, as the dataclass that uses its value declares it.
 
-They are read from ``parameters.yaml``. The defaults come from the dataclasses that use the values,
-so a program without ROS has the same.
+So a program without ROS has the same defaults and bounds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
-from itertools import chain
-from math import inf
-from typing import TypeAlias
+from inspect import getsource
+from typing import Any, TypeAlias
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-import yaml
+
+from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.motion.goal.parameter_fields import (
+    parameter_fields,
+    ParameterField,
+    plain_number,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.ros.parameters.node_settings import NodeSettings
 
 ParameterValue: TypeAlias = bool | int | float | str | list[str]
 
@@ -38,35 +43,54 @@ class ParameterError(ValueError):
 class ParameterDeclaration:
     """One parameter: its meaning and its values."""
 
-    name: str
+    field: ParameterField
     description: str
-    range: Sequence[float] = (-inf, inf)
-    choices: Sequence[str] = ()
 
-    def descriptor(self, default: ParameterValue) -> ParameterDescriptor:
+    @property
+    def name(self) -> str:
+        """The name of the field and of the parameter."""
+        return self.field.name
+
+    @property
+    def default(self) -> ParameterValue:
+        """The default, in a type that parameters have."""
+        return plain_value(self.field.default)
+
+    @property
+    def values(self) -> str:
+        """The values that it takes, in words; '' if any does."""
+        if self.field.choices:
+            return f'one of: {", ".join(self.field.choices)}'
+        if (bounds := self.field.range) is None:
+            return ''
+        zero = '0 or ' if bounds.zero else ''
+        return f'range: {zero}{plain_number(bounds.low)} to {plain_number(bounds.high)}'
+
+    def descriptor(self) -> ParameterDescriptor:
         """Return what ``ros2 param describe`` shows."""
         descriptor = ParameterDescriptor(
-            name=self.name,
-            description=self.description,
-            read_only=True,
-            additional_constraints='one of: ' + ', '.join(self.choices) if self.choices else '',
+            name=self.name, description=self.description, read_only=True
         )
-        low, high = self.range
-        if type(default) is int:
-            integers = IntegerRange(from_value=int(low), to_value=int(high))
-            descriptor.integer_range = [integers]
-        elif type(default) is float:
-            floats = FloatingPointRange(from_value=low, to_value=high)
-            descriptor.floating_point_range = [floats]
+        bounds = self.field.range
+        if bounds is None or bounds.zero:
+            descriptor.additional_constraints = self.values
+        if bounds is not None:
+            low, high = 0.0 if bounds.zero else bounds.low, bounds.high
+            if isinstance(self.default, float):
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=float(low), to_value=float(high))
+                ]
+            else:
+                descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
         return descriptor
 
-    def check(self, value: ParameterValue, default: ParameterValue) -> None:
+    def check(self, value: ParameterValue) -> None:
         """
         Refuse a value of another type or out of range.
 
         :raises ParameterError: with the bound.
         """
-        wanted = type(default)
+        wanted = type(self.default)
         if type(value) is not wanted:
             hint = f'; write {value}.0' if wanted is float and type(value) is int else ''
             if wanted is str:  # YAML reads off as false, 2.14 as a number
@@ -74,26 +98,40 @@ class ParameterDeclaration:
             raise ParameterError(
                 f'Parameter {self.name} is {value!r}, but must be {_TYPE_NAMES[wanted]}{hint}.'
             )
-        low, high = self.range
-        if isinstance(value, (int, float)) and not low <= value <= high:
-            raise ParameterError(
-                f'Parameter {self.name} is {value}, but must lie between {low:g} and {high:g}.'
-            )
-        if self.choices and value not in self.choices:
-            raise ParameterError(
-                f'Parameter {self.name} is {value!r}, but must be one of '
-                f'{", ".join(self.choices)}.'
-            )
+        if problem := self.field.problem(value):
+            raise ParameterError(f'Parameter {self.name} {problem}.')
 
 
-def _read_sections() -> dict[str, list[ParameterDeclaration]]:
-    text = files(__package__).joinpath('parameters.yaml').read_text('utf-8')
-    return {
-        title: [ParameterDeclaration(name, **facts) for name, facts in section.items()]
-        for title, section in yaml.safe_load(text).items()
-    }
+def plain_value(value: Any) -> ParameterValue:
+    """
+    Return a value as plain Python; a sequence as a list of texts.
+
+    The list is never empty: YAML and ROS have no type for an empty one.
+    """
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    return [str(text) for text in value] or ['']
 
 
-#: The parameters by the sections of ``config/driver.yaml``, in its order.
-SECTIONS = _read_sections()
-DECLARATIONS = tuple(chain.from_iterable(SECTIONS.values()))
+def _comments(kind: type) -> Iterator[tuple[str, str]]:
+    """Yield the fields of a class and the ``#:`` comments before them, as Sphinx reads them."""
+    comment: list[str] = []
+    for line in map(str.strip, getsource(kind).splitlines()):
+        if line.startswith('#:'):
+            # An empty line begins a paragraph.
+            comment.append(line[2:].strip() or '\n')
+        else:
+            yield line.partition(':')[0], ' '.join(comment).replace(' \n ', '\n')
+            comment = []
+
+
+def _declarations() -> Iterator[ParameterDeclaration]:
+    for kind in (DriverConfig, PlanningOptions, NodeSettings):
+        comments = {
+            name: comment for each in kind.__mro__[-2::-1] for name, comment in _comments(each)
+        }
+        for field in parameter_fields(kind):
+            yield ParameterDeclaration(field, comments[field.name])
+
+
+DECLARATIONS = tuple(_declarations())
