@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 import re
 from typing import TypeVar
@@ -23,6 +24,13 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
     """Add all options of the simulator."""
     take_negative_numbers(command)
     add_model(command, '--model')
+    _add_network(command)
+    _add_arm(command)
+    _add_surroundings(command)
+    _add_start(command)
+
+
+def _add_network(command: argparse.ArgumentParser) -> None:
     command.add_argument('--host', default='127.0.0.1', help='address to listen on')
     command.add_argument(
         '--polyscope',
@@ -31,23 +39,15 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
         help='software version, such as 5.21; empty = the newest for the model',
     )
     add_ports(command, '0 = any free port', rtde=30004, primary=30001, dashboard=29999)
-    for name, port in (
-        ('secondary', 30002),
-        ('realtime', 30003),
-        ('interpreter', 30020),
-        ('robot-api', 8000),
-    ):
-        command.add_argument(
-            f'--{name}-port',
-            type=port_number,
-            default=None,
-            help=f'0 = any free port; by default {port} if the primary port is 30001, else any',
-        )
+    ports = {'secondary': 30002, 'realtime': 30003, 'interpreter': 30020, 'robot_api': 8000}
+    for name, port in ports.items():
+        text = f'0 = any free port; by default {port} if the primary port is 30001, else any'
+        add_ports(command, text, **{name: None})
+
+
+def _add_arm(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        '--joints',
-        type=joints,
-        metavar='Q1,...,Q6',
-        help='initial joint positions [rad]',
+        '--joints', type=joints, metavar='Q1,...,Q6', help='initial joint positions [rad]'
     )
     add_calibration(command)
     command.add_argument(
@@ -65,34 +65,32 @@ def add_simulator_options(command: argparse.ArgumentParser) -> None:
         default=1.0,
         help='speed of time; 2 = twice as fast, 0 = as fast as possible',
     )
-    command.add_argument(
+
+
+def _add_surroundings(command: argparse.ArgumentParser) -> None:
+    add = partial(command.add_argument, action='append', default=[], metavar='TEXT')
+    add(
         '--fault',
         type=fault,
-        action='append',
-        default=[],
-        metavar='TEXT',
         dest='faults',
         help="fault, and when it happens: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
         'given several times, see doc/simulation.md',
     )
-    command.add_argument(
+    add(
         '--contact',
-        action='append',
-        default=[],
-        metavar='TEXT',
         dest='contacts',
         help="what the tool can touch, in the base [m]: 'plane x y z nx ny nz' or 'box x y z dx "
         "dy dz'; may be given several times, see doc/simulation.md",
     )
-    command.add_argument(
+    add(
         '--input',
-        action='append',
-        default=[],
-        metavar='TEXT',
         dest='inputs',
         help="a digital input that is on: 'standard 3', 'configurable 0' or 'tool 1'; may be "
         'given several times',
     )
+
+
+def _add_start(command: argparse.ArgumentParser) -> None:
     command.add_argument('--power-off', action='store_true', help='start with the arm powered off')
     command.add_argument(
         '--local', action='store_true', help='local control: refuse scripts from the network'
@@ -126,7 +124,7 @@ def add_model(command: argparse.ArgumentParser, name: str = '--ur-type') -> None
     command.add_argument(name, default='ur5e', choices=sorted(MODELS), help='model of the robot')
 
 
-def add_ports(command: argparse.ArgumentParser, text: str, **ports: int) -> None:
+def add_ports(command: argparse.ArgumentParser, text: str, **ports: int | None) -> None:
     """Add an option for each port."""
     for name, port in ports.items():
         command.add_argument(
