@@ -115,8 +115,12 @@ def plain_value(value: Any) -> ParameterValue:
 
 def _comments(kind: type) -> Iterator[tuple[str, str]]:
     """Yield the fields of a class and the ``#:`` comments before them, as Sphinx reads them."""
+    try:
+        source = getsource(kind)
+    except OSError:
+        return  # an installation of compiled modules only; the parameters work without
     comment: list[str] = []
-    for line in map(str.strip, getsource(kind).splitlines()):
+    for line in map(str.strip, source.splitlines()):
         if line.startswith('#:'):
             # An empty line begins a paragraph.
             comment.append(line[2:].strip() or '\n')
@@ -131,7 +135,7 @@ def _declarations() -> Iterator[ParameterDeclaration]:
             name: comment for each in kind.__mro__[-2::-1] for name, comment in _comments(each)
         }
         for field in parameter_fields(kind):
-            yield ParameterDeclaration(field, comments[field.name])
+            yield ParameterDeclaration(field, comments.get(field.name, ''))
 
 
 DECLARATIONS = tuple(_declarations())
