@@ -378,6 +378,25 @@ def _add_import(command: CommandParser) -> None:
         choices=[each.value for each in ToolOrientation],
         help='of the tool: as the file has it, against its normals, or straight down',
     )
+    _add_speeds(command)
+    _add_shape(command)
+    command.add_argument(
+        '--output-of',
+        type=argument_types.code_output,
+        action='append',
+        default=[],
+        metavar='CODE=KIND:PIN:VALUE',
+        help='output of an M-code, like M3=standard:2:1, of one with its values, like '
+        '"M280 S40=standard:0:1", or of S with the number that means 1, like S=analog:0:10000; '
+        'may be given several times',
+    )
+    add_model(command)  # for joint positions
+    _add_tcp(command, ', for joint positions [m, rad]')
+    add_calibration(command)
+
+
+def _add_speeds(command: CommandParser) -> None:
+    """Add the speeds and times of an import."""
     command.add_argument(
         '--speed',
         type=argument_types.factor,
@@ -395,6 +414,10 @@ def _add_import(command: CommandParser) -> None:
         metavar='SECONDS',
         help='for the way to the first point, where the file has times',
     )
+
+
+def _add_shape(command: CommandParser) -> None:
+    """Add the lengths by which an import changes the shape of a path."""
     for name, default, text in (
         ('blend', 0.0, 'at inner points, like 1mm'),
         (
@@ -412,19 +435,6 @@ def _add_import(command: CommandParser) -> None:
             metavar='LENGTH',
             help=text,
         )
-    command.add_argument(
-        '--output-of',
-        type=argument_types.code_output,
-        action='append',
-        default=[],
-        metavar='CODE=KIND:PIN:VALUE',
-        help='output of an M-code, like M3=standard:2:1, of one with its values, like '
-        '"M280 S40=standard:0:1", or of S with the number that means 1, like S=analog:0:10000; '
-        'may be given several times',
-    )
-    add_model(command)  # for joint positions
-    _add_tcp(command, ', for joint positions [m, rad]')
-    add_calibration(command)
 
 
 def _add_teach(command: CommandParser) -> None:

@@ -308,6 +308,13 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'PROGRAM_VERSION = {registers.PROGRAM_VERSION}'
     yield f'PROGRAM_NUMBER = {settings.number}'
     yield from _servo_constants(settings)
+    yield from _message_constants()
+    yield from _output_constants()
+    yield from _event_constants()
+
+
+def _message_constants() -> Iterator[str]:
+    """Yield the numbers that stand in messages of the driver."""
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', point_fields.MotionType)
@@ -317,6 +324,10 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
     yield f'NO_COMMAND = {[0] * (script_command.COMMAND_WORDS + 1)}'
+
+
+def _output_constants() -> Iterator[str]:
+    """Yield the constants of safe outputs, and of outputs that are due along the path."""
     yield from _enum('SAFE_OUTPUTS', script_command.SafeOutputsAction)
     # Index in the list that the robot reads: behind its length, command, action and token.
     yield 'SAFE_DIGITAL = 4'
@@ -334,6 +345,10 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
+
+
+def _event_constants() -> Iterator[str]:
+    """Yield the constants of waits, presses, path offsets and outputs that follow the speed."""
     yield from _enum('INPUT', InputKind)
     yield from _enum('CONTACT', ContactEnd)
     for name, value in PRESS_CONSTANTS.items():

@@ -313,8 +313,7 @@ class SegmentTimings:
         needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
         # A blend that is too small for the speed asked for is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
-        travel = asked * self._model.control_cycle
-        too_small = needs_a_cycle & (path.radius < travel)
+        too_small = needs_a_cycle & (path.radius < asked * self._model.control_cycle)
         # Half a turn takes less than a control cycle, even as slow as its acceleration may be.
         turns_back = path.has_blend_after & (
             path.arc_radius
@@ -345,30 +344,44 @@ class SegmentTimings:
                     'the next segment could not make good the time in the blend'
                 )
             if takes_too_long[row]:
-                raise InvalidGoal(
-                    point_field(point),
-                    f'would be approached in {self.wire_times[row]:.4g} s, more than '
-                    f'max_segment_time = {self._options.max_segment_time:.0f} s',
-                    'raise velocity or acceleration',
-                )
+                raise self._too_long(row)
             if turns_back[row]:
-                raise InvalidGoal(
-                    segment_field(point, 'blend_radius'),
-                    f'is {1e3 * path.radius[row]:g} mm, but the path turns back there: PROCESS '
-                    'would keep its speed around an arc with a radius of '
-                    f'{1e3 * path.arc_radius[row]:.2g} mm, and no robot reverses in motion',
-                    'set it to 0 to stop there, or add a point beside it',
-                )
+                raise self._turning_back(row)
             if too_slow[row]:
                 raise self._too_slow(row)
             if too_small[row]:
-                raise InvalidGoal(  # the robot would stop at the point (C171)
-                    segment_field(point, 'blend_radius'),
-                    f'is {1e3 * path.radius[row]:g} mm, less than the {1e3 * travel[row]:.3g} mm '
-                    f'that the robot moves in one control cycle at {asked[row]:.3g} '
-                    f'{requests.limits.unit(row)}: it would stop at the point',
-                    'enlarge it, move slower, or set it to 0 to stop there',
-                )
+                raise self._too_small(row, asked[row])
+
+    def _too_long(self, row: int) -> InvalidGoal:
+        """Return the refusal of a move that takes too long."""
+        return InvalidGoal(
+            point_field(self._geometries.begin + row),
+            f'would be approached in {self.wire_times[row]:.4g} s, more than '
+            f'max_segment_time = {self._options.max_segment_time:.0f} s',
+            'raise velocity or acceleration',
+        )
+
+    def _turning_back(self, row: int) -> InvalidGoal:
+        """Return the refusal of a blend whose arc no robot can pass."""
+        path = self._geometries.path
+        return InvalidGoal(
+            segment_field(self._geometries.begin + row, 'blend_radius'),
+            f'is {1e3 * path.radius[row]:g} mm, but the path turns back there: PROCESS '
+            'would keep its speed around an arc with a radius of '
+            f'{1e3 * path.arc_radius[row]:.2g} mm, and no robot reverses in motion',
+            'set it to 0 to stop there, or add a point beside it',
+        )
+
+    def _too_small(self, row: int, speed: float) -> InvalidGoal:
+        """Return the refusal of a blend that the robot would skip, and stop (C171)."""
+        return InvalidGoal(
+            segment_field(self._geometries.begin + row, 'blend_radius'),
+            f'is {1e3 * self._geometries.path.radius[row]:g} mm, less than the '
+            f'{1e3 * speed * self._model.control_cycle:.3g} mm that the robot moves in one '
+            f'control cycle at {speed:.3g} {self.requests.limits.unit(row)}: it would stop at the '
+            'point',
+            'enlarge it, move slower, or set it to 0 to stop there',
+        )
 
     def _too_slow(self, row: int) -> InvalidGoal:
         """Return the refusal of a speed too small for the wire."""

@@ -80,7 +80,7 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
     if options.dialect.is_coarse:
         raise NotAvailable(
             'trajectory',
-            f'is a spline of joint positions, but robot programs of wire dialect '
+            'is a spline of joint positions, but robot programs of wire dialect '
             f'{options.dialect.name} count in milliseconds, too coarse for splines',
             'use a robot program of a newer dialect',
         )

@@ -161,13 +161,7 @@ def plan_spline(
         _max_piece_time(goal),
     )
     segments = _segments(path, polynomials, goal)
-    q, qd, qdd = (vector6(rows[-1].tolist()) for rows in polynomials.joints)
-    end = SplineState(
-        time=float(polynomials.times[-1]),
-        q=q,
-        qd=qd,
-        qdd=qdd if polynomials.quintic else ZERO6,
-    )
+    end = _end_of(polynomials)
     poses = path.poses.copy()
     keep_hemisphere(poses)
     kind = 'quintic' if polynomials.quintic else 'cubic'
@@ -195,6 +189,13 @@ def plan_spline(
                 slower_by(goal),
             )
         ),
+    )
+
+
+def _end_of(polynomials: JointPolynomials) -> SplineState:
+    q, qd, qdd = (vector6(rows[-1].tolist()) for rows in polynomials.joints)
+    return SplineState(
+        time=float(polynomials.times[-1]), q=q, qd=qd, qdd=qdd if polynomials.quintic else ZERO6
     )
 
 
