@@ -133,7 +133,7 @@ async def a_replanner(cell: Any) -> Any:
 async def a_press(cell: Any) -> list[tuple[float, ...]]:
     """Grind a part that is lower than the path and has a step; return time, heights, force."""
     from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
-    from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+    from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
     controller, rows = cell.robot.controller, []
     x, y, z = cell.memory.read().actual_tcp_pose.position
@@ -300,7 +300,7 @@ def record(picture: Picture, directory: Path) -> Path:
 
 def draw(name: str) -> Path:
     """Record and draw; return the file of the picture."""
-    from ur_cartesian_driver.cli import recording_plot as plot
+    from ur_cartesian_driver.cli.plots import recording_plot as plot
     from ur_cartesian_driver.driver.recordings.recording import Recording
 
     drawing = CHECKOUT / 'doc' / f'execution_{name}.png'

@@ -29,7 +29,7 @@ from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.command_line.simulate import simulator_config
 from ur_cartesian_driver.sim.faults.fault_values import AfterTime
-from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 
 pytestmark = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'

@@ -14,9 +14,10 @@ from unittest.mock import Mock
 import pytest
 import yaml
 
-from ur_cartesian_driver.cli import demo, feedback_plot, main, parser
+from ur_cartesian_driver.cli import demo, main, parser
 from ur_cartesian_driver.cli.commands import goal_file
 from ur_cartesian_driver.cli.plan_commands import GoalPlanning
+from ur_cartesian_driver.cli.plots import feedback_plot
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest

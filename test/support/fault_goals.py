@@ -49,7 +49,7 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.registers import OutputInteger
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
-from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
 #: Side of the square, and radius of the blends at its corners [m].

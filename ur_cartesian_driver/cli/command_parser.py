@@ -492,7 +492,7 @@ def _add_check_robot(command: CommandParser) -> None:
 
 
 def _add_plot(command: CommandParser) -> None:
-    from ur_cartesian_driver.cli import recording_plot
+    from ur_cartesian_driver.cli.plots import recording_plot
 
     command.set_defaults(run=recording_plot.plot)
     command.add_argument(

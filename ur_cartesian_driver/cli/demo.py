@@ -21,7 +21,7 @@ import sys
 import tempfile
 import threading
 
-from ur_cartesian_driver.cli import feedback_plot
+from ur_cartesian_driver.cli.plots import feedback_plot
 
 #: How long a process may take to end [s].
 END_TIMEOUT = 10.0

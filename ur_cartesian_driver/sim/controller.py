@@ -28,9 +28,9 @@ from ur_cartesian_driver.motion.state.robot_state import (
 )
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
-from ur_cartesian_driver.sim.motion.contact_motion import ArmState, ContactMotion
+from ur_cartesian_driver.sim.motion.contact.contact_motion import ArmState, ContactMotion
+from ur_cartesian_driver.sim.motion.kinematics.point_motion import point_motion
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership
-from ur_cartesian_driver.sim.motion.point_motion import point_motion
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs

@@ -18,7 +18,7 @@ from ur_cartesian_driver.kinematics.robot_models import (
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.goal.declared_types import declare_types
 from ur_cartesian_driver.sim.faults.fault_values import Fault
-from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 

@@ -4,7 +4,7 @@
 
 import pytest
 
-from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
 STILL = (0.0, 0.0, 0.0)

@@ -12,7 +12,11 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import scale, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.builtins.arguments import pose, six
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
-from ur_cartesian_driver.sim.motion.point_motion import flange_point, moments_for, point_motion
+from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
+    flange_point,
+    moments_for,
+    point_motion,
+)
 from ur_cartesian_driver.urscript.script_values import Matrix, Value
 
 #: Half the time between the two Jacobians whose difference is the derivative [s].

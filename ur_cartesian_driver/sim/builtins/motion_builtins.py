@@ -21,7 +21,7 @@ from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose_of
 from ur_cartesian_driver.sim.controller import MAX_HISTORY
 from ur_cartesian_driver.sim.motion import MotionGenerator, Move
-from ur_cartesian_driver.sim.motion.contact_motion import ForceMode
+from ur_cartesian_driver.sim.motion.contact.contact_motion import ForceMode
 from ur_cartesian_driver.sim.motion.motion_generator import (
     DEFAULT_JOINT_ACCELERATION,
     DEFAULT_JOINT_SPEED,

@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 )
 from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
-from ur_cartesian_driver.sim.motion.contact_motion import ContactMotion
+from ur_cartesian_driver.sim.motion.contact.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
 # A solution farther than this from the target is another branch [rad].

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
-from ur_cartesian_driver.sim.motion.ik_branch import IkBranchTracker
-from ur_cartesian_driver.sim.motion.joint_kinematics import (
+from ur_cartesian_driver.sim.motion.kinematics.ik_branch import IkBranchTracker
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     difference_rate,
     JointKinematics,
     NO_CHANGE,

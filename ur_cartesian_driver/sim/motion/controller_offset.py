@@ -44,7 +44,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     ZERO6,
 )
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
-from ur_cartesian_driver.sim.motion.joint_kinematics import (
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     MAX_JOINT_ACCELERATION,
     max_joint_difference,
 )

@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_batch import CycleBatch, CycleStep
-from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import is_singular
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion

@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.controller_offset import ControllerPathOffset
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion
-from ur_cartesian_driver.sim.motion.joint_kinematics import (
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     MAX_JOINT_ACCELERATION,
     MAX_TOOL_SPEED,
     NO_CHANGE,

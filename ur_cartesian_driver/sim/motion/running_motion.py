@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.motion.geometry.vectors import scale6, Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import Motion
-from ur_cartesian_driver.sim.motion.joint_kinematics import STILL
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import STILL
 from ur_cartesian_driver.sim.motion.motion_values import Move
 from ur_cartesian_driver.sim.motion.servo_motions import (
     JointSpeedMotion,

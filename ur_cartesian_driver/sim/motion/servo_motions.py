@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     Vector6,
     vector6,
 )
-from ur_cartesian_driver.sim.motion.joint_kinematics import STILL
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import STILL
 from ur_cartesian_driver.sim.motion.paths.move_paths import Setpoint
 
 _JointState: TypeAlias = tuple[Vector6, Vector6, float]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import ROUNDING
-from ur_cartesian_driver.sim.motion.joint_kinematics import (
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     MAX_JOINT_ACCELERATION,
     max_joint_difference,
     STILL,

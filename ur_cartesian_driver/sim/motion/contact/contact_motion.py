@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     vector6,
     ZERO6,
 )
-from ur_cartesian_driver.sim.motion.contact_bodies import ContactBody
+from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 

@@ -16,7 +16,10 @@ from math import ceil, log2
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
-from ur_cartesian_driver.sim.motion.joint_kinematics import JointKinematics, max_joint_difference
+from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
+    JointKinematics,
+    max_joint_difference,
+)
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
 # The rest of a path is solved in so many steps, or in shorter ones down to this part of it, so
