@@ -144,5 +144,5 @@ def test_blends_are_planned_as_the_wire_carries_them(cell):
 
 
 def test_only_the_newest_is_told_to_set_a_tcp():
-    assert [name for name, dialect in DIALECTS.items() if dialect.supports_tcp_change] == ['2.14']
+    assert [name for name, dialect in DIALECTS.items() if dialect.is_own] == ['2.14']
     assert replace(PlanningOptions(), dialect=DIALECTS['2.0']).dialect.name == '2.0'

@@ -207,7 +207,7 @@ class GoalPlanning:
             settings.planning,
             dialect=dialect,
             prelude=settings.driver.prelude,
-            allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
+            allow_tcp_change=settings.planning.allow_tcp_change and dialect.is_own,
         )
         self.goal = goal_from_message(
             self._message,

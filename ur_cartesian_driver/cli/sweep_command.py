@@ -92,7 +92,7 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
             settings.planning,
             dialect=dialect,
             prelude=settings.driver.prelude,
-            allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
+            allow_tcp_change=settings.planning.allow_tcp_change and dialect.is_own,
         ),
         frames=settings.frames,
     )

@@ -406,8 +406,7 @@ class Driver(RobotServices, InteractiveMotions):
             dialect=self.config.dialect,
             prelude=self.config.prelude,
             # A foreign program may skip the command, and would then move the wrong TCP.
-            allow_tcp_change=self.options.allow_tcp_change
-            and self.config.dialect.supports_tcp_change,
+            allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.is_own,
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None

@@ -159,7 +159,7 @@ class InteractiveMotions(ABC):
 
         :raises RobotNotReady: there is none, or the robot program lacks the function.
         """
-        if not self.config.dialect.supports_servo:
+        if not self.config.dialect.is_own:
             raise RobotNotReady(
                 f'Only the robot program of this driver can {what}; wire_dialect '
                 f'says that another one, {self.config.wire_dialect}, runs.'

@@ -193,7 +193,7 @@ def job_from_plan(
         joint_tolerances=plan.joint_tolerances,
         goal_time_tolerance=goal.goal_time_tolerance,
         # How far set-points are, the driver knows by itself.
-        reports_points_begun=dialect.reports_points_begun or streams,
+        reports_points_begun=dialect.is_own or streams,
         execution=plan.execution,
         keep_open=goal.keep_open,
         replace_horizon=goal.replace_horizon,

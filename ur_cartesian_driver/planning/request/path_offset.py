@@ -53,7 +53,7 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
 
     :raises NotAvailable: names the reason.
     """
-    if not options.dialect.supports_stops:
+    if not options.dialect.is_own:
         raise NotAvailable(
             'path_offset',
             f'is set, but robot programs of wire dialect {options.dialect.name} add no offsets '

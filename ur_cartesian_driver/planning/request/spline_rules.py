@@ -97,7 +97,7 @@ def _check_support(goal: GoalTable, name: str, options: PlanningOptions) -> None
         )
     traits = resolve_execution_mode(goal).traits
     if traits.streams_setpoints:
-        if not options.dialect.supports_servo:
+        if not options.dialect.is_own:
             raise NotAvailable(
                 'execution',
                 f'is {name}, which robot programs of wire dialect '

@@ -78,12 +78,9 @@ class Dialect:
     supports_q_near: bool = False
     #: A trajectory may have an open end (STREAM_START, STREAM_END).
     supports_append: bool = False
-    #: The program of this dialect is certain to set a TCP.
-    supports_tcp_change: bool = False
-    #: The program has the buffered servo and freedrive.
-    supports_servo: bool = False
-    #: The program reports the number of points begun.
-    reports_points_begun: bool = False
+    #: The program is this driver's own: it has outputs and stops, the buffered servo, freedrive,
+    #: offsets and a temporary TCP, and reports the number of points begun.
+    is_own: bool = False
     #: Longest duration that fits [s].
     max_duration: float = field(init=False)
     #: Shortest duration that is not rounded to 0, which has another meaning [s].
@@ -106,16 +103,6 @@ class Dialect:
             ('move_word_names', _NAMES_WITH_Q_NEAR if with_q_near else _NAMES_WITHOUT_Q_NEAR),
         ):
             object.__setattr__(self, name, value)
-
-    @property
-    def supports_outputs(self) -> bool:
-        """Whether a trajectory may contain outputs."""
-        return self.motion_types >= _OUTPUTS
-
-    @property
-    def supports_stops(self) -> bool:
-        """Whether the program does something where the arm stands, rests for example."""
-        return self.motion_types >= _STOPS
 
     @property
     def is_coarse(self) -> bool:
@@ -187,9 +174,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
                 | _STOPS,
                 supports_q_near=True,
                 supports_append=True,
-                supports_tcp_change=True,
-                supports_servo=True,
-                reports_points_begun=True,
+                is_own=True,
             ),
         )
     }

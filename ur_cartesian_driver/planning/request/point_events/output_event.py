@@ -25,7 +25,7 @@ class OutputEvent(PointEvent[E]):
 
         :raises NotAvailable: names the dialect.
         """
-        if self.of(goal) and not options.dialect.supports_outputs:
+        if self.of(goal) and not options.dialect.is_own:
             raise NotAvailable(
                 self.field,
                 f'is not empty, but robot programs of wire dialect {options.dialect.name} '

@@ -101,7 +101,7 @@ def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     for kind in STOP_EVENTS:
         for field, waypoint in kind.places(goal):
             check_point(field, waypoint, goal)
-            if not (mode.traits.streams_setpoints or options.dialect.supports_stops):
+            if not (mode.traits.streams_setpoints or options.dialect.is_own):
                 raise NotAvailable(
                     field,
                     f'is set, but robot programs of wire dialect {options.dialect.name} do '

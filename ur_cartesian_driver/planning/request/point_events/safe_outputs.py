@@ -25,7 +25,7 @@ def check_safe_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     :raises InvalidGoal: names field, value and bound.
     :raises NotAvailable: the robot program is not ours.
     """
-    if (goal.safe_outputs or options.safe_outputs) and not options.dialect.supports_outputs:
+    if (goal.safe_outputs or options.safe_outputs) and not options.dialect.is_own:
         raise NotAvailable(
             'safe_outputs',
             'is not empty, but robot programs of wire dialect '
