@@ -3,7 +3,7 @@
 """
 Feeds a goal to which points are appended while it runs (keep_open).
 
-Its trajectory is a stream of the wire dialect 2.14: the robot program reads points until it is
+Its trajectory is a stream, which came with URCL 2.14: the robot program reads points until it is
 sent their number. Three things hold, whoever appends:
 
 * The program never waits for a point while the arm moves: it would fail, or stop the arm the hard

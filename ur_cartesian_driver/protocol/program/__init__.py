@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sockets and registers between the driver and its robot program, in every wire dialect."""
+"""Sockets and registers between the driver and its robot program."""

@@ -4,10 +4,9 @@
 The 21 numbers of a trajectory point: motion primitives and outputs to SI numbers and back.
 
 The table is that of URCL since 2.12; the order velocity, acceleration is the wire's, not
-URScript's. What differs in older programs is defined in
-:mod:`~ur_cartesian_driver.protocol.program.wire_dialects`. S = 1,000,000 and T, the dialect's time
-scale, are the factors on the wire
-(:mod:`~ur_cartesian_driver.protocol.program.trajectory_points`).
+URScript's. S = 1,000,000 and T, which is the same except for very old programs, are the factors on
+the wire. :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and
+arranges them for older programs.
 
 =======  =====================================================================  =====
 index    meaning                                                                scale
@@ -19,9 +18,6 @@ index    meaning                                                                
 13       acceleration [rad/s^2 or m/s^2; OPTIMOVE*: fraction]                   S
 14       pose targets: 1 = words 6 - 11 are q_near; MOVEC*: mode of the arc     S
 12 - 17  SPLINE: joint accelerations [rad/s^2], zeros when cubic                S
-6 - 11   before 2.12, all but MOVEC* and SPLINE: the velocity, six times        S
-12 - 17  before 2.12, all but MOVEC* and SPLINE: the acceleration, six times    S
-12, 13   before 2.12, MOVEC*: acceleration, velocity                            S
 18       duration [s]; 0 = determined by velocity and acceleration              T
 19       blend radius [m]; SPLINE: its kind, unscaled                           T
 20       motion type                                                            1
@@ -108,7 +104,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Wait,
 )
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
 class MotionType(IntEnum):
@@ -213,7 +208,17 @@ PointFields: TypeAlias = tuple[float, ...]
 _E = TypeVar('_E', bound=IntEnum)
 
 _TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
-_MOVE_END_NAMES = ('duration', 'blend_radius', 'motion type')
+_MOVE_NAMES = (
+    *_TARGET_NAMES,
+    *(f'words 6-11[{i}]' for i in range(6)),
+    'velocity',
+    'acceleration',
+    'mode',
+    *(f'words 15-17[{i}]' for i in range(3)),
+    'duration',
+    'blend_radius',
+    'motion type',
+)
 _SPLINE_NAMES = (
     *_TARGET_NAMES,
     *(f'velocities[{i}]' for i in range(6)),
@@ -267,6 +272,8 @@ _STOPS: dict[type[Stop], MotionType] = {
 #: Records whose word 18 is no duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
+#: The types of arcs, and of the other moves with a velocity and an acceleration.
+ARC_TYPES, MOVE_TYPES = frozenset(_ARCS), frozenset(_MOVES)
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
 )
@@ -292,16 +299,13 @@ def motion_type(primitive: Instruction) -> MotionType:
         raise LocalProtocolError(f'{primitive!r} is not a motion primitive.') from None
 
 
-def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
+def to_fields(primitive: Instruction) -> PointFields:
     """
     Return the 21 numbers of a primitive, in SI units.
 
-    :raises LocalProtocolError: the target is joint positions and has a q_near, or the dialect
-        lacks this motion or q_near.
+    :raises LocalProtocolError: the target is joint positions and has a q_near.
     """
     kind = motion_type(primitive)
-    if kind not in dialect.motion_types:
-        raise dialect.unsupported(f'{kind.name} (motion type {kind})')
     if isinstance(primitive, SwitchOutput):
         return _output_fields(primitive)
     if isinstance(primitive, SpeedLaw):
@@ -313,21 +317,21 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
     target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
         via, mode, radius = _numbers(primitive.via), primitive.mode, primitive.blend_radius
-        return (*target, *via, *dialect.arc_speeds(v, a), mode, 0, 0, 0, 0, radius, kind)
+        return (*target, *via, v, a, mode, 0, 0, 0, 0, radius, kind)
     q_near = primitive.q_near
     if q_near is not None and not isinstance(primitive.target, Pose):
         raise LocalProtocolError(
             f'{type(primitive).__name__} has joint positions as its target and a q_near; only '
             'poses can have a q_near.'
         )
-    words = dialect.encode_move(q_near, v, a)
+    near, has_q_near, radius = q_near or ZERO6, q_near is not None, primitive.blend_radius
     duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
-    return (*target, *words, duration, primitive.blend_radius, kind)
+    return (*target, *near, v, a, has_q_near, 0, 0, 0, duration, radius, kind)
 
 
 def move_fields(moves: MoveRows) -> Floats:
     """
-    Return the 21 numbers of each row of moves (n, 21), in SI units, for dialects with q_near.
+    Return the 21 numbers of each row of moves (n, 21), in SI units.
 
     The rows of ``others`` have no meaning.
     """
@@ -360,22 +364,10 @@ def spline_fields(pieces: SplineRows) -> Floats:
     )
 
 
-def are_plain_splines(pieces: SplineRows, dialect: Dialect) -> NDArray[np.bool_]:
-    """Tell of each piece (n,) that :func:`check_fields` accepts it."""
-    fits: NDArray[np.bool_] = (pieces.durations >= dialect.min_duration) & (
-        pieces.durations <= dialect.max_duration
-    )
-    return fits & (MotionType.SPLINE in dialect.motion_types)
-
-
-def are_plain_moves(moves: MoveRows, dialect: Dialect) -> NDArray[np.bool_]:
-    """Tell of each row (n,) that it is no other, and that :func:`check_fields` accepts it."""
-    types, durations = _POSE_TYPES[moves.kinds], moves.durations
-    are_plain = np.isin(types, list(dialect.motion_types))
-    are_plain &= (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
-    are_plain &= (moves.blend_radii >= 0.0) & (durations <= dialect.max_duration)
-    are_plain &= (durations == 0.0) | (durations >= dialect.min_duration)
-    are_plain &= ~np.isin(types, list(_OPTIMOVES))
+def are_plain_moves(moves: MoveRows) -> NDArray[np.bool_]:
+    """Return a mask (n,) of the rows that :func:`check_fields` is known to accept."""
+    are_plain: NDArray[np.bool_] = (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
+    are_plain &= (moves.blend_radii >= 0.0) & ~np.isin(_POSE_TYPES[moves.kinds], list(_OPTIMOVES))
     are_plain[list(moves.others)] = False
     return are_plain
 
@@ -465,24 +457,20 @@ def _spline_fields(piece: Spline) -> PointFields:
     return (*numbers, kind, MotionType.SPLINE)
 
 
-def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> Instruction:
+def from_fields(fields: Sequence[float]) -> Instruction:
     """
     Return the primitive or output of 21 numbers.
 
     :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
     """
     kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
-    if kind not in dialect.motion_types:
-        raise RemoteProtocolError(
-            f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.'
-        )
     if kind is MotionType.SPLINE:
         return _spline(fields)
     if kind is MotionType.SWITCH_OUTPUT:
         return _output(fields)
     if kind in _STOPS.values():
         return _stop(fields, kind)
-    return _arc(fields, *_ARCS[kind], dialect) if kind in _ARCS else _move(fields, kind, dialect)
+    return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind)
 
 
 def _spline(fields: Sequence[float]) -> Spline:
@@ -521,50 +509,43 @@ def _output(fields: Sequence[float]) -> OutputRecord:
     )
 
 
-def _arc(
-    fields: Sequence[float], target_is_pose: bool, via_is_pose: bool, dialect: Dialect
-) -> MoveC:
-    velocity_word, acceleration_word = dialect.arc_speed_words
+def _arc(fields: Sequence[float], target_is_pose: bool, via_is_pose: bool) -> MoveC:
     return MoveC(
         target=_target(fields[:6], target_is_pose),
         via=_target(fields[6:12], via_is_pose),
-        velocity=fields[velocity_word],
-        acceleration=fields[acceleration_word],
+        velocity=fields[12],
+        acceleration=fields[13],
         blend_radius=fields[19],
         mode=_enum_member(ArcMode, fields[14], 'arc mode (word 14)'),
     )
 
 
-def _move(fields: Sequence[float], kind: MotionType, dialect: Dialect) -> Primitive:
+def _move(fields: Sequence[float], kind: MotionType) -> Primitive:
     cls, is_pose = _MOVES[kind]
-    velocity_word, acceleration_word = dialect.speed_words
     # Optimoves and MoveP have no duration.
     duration = {'duration': fields[18]} if cls in (MoveJ, MoveL) else {}
     return cast(type[MoveJ], cls)(
         target=_target(fields[:6], bool(is_pose)),
-        q_near=vector6(fields[6:12]) if is_pose and dialect.has_q_near(fields) else None,
-        velocity=fields[velocity_word],
-        acceleration=fields[acceleration_word],
+        q_near=vector6(fields[6:12]) if is_pose and fields[14] else None,
+        velocity=fields[12],
+        acceleration=fields[13],
         blend_radius=fields[19],
         **duration,
     )
 
 
-def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None:
+def check_fields(fields: PointFields) -> None:
     """
     Refuse what URCL refuses to send: the robot would misunderstand or ignore it.
 
-    :raises LocalProtocolError: names the field, its value, the bound and the dialect.
+    :raises LocalProtocolError: names the field, its value and the bound.
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
-    if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.min_duration):
-        raise _duration_error(duration, dialect)
-    if kind in _WITH_DELAY and not 0.0 <= duration <= dialect.max_duration:
+    if kind in _WITH_DELAY and not duration >= 0.0:
         raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
     if kind == MotionType.SPLINE or kind in _WITH_DELAY:
         return
-    v_at, a_at = dialect.arc_speed_words if kind in _ARCS else dialect.speed_words
-    velocity, acceleration = fields[v_at], fields[a_at]
+    velocity, acceleration = fields[12], fields[13]
     if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
         name, value = next(
             (name, value)
@@ -583,29 +564,11 @@ def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None
         )
 
 
-def _duration_error(duration: float, dialect: Dialect) -> LocalProtocolError:
-    if duration < dialect.min_duration:
-        return LocalProtocolError(
-            f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
-            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity applies.'
-        )
-    return LocalProtocolError(
-        f'duration is {duration!r} s, but one point can take at most {dialect.max_duration} s '
-        f'in wire dialect {dialect.name}.'
-    )
-
-
-def field_names(kind: float, dialect: Dialect) -> Sequence[str]:
+def field_names(kind: float) -> Sequence[str]:
     """Return the names of the 21 numbers of a motion type, for errors."""
     if kind == MotionType.SPLINE:
         return _SPLINE_NAMES
-    if kind == MotionType.SWITCH_OUTPUT:
-        return _OUTPUT_NAMES
-    if kind in _ARCS:
-        words = list(NEWEST_DIALECT.move_word_names)
-        words[6:8] = dialect.arc_speeds('velocity', 'acceleration')
-        return (*_TARGET_NAMES, *words, *_MOVE_END_NAMES)
-    return (*_TARGET_NAMES, *dialect.move_word_names, *_MOVE_END_NAMES)
+    return _OUTPUT_NAMES if kind == MotionType.SWITCH_OUTPUT else _MOVE_NAMES
 
 
 def _numbers(target: Target) -> Vector6:

@@ -34,8 +34,8 @@ The sender must
 
 ``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
 Word 3 of START is of our own program, too; the library's leaves it 0.
-Streams came with URCL 2.14 (see `wire_dialects`). Everything else here has had its place and scale
-since URCL 2.0.
+Streams came with URCL 2.14; older programs ignore them. Everything else here has had its place
+and scale since URCL 2.0.
 """
 
 from __future__ import annotations
@@ -54,7 +54,6 @@ from ur_cartesian_driver.protocol.framing import (
     INT32_MIN,
     RecordDecoder,
 )
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
 class ControlMode(IntEnum):
@@ -110,8 +109,7 @@ STOPPED_TIMEOUT = 100
 #: Controller cycle of an e-Series robot [ms].
 DEFAULT_STEP_TIME = 2
 
-# Tuples: to compare a few numbers is faster than to hash one.
-_STREAMS = (TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END)
+# A tuple: to compare a few numbers is faster than to hash one.
 REALTIME_MODES = (
     ControlMode.SERVOJ,
     ControlMode.SPEEDJ,
@@ -212,7 +210,6 @@ def trajectory(
     count: int = 0,
     read_timeout: int = 200,
     step_time: int = DEFAULT_STEP_TIME,
-    dialect: Dialect = NEWEST_DIALECT,
     takes_offsets: bool = False,
 ) -> ReverseMessage:
     """
@@ -220,10 +217,7 @@ def trajectory(
 
     :param count: number of points: START, STREAM_END, CANCEL of a stream.
     :param takes_offsets: START: offsets of the path come through registers.
-    :raises LocalProtocolError: the dialect has no such action; a program would ignore it.
     """
-    if action in _STREAMS and not dialect.supports_append:
-        raise dialect.unsupported(f'{action.name} (a trajectory with an open end)')
     mode = ControlMode.FORWARD
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),

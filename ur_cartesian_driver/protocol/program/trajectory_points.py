@@ -6,7 +6,8 @@ The trajectory point interface: motion primitives to the robot program, one resu
 A point is 21 big-endian int32, 84 bytes: the numbers of
 :mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
 :func:`decode_point` convert primitives, :func:`encode_fields` and :func:`decode_fields` bare
-numbers; :func:`encode_points` is faster for many, and :func:`encode_rows` for a whole plan.
+numbers; :func:`encode_points` is faster for many, and :func:`encode_rows` for a whole plan. The
+:class:`Dialect` checks the numbers, and arranges their words for older robot programs.
 
 The sender must
 
@@ -22,15 +23,14 @@ The result is one int32: 0 success, 1 canceled, 2 failure. It comes in a segment
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import islice
+from collections.abc import Iterable
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, SplineRows
 from ur_cartesian_driver.motion.plan.plan import PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import Instruction
@@ -46,8 +46,6 @@ from ur_cartesian_driver.protocol.framing import (
 )
 from ur_cartesian_driver.protocol.program.point_fields import (
     are_plain_moves,
-    are_plain_splines,
-    check_fields,
     field_names,
     from_fields,
     MotionType,
@@ -77,7 +75,8 @@ def encode_point(instruction: Instruction, dialect: Dialect = NEWEST_DIALECT) ->
 
     :raises LocalProtocolError: a value cannot be sent; the text names the field and the bound.
     """
-    return encode_fields(to_fields(instruction, dialect), dialect)
+    data = encode_fields(to_fields(instruction), dialect)
+    return dialect.arrange(np.frombuffer(data, '>i4').reshape(1, POINT_FIELDS)).tobytes()
 
 
 def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
@@ -87,7 +86,7 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     :raises RemoteProtocolError: the size is wrong, or a type, kind or mode is unknown.
     """
     try:
-        return from_fields(decode_fields(data, dialect), dialect)
+        return from_fields(dialect.restore(decode_fields(data, dialect)))
     except RemoteProtocolError as error:
         raise RemoteProtocolError(f'{error} Bytes: {hex_text(data)}') from None
 
@@ -98,13 +97,8 @@ def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST
 
     :raises LocalProtocolError: names the point (from 0), the field and the bound.
     """
-    chunks = []
-    iterator = iter(instructions)
-    first = 0
-    while chunk := list(islice(iterator, _CHUNK)):
-        chunks.append(_encode_chunk(chunk, first, dialect))
-        first += len(chunk)
-    return b''.join(chunks)
+    fields = [_checked_fields(each, i, dialect) for i, each in enumerate(instructions)]
+    return _encode_rows(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
 
 
 def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
@@ -119,27 +113,19 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     fine = np.zeros(len(fields), dtype=np.bool_)
     others: dict[int, Instruction] = {}
     if isinstance(moves, SplineRows):
-        fields[first], fine[first] = spline_fields(moves), are_plain_splines(moves, dialect)
-    elif isinstance(moves, MoveRows) and dialect.supports_q_near:
-        fields[first], fine[first] = move_fields(moves), are_plain_moves(moves, dialect)
+        fields[first], fine[first] = spline_fields(moves), moves.durations > 0.0
+    elif isinstance(moves, MoveRows):
+        fields[first], fine[first] = move_fields(moves), are_plain_moves(moves)
         others |= {int(first[row]): move for row, move in moves.others.items()}
     else:
-        return encode_points(_instructions(rows), dialect)
+        others |= zip(first.tolist(), moves, strict=True)
+    fine &= dialect.accepts(fields)
     for row, outputs in rows.outputs.items():
         others |= {int(first[row]) + 1 + k: output for k, output in enumerate(outputs)}
     for record in np.flatnonzero(~fine).tolist():
         instruction = others.get(record) or moves[int(np.searchsorted(first, record))]
         fields[record] = _checked_fields(instruction, record, dialect)
-    return b''.join(
-        _encode_rows(fields[begin : begin + _CHUNK], begin, dialect)
-        for begin in range(0, len(fields), _CHUNK)
-    )
-
-
-def _instructions(rows: PlannedRows) -> Iterator[Instruction]:
-    for i, primitive in enumerate(rows.primitives):
-        yield primitive
-        yield from rows.outputs.get(i, ())
+    return _encode_rows(fields, dialect)
 
 
 def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
@@ -148,9 +134,9 @@ def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> byt
 
     :raises LocalProtocolError: a number cannot be sent.
     """
-    check_fields(fields, dialect)
+    dialect.check_fields(fields)
     motion_type = fields[PointField.TYPE]
-    names, scales = field_names(motion_type, dialect), _scales(motion_type, dialect)
+    names, scales = field_names(motion_type), _scales(motion_type, dialect)
     return _POINT.pack(*map(to_fixed, fields, names, scales))
 
 
@@ -176,30 +162,29 @@ class TrajectoryResultDecoder(ResultDecoder[TrajectoryResult]):
         super().__init__(TrajectoryResult, 'trajectory result')
 
 
-def _encode_chunk(instructions: list[Instruction], first: int, dialect: Dialect) -> bytes:
-    """Return the bytes of primitives, the first of which is point ``first``."""
-    rows = [
-        _checked_fields(instruction, index, dialect)
-        for index, instruction in enumerate(instructions, first)
-    ]
-    return _encode_rows(np.array(rows, dtype=np.float64), first, dialect)
-
-
 def _checked_fields(instruction: Instruction, index: int, dialect: Dialect) -> PointFields:
     try:
-        fields = to_fields(instruction, dialect)
-        check_fields(fields, dialect)
+        fields = to_fields(instruction)
+        dialect.check_fields(fields)
     except LocalProtocolError as error:
         raise LocalProtocolError(f'Point {index}: {error}') from None
     return fields
 
 
-def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> bytes:
+def _encode_rows(fields: Floats, dialect: Dialect) -> bytes:
     """
-    Return the bytes of the rows of an array of shape (n, 21).
+    Return the bytes of rows (n, 21).
 
     :raises LocalProtocolError: names the first number that does not fit.
     """
+    return b''.join(
+        _encode_chunk(fields[first : first + _CHUNK], first, dialect)
+        for first in range(0, len(fields), _CHUNK)
+    )
+
+
+def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:
+    """Return the bytes of some rows, the first of which is point ``first``."""
     scales = np.where(
         fields[:, [PointField.TYPE]] == MotionType.SPLINE,
         _scales(MotionType.SPLINE, dialect),
@@ -210,10 +195,10 @@ def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> b
     fits = (scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5)  # NaN fits nowhere
     if not fits.all():
         row, column = (int(i) for i in np.argwhere(~fits)[0])
-        name = field_names(fields[row, PointField.TYPE], dialect)[column]
+        name = field_names(fields[row, PointField.TYPE])[column]
         error = range_error(float(fields[row, column]), name, int(scales[row, column]))
         raise LocalProtocolError(f'Point {first + row}: {error}')
-    return _round_half_away(scaled).astype('>i4').tobytes()
+    return dialect.arrange(_round_half_away(scaled).astype('>i4')).tobytes()
 
 
 def _scales(motion_type: float, dialect: Dialect) -> tuple[int, ...]:
@@ -224,7 +209,7 @@ def _scales(motion_type: float, dialect: Dialect) -> tuple[int, ...]:
     return (*_MOVE_SCALES, time, word19, 1)
 
 
-def _round_half_away(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _round_half_away(values: Floats) -> Floats:
     """Return whole numbers, ties rounded away from zero as by :func:`to_fixed`."""
     size = np.abs(values)
     whole = np.floor(size)

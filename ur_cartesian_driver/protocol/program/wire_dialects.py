@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What robot programs of different ages understand: one row for each wire dialect.
+Wire dialects: the messages of robot programs of different ages, one row for each.
 
 A program that was saved on a pendant keeps the messages of the library version it came with, and
 nothing on the sockets tells which one that is. So the dialect is a setting. A message has the same
-number of words and the same size in all dialects. Everything that differs is defined here;
-:mod:`trajectory_points` and :mod:`reverse` ask the :class:`Dialect`:
+number of words and the same size in all dialects. Everything that differs is defined here:
 
 =======  =============  ==========  ===================  =====================  =======
 dialect  library        time scale  motion types         words 6 - 17 of moves  streams
@@ -35,34 +34,36 @@ newest dialect sets a temporary TCP for a goal.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from math import floor
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeVar
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
-
-_V = TypeVar('_V', float, str)
-
-_LINES_AND_ARCS = frozenset(range(4))
-_OPTIMOVES = frozenset((4, 5))
-_OTHER_TARGETS = frozenset(range(6, 14))
-_SPLINE = frozenset((51,))
-_OUTPUTS = frozenset((200,))
-_STOPS = frozenset(range(201, 208))
-
-#: Names of words 6 to 17 of a move in errors, with and without q_near.
-_NAMES_WITH_Q_NEAR = (
-    *(f'words 6-11[{i}]' for i in range(6)),
-    'velocity',
-    'acceleration',
-    'mode',
-    *(f'words 15-17[{i}]' for i in range(3)),
+from ur_cartesian_driver.protocol.program.point_fields import (
+    ARC_TYPES,
+    check_fields,
+    MotionType,
+    MOVE_TYPES,
+    PointField,
+    PointFields,
 )
-_NAMES_WITHOUT_Q_NEAR = (*['velocity'] * 6, *['acceleration'] * 6)
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+
+_Lengths = TypeVar('_Lengths', float, Floats)
+
+_FIRST_TYPES = frozenset((*map(MotionType, range(4)), MotionType.SPLINE))
+_OPTIMOVES = frozenset((MotionType.OPTIMOVEJ, MotionType.OPTIMOVEL))
+_LIBRARY_TYPES = ARC_TYPES | MOVE_TYPES | {MotionType.SPLINE}
+#: Where each word of a move and of an arc comes from, for programs before 2.12.
+_OLD_MOVE = (*range(6), *(PointField.VELOCITY,) * 6, *(PointField.ACCELERATION,) * 6, 18, 19, 20)
+_OLD_ARC = (*range(12), PointField.ACCELERATION, PointField.VELOCITY, *range(14, 21))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +72,9 @@ class Dialect:
 
     name: str
     #: Factor of times [s] and blend radii [m].
-    time_scale: int
+    time_scale: int = FIXED_POINT
     #: Motion types that a program of this dialect runs; it silently skips all others.
-    motion_types: frozenset[int]
+    motion_types: frozenset[MotionType]
     #: Words 6 - 14 of a move are q_near, velocity, acceleration and flag.
     supports_q_near: bool = False
     #: A trajectory may have an open end (STREAM_START, STREAM_END).
@@ -81,68 +82,104 @@ class Dialect:
     #: The program is this driver's own: it has outputs and stops, the buffered servo, freedrive,
     #: offsets and a temporary TCP, and reports the number of points begun.
     is_own: bool = False
-    #: Longest duration that fits [s].
-    max_duration: float = field(init=False)
-    #: Shortest duration that is not rounded to 0, which has another meaning [s].
-    min_duration: float = field(init=False)
-    #: Words that hold the velocity and the acceleration of a move.
-    speed_words: tuple[int, int] = field(init=False)
-    #: The same of an arc, as the program reads them.
-    arc_speed_words: tuple[int, int] = field(init=False)
-    #: Names of words 6 to 17 of a move, for errors.
-    move_word_names: tuple[str, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        """Derive what is looked up for every point."""
-        with_q_near = self.supports_q_near
-        for name, value in (
-            ('max_duration', INT32_MAX / self.time_scale),
-            ('min_duration', 0.5 / self.time_scale),
-            ('speed_words', (12, 13) if with_q_near else (6, 12)),
-            ('arc_speed_words', (12, 13) if with_q_near else (13, 12)),
-            ('move_word_names', _NAMES_WITH_Q_NEAR if with_q_near else _NAMES_WITHOUT_Q_NEAR),
-        ):
-            object.__setattr__(self, name, value)
+    @property
+    def max_duration(self) -> float:
+        """The longest duration that fits [s]."""
+        return INT32_MAX / self.time_scale
+
+    @property
+    def min_duration(self) -> float:
+        """The shortest duration that is not rounded to 0, which has another meaning [s]."""
+        return 0.5 / self.time_scale
 
     @property
     def is_coarse(self) -> bool:
         """Whether rounding of times and radii matters."""
         return self.time_scale < FIXED_POINT
 
-    def round_down_radius(self, radius: float) -> float:
+    def round_down_radius(self, radius: _Lengths) -> _Lengths:
         """Return the largest radius that the wire can express and that is not larger [m]."""
         if not self.is_coarse:
             return radius
         # 0.029 * 1000 is a little less than 29.
-        return floor(radius * self.time_scale + 1e-6) / self.time_scale
+        rounded: _Lengths = np.floor(radius * self.time_scale + 1e-6) / self.time_scale
+        return rounded
 
-    def encode_move(
-        self, q_near: Sequence[float] | None, velocity: float, acceleration: float
-    ) -> tuple[float, ...]:
-        """
-        Return words 6 to 17 of a move, unscaled.
+    # -- the messages --------------------------------------------------------------------------
 
-        :raises LocalProtocolError: the dialect has no q_near.
+    def check_action(self, action: TrajectoryAction) -> None:
         """
+        Refuse an action that the program would ignore.
+
+        :raises LocalProtocolError: names it.
+        """
+        is_stream = action in (TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END)
+        if is_stream and not self.supports_append:
+            raise self._unsupported(f'{action.name} (a trajectory with an open end)')
+
+    def check_fields(self, fields: PointFields) -> None:
+        """
+        Refuse a point that the program would skip, misunderstand or ignore.
+
+        :param fields: its 21 numbers in SI units.
+        :raises LocalProtocolError: names the field, its value and the bound.
+        """
+        duration, kind = fields[18], fields[20]
+        if kind not in self.motion_types:
+            raise self._unsupported(f'{MotionType(int(kind)).name} (motion type {kind:g})')
+        if not self.supports_q_near and fields[14] and kind in MOVE_TYPES:
+            raise self._unsupported('q_near')
+        if 0.0 < duration < self.min_duration:
+            raise LocalProtocolError(
+                f'duration is {duration!r} s, but wire dialect {self.name} counts in '
+                f'{1.0 / self.time_scale:g} s, and 0 would mean that the velocity applies.'
+            )
+        if duration > self.max_duration:
+            raise LocalProtocolError(
+                f'duration is {duration!r} s, but one point can take at most {self.max_duration} '
+                f's in wire dialect {self.name}.'
+            )
+        check_fields(fields)
+
+    def accepts(self, fields: Floats) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the rows (n, 21) whose motions and durations the program has."""
+        kinds, durations = fields[:, PointField.TYPE].astype(int), fields[:, PointField.DURATION]
+        accepted = np.isin(kinds, list(self.motion_types))
+        accepted &= (durations == 0.0) | (durations >= self.min_duration)
+        accepted &= durations <= self.max_duration
+        if not self.supports_q_near:
+            accepted &= ~np.isin(kinds, list(MOVE_TYPES))
+        return accepted
+
+    def arrange(self, words: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return points (n, 21) in the order in which the program reads their words."""
         if self.supports_q_near:
-            flag = q_near is not None
-            return (*(q_near or ZERO6), velocity, acceleration, flag, 0, 0, 0)
-        if q_near is not None:
-            raise self.unsupported('q_near')
-        v, a = velocity, acceleration
-        return (v, v, v, v, v, v, a, a, a, a, a, a)
+            return words
+        kinds, words = words[:, PointField.TYPE], words.copy()
+        for types, order in ((MOVE_TYPES, _OLD_MOVE), (ARC_TYPES, _OLD_ARC)):
+            rows = np.isin(kinds, list(types))
+            words[rows] = words[rows][:, order]
+        return words
 
-    def arc_speeds(self, velocity: _V, acceleration: _V) -> tuple[_V, _V]:
-        """Return words 12 and 13 of an arc, unscaled, or their names."""
-        first = self.arc_speed_words[0] == 12
-        return (velocity, acceleration) if first else (acceleration, velocity)
+    def restore(self, fields: PointFields) -> PointFields:
+        """
+        Return the 21 numbers of a point in the order of today.
 
-    def has_q_near(self, fields: Sequence[float]) -> bool:
-        """Tell whether the 21 numbers of a move contain q_near, in words 6 to 11."""
-        return self.supports_q_near and bool(fields[14])
+        :raises RemoteProtocolError: the program does not know its motion type.
+        """
+        kind = fields[PointField.TYPE]
+        if kind not in self.motion_types:
+            raise RemoteProtocolError(
+                f'{kind:g} is an unknown motion type (word 20) in wire dialect {self.name}.'
+            )
+        if self.supports_q_near or kind == MotionType.SPLINE:
+            return fields
+        if kind in ARC_TYPES:
+            return tuple(fields[i] for i in _OLD_ARC)
+        return (*fields[:6], *ZERO6, fields[6], fields[12], *(0.0,) * 4, *fields[18:])
 
-    def unsupported(self, what: str) -> LocalProtocolError:
-        """Return the error for something that this dialect does not have."""
+    def _unsupported(self, what: str) -> LocalProtocolError:
         return LocalProtocolError(f'{what} does not exist in wire dialect {self.name}.')
 
 
@@ -151,27 +188,12 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
     {
         dialect.name: dialect
         for dialect in (
-            Dialect(name='2.0', time_scale=1000, motion_types=_LINES_AND_ARCS | _SPLINE),
-            Dialect(
-                name='2.10',
-                time_scale=FIXED_POINT,
-                motion_types=_LINES_AND_ARCS | _OPTIMOVES | _SPLINE,
-            ),
-            Dialect(
-                name='2.12',
-                time_scale=FIXED_POINT,
-                motion_types=_LINES_AND_ARCS | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
-                supports_q_near=True,
-            ),
+            Dialect(name='2.0', time_scale=1000, motion_types=_FIRST_TYPES),
+            Dialect(name='2.10', motion_types=_FIRST_TYPES | _OPTIMOVES),
+            Dialect(name='2.12', motion_types=_LIBRARY_TYPES, supports_q_near=True),
             Dialect(
                 name='2.14',
-                time_scale=FIXED_POINT,
-                motion_types=_LINES_AND_ARCS
-                | _OPTIMOVES
-                | _OTHER_TARGETS
-                | _SPLINE
-                | _OUTPUTS
-                | _STOPS,
+                motion_types=frozenset(MotionType),
                 supports_q_near=True,
                 supports_append=True,
                 is_own=True,

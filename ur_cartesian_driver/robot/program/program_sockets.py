@@ -158,14 +158,9 @@ class ProgramSockets:
         self, action: TrajectoryAction, count: int, *, takes_offsets: bool = False
     ) -> None:
         """Send a trajectory action."""
+        self._settings.dialect.check_action(action)
         self._send(
-            reverse.trajectory(
-                action,
-                count,
-                self._read_timeout,
-                dialect=self._settings.dialect,
-                takes_offsets=takes_offsets,
-            )
+            reverse.trajectory(action, count, self._read_timeout, takes_offsets=takes_offsets)
         )
 
     def send_points(self, data: bytes) -> None:
