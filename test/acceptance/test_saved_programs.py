@@ -82,7 +82,7 @@ class SavedCell(RobotCell):
         owner.send(
             StartMotion(
                 motion=number,
-                job=job_from_plan(made, self.dialect),
+                job=job_from_plan(made),
                 points=encode_points((s.primitive for s in made.segments), self.dialect),
             )
         )

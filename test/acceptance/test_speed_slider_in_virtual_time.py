@@ -8,7 +8,7 @@ from fault_goals import ARM, OPTIONS
 import pytest
 from robot_cell import run_cell
 
-from ur_cartesian_driver.driver.appender import encode_plan
+from ur_cartesian_driver.driver.appender import encode_part
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -17,7 +17,6 @@ from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
 pytestmark = [
     pytest.mark.acceptance,
@@ -67,7 +66,7 @@ def start_appended(cell):
     whole = timed_goal(state, ExecutionMode.SPLINE)
     goal = replace(whole, waypoints=whole.waypoints[:1], keep_open=True)
     first = plan_first_part(plan(goal, state, ARM, OPTIONS), ARM, OPTIONS)
-    motion = cell.owner.run(*encode_plan(first, NEWEST_DIALECT))
+    motion = cell.owner.run(*encode_part(first))
     rest = plan_append(
         first.next_goal,
         AppendedPoints(waypoints=whole.waypoints[1:], last=True),
@@ -75,7 +74,7 @@ def start_appended(cell):
         OPTIONS,
         from_rest=False,
     )
-    points, job = encode_plan(rest, NEWEST_DIALECT)
+    points, job = encode_part(rest)
     cell.owner.append(points, AppendJob(number=1, records_before=rest.records_before, job=job))
     return motion
 

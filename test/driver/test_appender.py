@@ -19,7 +19,6 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -52,7 +51,6 @@ def goal(sent):
         return Appender(
             1,
             part,
-            dialect=NEWEST_DIALECT,
             planning_inputs=lambda: (ARM, OPTIONS),
             send=sent.put,
             progress=lambda: None,

@@ -114,6 +114,17 @@ def test_another_robot_program_does_not_follow_targets():
         Driver(DriverConfig()).send_live_target(HERE)
 
 
+def test_a_plan_for_another_robot_program_is_not_sent():
+    for_ours = stationary_plan(STATE)
+    for_older = replace(for_ours, older_program='2.12')
+    for version, fits, other in (('2.12', for_older, for_ours), ('2.14', for_ours, for_older)):
+        driver = Driver(DriverConfig(wire_dialect=version))
+        with pytest.raises(RobotNotReady, match='for another robot program'):
+            driver.start(other)
+        with pytest.raises(RobotNotReady, match='is DISCONNECTED'):
+            driver.start(fits)
+
+
 def test_a_plan_that_stands_has_nothing_on_the_wire():
     plan = stationary_plan(STATE)
     assert (plan.segments, plan.report, plan.T_flange_active) == ((), (), IDENTITY)

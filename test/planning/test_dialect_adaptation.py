@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans for robot programs of other ages: other words for the same motion, or a refusal."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
+from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import NotAvailable
@@ -14,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan, encode_points
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 OLD = ('2.0', '2.10')
@@ -144,5 +145,17 @@ def test_blends_are_planned_as_the_wire_carries_them(cell):
 
 
 def test_only_the_newest_is_told_to_set_a_tcp():
-    assert [name for name, dialect in DIALECTS.items() if dialect.is_own] == ['2.14']
-    assert replace(PlanningOptions(), dialect=DIALECTS['2.0']).dialect.name == '2.0'
+    allowed = {
+        name: PlanningOptions().for_program(DriverConfig(wire_dialect=name)) for name in DIALECTS
+    }
+    assert [name for name in DIALECTS if allowed[name].allow_tcp_change] == ['2.14']
+    assert [options.dialect.name for options in allowed.values()] == list(DIALECTS)
+    refused = PlanningOptions(allow_tcp_change=False).for_program(DriverConfig())
+    assert not refused.allow_tcp_change
+
+
+def test_a_plan_is_encoded_for_the_program_for_which_it_was_made(cell):
+    for name in DIALECTS:
+        made = planned(cell, name, (cell.pose(y=0.05), JOINT, 0.0, True))
+        assert encode_plan(made) == encode_points(made.instructions, DIALECTS[name])
+        assert job_from_plan(made).reports_points_begun == (name == '2.14')

@@ -8,7 +8,7 @@ from typing import Any
 
 from robot_cell import RobotCell
 
-from ur_cartesian_driver.driver.appender import Appender, encode_plan
+from ur_cartesian_driver.driver.appender import Appender, encode_part
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import Outcome, Progress
@@ -18,7 +18,6 @@ from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, Segment, Waypo
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
 BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
 
@@ -83,12 +82,11 @@ class AppendMotion:
         self.appender = Appender(
             len(self._owner.motions) + 1,
             part,
-            dialect=NEWEST_DIALECT,
             send=self._owner.send,
             progress=self._newest,
             planning_inputs=lambda: (self._arm, self._options),
         )
-        points, job = encode_plan(part, NEWEST_DIALECT)
+        points, job = encode_part(part)
         self.motion = self._owner.run(points, job)
 
     def _newest(self) -> Progress | None:

@@ -16,7 +16,7 @@ from fault_table import BEFORE
 import robot_cell
 from robot_cell import CellMotion, CYCLE, RobotCell
 
-from ur_cartesian_driver.driver.appender import encode_plan
+from ur_cartesian_driver.driver.appender import encode_part
 from ur_cartesian_driver.driver.ipc.channel import ArmSetup, SetPathOffset
 from ur_cartesian_driver.driver.live_session import stationary_job, stationary_plan
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
@@ -48,7 +48,6 @@ from ur_cartesian_driver.planning.append.append_planner import plan_append, plan
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.registers import OutputInteger
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
@@ -737,7 +736,7 @@ class AppendGoal(SplineGoal):
 
     def send_motion(self):
         part, _ = half_circle_to_append(self._beginning, self.execution)
-        self.motion = self.cell.owner.run(*encode_plan(part, NEWEST_DIALECT))
+        self.motion = self.cell.owner.run(*encode_part(part))
 
     def is_in(self, phase):
         match phase:
@@ -762,7 +761,7 @@ class AppendGoal(SplineGoal):
 
     def send_remaining_points(self, phase):
         part = self._rest(phase)
-        points, job = encode_plan(part, NEWEST_DIALECT)
+        points, job = encode_part(part)
         self.cell.owner.append(
             points,
             AppendJob(

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 import sys
 from tempfile import NamedTemporaryFile
@@ -202,13 +201,8 @@ class GoalPlanning:
         from ur_cartesian_driver.planning import plan
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 
-        settings, dialect = self._settings, self._settings.driver.dialect
-        options = replace(
-            settings.planning,
-            dialect=dialect,
-            prelude=settings.driver.prelude,
-            allow_tcp_change=settings.planning.allow_tcp_change and dialect.is_own,
-        )
+        settings = self._settings
+        options = settings.planning.for_program(settings.driver)
         self.goal = goal_from_message(
             self._message,
             settings.frames,

@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 import csv
-from dataclasses import replace
 from math import prod
 from multiprocessing import get_context
 from pathlib import Path as FilePath
@@ -82,18 +81,13 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
         raise ValueError(f'the sweep has {count} variants; give {MAX_VARIANTS} at most')
     if len(models) > 1 and (arguments.calibration or arguments.calibration_seed is not None):
         raise ValueError('a calibration is that of one arm; give one model')
-    model, dialect = robot_model(models[0]), settings.driver.dialect
+    model = robot_model(models[0])
     variant = Variant(
         goal=Path.from_message(read_goal(arguments)),
         arm=Arm(model, calibration(arguments, model)),
         start=vector6(arguments.joints or SimulatorConfig().q),
         T_flange_tcp=Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY,
-        options=replace(
-            settings.planning,
-            dialect=dialect,
-            prelude=settings.driver.prelude,
-            allow_tcp_change=settings.planning.allow_tcp_change and dialect.is_own,
-        ),
+        options=settings.planning.for_program(settings.driver),
         frames=settings.frames,
     )
     variants = at_places(variant, **offsets)

@@ -15,7 +15,7 @@ from concurrent.futures import Future
 import contextlib
 from dataclasses import replace
 
-from ur_cartesian_driver.driver.appender import Appender, encode_plan
+from ur_cartesian_driver.driver.appender import Appender, encode_part
 from ur_cartesian_driver.driver.callbacks import LOG
 from ur_cartesian_driver.driver.ipc.channel import (
     ArmSetup,
@@ -70,7 +70,7 @@ from ur_cartesian_driver.planning.preflight.clearance import self_collision_rema
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.preview import ArmPlan
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
     is_paused,
@@ -265,18 +265,21 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Execute a plan and return at once.
 
-        :raises RobotNotReady: the robot program is not connected, or a motion is running.
+        :raises RobotNotReady: the robot program is not connected, or a motion is running; or the
+            plan was made for another program.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
+        if plan.older_program != self.options.for_program(self.config).older_program:
+            raise RobotNotReady(
+                'The plan was made for another robot program than the one that runs; make it with '
+                'Driver.plan().'
+            )
         if plan.goal.keep_open:
             options = self._options_for(self._require(self.state))
             part = plan_first_part(plan, self.arm, options)
-            points, job = encode_plan(part, self.config.dialect)
+            points, job = encode_part(part)
             return self._start_motion(plan, points, job, on_progress, part=part)
-        points = encode_rows(plan.rows, self.config.dialect)
-        return self._start_motion(
-            plan, points, job_from_plan(plan, self.config.dialect), on_progress
-        )
+        return self._start_motion(plan, encode_plan(plan), job_from_plan(plan), on_progress)
 
     def execute(
         self,
@@ -401,12 +404,8 @@ class Driver(RobotServices, InteractiveMotions):
         """Return the planning options, with the features of the connected robot."""
         status = self.status
         return replace(
-            self.options,
+            self.options.for_program(self.config),
             calibration_known=status.calibration_known,
-            dialect=self.config.dialect,
-            prelude=self.config.prelude,
-            # A foreign program may skip the command, and would then move the wrong TCP.
-            allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.is_own,
             optimove_known=has_feature('optimove', status.software()),
             path_offset_known=has_feature('path_offset', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
@@ -457,7 +456,6 @@ class Driver(RobotServices, InteractiveMotions):
         return Appender(
             motion.number,
             part,
-            dialect=self.config.dialect,
             send=self._send,
             planning_inputs=planning_inputs,
             progress=lambda: motion.progress,

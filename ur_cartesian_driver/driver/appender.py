@@ -34,8 +34,7 @@ from ur_cartesian_driver.planning.append.replaced_tail import (
     first_replaceable,
     without_passed,
 )
-from ur_cartesian_driver.protocol.program.trajectory_points import encode_rows
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
 
 #: How long the robot loop may take to answer [s]; the arm is stopped when it hangs for so long.
 ANSWER_TIMEOUT = 5.0
@@ -57,18 +56,17 @@ class AppendResult:
 Offers: TypeAlias = Generator[AppendToMotion, AnswerAppend, AppendResult]
 
 
-def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
+def encode_part(part: AppendPlan) -> tuple[bytes, MotionJob]:
     """Return the records of an append plan, encoded, and its job."""
     plan = part.plan
     job = job_from_plan(
         plan,
-        dialect,
         start_time=part.start_time,
         ending_records=part.ending_records,
         spline=part.spline,
     )
     # Set-points are made by the robot loop: no records go to the robot.
-    points = b'' if plan.execution.traits.streams_setpoints else encode_rows(plan.rows, dialect)
+    points = b'' if plan.execution.traits.streams_setpoints else encode_plan(plan)
     return points, replace(job, due=part.end_time)
 
 
@@ -80,7 +78,6 @@ class Appender:
         motion: int,
         opened: AppendPlan,
         *,
-        dialect: Dialect,
         planning_inputs: Callable[[], tuple[Arm, PlanningOptions]],
         send: Callable[[AppendToMotion], None],
         progress: Callable[[], Progress | None],
@@ -94,7 +91,7 @@ class Appender:
         :param timeout: how long to wait for an answer [s].
         """
         self._timeout = timeout
-        self._motion, self._dialect = motion, dialect
+        self._motion = motion
         self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
         self._goal: AppendableGoal = opened.next_goal
         self._is_open = True
@@ -166,7 +163,7 @@ class Appender:
         self._check_ahead(before, new_points, options)
         for from_rest in (False, True) if not self._is_at_rest() else (True,):
             part = plan_append(before, new_points, arm, options, from_rest=from_rest)
-            points, job = encode_plan(part, self._dialect)
+            points, job = encode_part(part)
             answer = yield self._offer(job, points, part.records_before, part.cut_time)
             if not answer.refusal:
                 self._goal = part.next_goal

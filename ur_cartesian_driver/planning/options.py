@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Protocol
 
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes
 from ur_cartesian_driver.motion.goal.field_table import Range
@@ -16,6 +16,18 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_D
 
 #: The longest path, and the widest clearance [m], that make sense.
 MAX_POINTS, MAX_CLEARANCE = 1_000_000, 1.0
+
+
+class ProgramTraits(Protocol):
+    """The settings of a driver that say what its robot program can do."""
+
+    @property
+    def dialect(self) -> Dialect:
+        """The messages that it understands."""
+
+    @property
+    def prelude(self) -> Prelude:
+        """The functions of others that it contains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,3 +212,18 @@ class PlanningOptions:
         check_parameters(self)
         parse_planes(self.workspace_planes)
         parse_safe_outputs(self.safe_outputs)
+
+    def for_program(self, settings: ProgramTraits) -> PlanningOptions:
+        """Return the options for the robot program of a driver."""
+        return replace(
+            self,
+            dialect=settings.dialect,
+            prelude=settings.prelude,
+            # Another program may skip the command, and would then move the wrong TCP.
+            allow_tcp_change=self.allow_tcp_change and settings.dialect.is_own,
+        )
+
+    @property
+    def older_program(self) -> str:
+        """The version of a robot program that is not the driver's own; '' = it is."""
+        return '' if self.dialect.is_own else self.dialect.name

@@ -388,5 +388,6 @@ class GoalPlanner:
             T_flange_active=self.T_flange_active,
             T_flange_tcp=self._retargeted.T_flange_tcp,
             T_tcp_controlled=self._retargeted.T_tcp_controlled,
+            older_program=self.options.older_program,
             execution=self.mode,
         )

@@ -38,7 +38,6 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Stop,
     SwitchOutput,
 )
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -155,14 +154,13 @@ class AppendJob:
 
 def job_from_plan(
     plan: Plan,
-    dialect: Dialect = NEWEST_DIALECT,
     *,
     start_time: float = 0.0,
     ending_records: int = 0,
     spline: JointSpline | None = None,
 ) -> MotionJob:
     """
-    Return the job of a plan, for a robot program of a dialect.
+    Return the job of a plan.
 
     :param start_time: when its first segment begins [s]; not 0 for appended points.
     :param ending_records: see :class:`MotionJob`.
@@ -192,8 +190,7 @@ def job_from_plan(
         goal_tolerance=goal.goal_tolerance,
         joint_tolerances=plan.joint_tolerances,
         goal_time_tolerance=goal.goal_time_tolerance,
-        # How far set-points are, the driver knows by itself.
-        reports_points_begun=dialect.is_own or streams,
+        reports_points_begun=not plan.older_program,
         execution=plan.execution,
         keep_open=goal.keep_open,
         replace_horizon=goal.replace_horizon,

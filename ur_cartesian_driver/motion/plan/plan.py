@@ -242,6 +242,8 @@ class Plan:
     T_flange_tcp: Pose | None = None
     #: Where the controlled frame is behind that TCP: elsewhere only if the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
+    #: The version of the robot program for which it was made; '' = the driver's own.
+    older_program: str = ''
     #: PRIMITIVES, SPLINE or SERVO: how it is carried out.
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: Where the path may give way; None = nowhere.

@@ -337,6 +337,7 @@ class _PartPlanner:
             start=start.q,
             T_flange_active=before.T_flange_active,
             T_flange_tcp=before.T_flange_tcp,
+            older_program=self._options.older_program,
             execution=goal.execution,
             remarks=found.remarks,
         )

@@ -146,6 +146,7 @@ def plan_joint_goal(
         ),
         start=state.actual_q,
         T_flange_active=state.T_flange_tcp,
+        older_program=options.older_program,
         execution=ExecutionMode.SPLINE,
         joint_tolerances=checked.tolerances,
         remarks=(*trajectory.remarks, *remark, *clearance),

@@ -6,7 +6,7 @@ The trajectory point interface: motion primitives to the robot program, one resu
 A point is 21 big-endian int32, 84 bytes: the numbers of
 :mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
 :func:`decode_point` convert primitives, :func:`encode_fields` and :func:`decode_fields` bare
-numbers; :func:`encode_points` is faster for many, and :func:`encode_rows` for a whole plan. The
+numbers; :func:`encode_points` is faster for many, and :func:`encode_plan` for a whole plan. The
 :class:`Dialect` checks the numbers, and arranges their words for older robot programs.
 
 The sender must
@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, SplineRows
-from ur_cartesian_driver.motion.plan.plan import PlannedRows
+from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import Instruction
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
@@ -55,7 +55,7 @@ from ur_cartesian_driver.protocol.program.point_fields import (
     spline_fields,
     to_fields,
 )
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
 #: Number of outputs that may wait for their trigger poses at one time.
 MAX_PENDING_OUTPUTS = 64
@@ -99,6 +99,15 @@ def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST
     """
     fields = [_checked_fields(each, i, dialect) for i, each in enumerate(instructions)]
     return _encode_rows(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
+
+
+def encode_plan(plan: Plan) -> bytes:
+    """
+    Return the bytes of a plan, for the robot program for which it was made.
+
+    :raises LocalProtocolError: names the record (from 0), the field and the bound.
+    """
+    return encode_rows(plan.rows, DIALECTS.get(plan.older_program, NEWEST_DIALECT))
 
 
 def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
