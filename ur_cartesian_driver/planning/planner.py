@@ -82,6 +82,7 @@ from ur_cartesian_driver.planning.request.point_events.registry import (
 )
 from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_safe_outputs
 from ur_cartesian_driver.planning.request.point_events.stops import Stops
+from ur_cartesian_driver.planning.request.program_features import time_remarks
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
@@ -316,12 +317,7 @@ class GoalPlanner:
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.timed = is_timed(goal)
         self.mode = resolve_execution_mode(goal)
-        if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
-            self.remarks.append(
-                'all points: sent with speeds instead of times, because robot programs of wire '
-                f'dialect {options.dialect.name} count in milliseconds'
-            )
-        self.remarks += self._static_error_remarks()
+        self.remarks += [*time_remarks(goal, options), *self._static_error_remarks()]
         check_reported_tcp(state, self.kinematics)
         self._first = pose_from_row(self.targets[0].tolist())
         check_approach(state, self._first, options)

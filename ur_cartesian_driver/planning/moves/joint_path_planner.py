@@ -22,7 +22,6 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
-    NotAvailable,
     Unreachable,
 )
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
@@ -64,6 +63,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.program_features import check_wait
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
 #: Solutions that differ by less are the same [rad].
@@ -381,13 +381,8 @@ class JointPathPlanner:
         time = float(geometries.times[0])
         waits = time > 0.0
         wait_clause = f', and waits {time:g} s' if waits else ''
-        if waits and self.options.dialect.is_coarse:
-            raise NotAvailable(
-                point_field(0, 'time_from_start'),
-                f'is {time:g} s, but the robot is already there and cannot wait, because '
-                f'no times are sent in wire dialect {self.options.dialect.name}',
-                'set it to 0, and the later times accordingly',
-            )
+        if waits:
+            check_wait(time, self.options)
         self.remarks.append(f'point 0: the robot is already there{wait_clause}')
         self.reasons[0] = [f'the robot is already there{wait_clause}']
         geometries.kinds[0] = _JOINT if geometries.kinds[0] == _JOINT else SegmentType.LINEAR

@@ -26,8 +26,9 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SAME_POSITION,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
+from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit
 from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
+from ur_cartesian_driver.planning.request.program_features import round_down, round_radii
 from ur_cartesian_driver.planning.request.validate import arc_through_via
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
@@ -189,14 +190,9 @@ class SegmentDrafts:
         """Return the blend radii that the wire carries (n,) [m]."""
         radii = self.segments.blend_radii.copy()
         radii[-1] = 0.0
-        if self._options.dialect.is_coarse:
-            for row in rows_where(radii > 0.0):
-                radii[row], remark = round_blend_radius(
-                    float(radii[row]), self.begin + row, self._options.dialect
-                )
-                if remark:
-                    remarks.append((row, remark))
-        return radii
+        rounded, found = round_radii(radii, self.begin, self._options)
+        remarks += found
+        return rounded
 
     def _check_first_blend(self, start: Pose) -> None:
         if self.radii[0] <= 0.0:
@@ -224,6 +220,4 @@ class SegmentDrafts:
             excess = before + after - (length - _MIN_BLEND_GAP)
             if excess > 0.0 and before + after > 0.0:
                 shortened, radius = (row, after) if after >= before else (row - 1, before)
-                radii[shortened] = self._options.dialect.round_down_radius(
-                    max(radius - excess, 0.0)
-                )
+                radii[shortened] = round_down(max(radius - excess, 0.0), self._options)

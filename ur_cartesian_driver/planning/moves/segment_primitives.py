@@ -3,8 +3,8 @@
 """
 Choose the primitives of segments: one for each row.
 
-Nearly all are their row of numbers. Arcs, moves to a posture, and what an older wire dialect says
-otherwise are objects beside the rows.
+Nearly all are their row of numbers. Arcs, moves to a posture, and moves that older robot programs
+take in another form are objects beside the rows.
 """
 
 from __future__ import annotations
@@ -42,14 +42,15 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     max_joint_change,
     named_joints,
 )
-from ur_cartesian_driver.planning.request.dialect_adaptation import (
-    adapt_to_dialect,
-    explain_poses_only,
-)
 from ur_cartesian_driver.planning.request.goal_fields import (
     point_field,
     segment_field,
     type_table,
+)
+from ur_cartesian_driver.planning.request.program_features import (
+    adapt_primitive,
+    explain_poses_only,
+    takes_q_near,
 )
 
 _CLASSES = {
@@ -70,7 +71,7 @@ def segment_primitives(
     Return the primitive of each segment.
 
     :param paths: has planned their joints; its remarks and reasons are added to.
-    :raises NotAvailable: the wire dialect cannot express one.
+    :raises NotAvailable: the robot program does not know one.
     :raises InvalidPosture: the arm passes a via in another configuration.
     """
     kinds = geometries.kinds
@@ -102,7 +103,7 @@ class _SpecialPrimitives:
         """Return them by row."""
         geometries = self._geometries
         special = geometries.kinds == SegmentType.CIRCULAR
-        special |= not self._options.dialect.supports_q_near
+        special |= not takes_q_near(self._options)
         special[list(self._postures)] = True
         special[0] |= geometries.waits
         return {row: self._primitive(row) for row in rows_where(special)}
@@ -126,7 +127,7 @@ class _SpecialPrimitives:
             primitive = move
             if kind in JOINT_SPACE_TYPES or row in self._postures:
                 primitive = replace(move, q_near=self._q_near(row, joints))
-        primitive, reason = adapt_to_dialect(primitive, point, joints, self._options)
+        primitive, reason = adapt_primitive(primitive, point, joints, self._options)
         if reason:
             self._paths.reasons.setdefault(point, []).append(reason)
         return primitive

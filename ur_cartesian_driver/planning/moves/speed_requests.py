@@ -24,6 +24,7 @@ from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometr
 from ur_cartesian_driver.planning.moves.speed_limits import SpeedLimits
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
+from ur_cartesian_driver.planning.request.program_features import takes_times
 
 #: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
 #: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
@@ -110,10 +111,8 @@ class SpeedRequests:
         self.acceleration_unit = np.where(
             limits.is_optimized, _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed), 1.0
         )
-        #: Whether the wire carries a time. Never in the dialect that counts in milliseconds: a
-        #: robot program that counts in microseconds would run a segment a thousand times too fast,
-        #: and a program does not report how it counts.
-        self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & (not options.dialect.is_coarse)
+        #: Whether the wire carries a time.
+        self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & takes_times(options)
         #: By row, on changes by the limits.
         self.remarks: dict[int, str] = {}
         #: By row, what limits the speed to less than is asked for.

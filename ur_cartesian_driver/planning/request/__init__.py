@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a goal asks for: its fields, its checks without a robot, its adaptation to the dialect."""
+"""The demands of a goal: its fields, its checks without a robot, and features of programs."""

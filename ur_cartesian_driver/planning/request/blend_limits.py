@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bounds of a blend radius: both blends of a segment fit into it, and the wire carries it.
+The bounds of a blend radius: both blends of a segment fit into it.
 
 A negative radius is refused by :mod:`~.field_rules`, one in a spline by :mod:`~.spline_rules`.
 """
@@ -14,7 +14,6 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, segment_field
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 
 def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
@@ -67,15 +66,3 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
             f'is too large: the blends at both ends of the segment to point {index} overlap',
             'reduce one of them',
         )
-
-
-def round_blend_radius(radius: float, index: int, dialect: Dialect) -> tuple[float, str]:
-    """Return the blend radius [m] that the wire carries, and a remark where it is smaller."""
-    rounded = dialect.round_down_radius(radius)
-    if rounded >= radius - 1e-6:
-        return rounded, ''
-    return rounded, (
-        f'point {index}: blend of {1e3 * rounded:g} mm instead of {1e3 * radius:g} mm, '
-        f'because wire dialect {dialect.name} counts in steps of '
-        f'{1e3 / dialect.time_scale:g} mm'
-    )

@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.field_rules import check_finite
 from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.program_features import check_joint_spline
 from ur_cartesian_driver.planning.request.spline_rules import (
     MAX_ACCELERATION,
     MAX_TWIST,
@@ -77,13 +78,7 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
             'has joint positions, but the calibration of this robot is unknown',
             'send poses with FollowCartesianTrajectory',
         )
-    if options.dialect.is_coarse:
-        raise NotAvailable(
-            'trajectory',
-            'is a spline of joint positions, but robot programs of wire dialect '
-            f'{options.dialect.name} count in milliseconds, too coarse for splines',
-            'use a robot program of a newer dialect',
-        )
+    check_joint_spline(options)
     before = 0.0
     for i, point in enumerate(goal.points):
         _check_point(i, point, len(order), before, options)

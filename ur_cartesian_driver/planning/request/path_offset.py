@@ -53,13 +53,6 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
 
     :raises NotAvailable: names the reason.
     """
-    if not options.dialect.is_own:
-        raise NotAvailable(
-            'path_offset',
-            f'is set, but robot programs of wire dialect {options.dialect.name} add no offsets '
-            'to their motions',
-            'let the driver send its own robot program',
-        )
     if not options.path_offset_known:
         raise NotAvailable(
             'path_offset',

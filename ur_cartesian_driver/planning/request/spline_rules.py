@@ -31,8 +31,8 @@ MAX_ACCELERATION = 10_000.0
 _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'
 
 
-def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse a spline that the robot program cannot run, or that makes no sense."""
+def check_spline_mode(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse a spline without times, or without the calibration that its joints depend on."""
     if not is_spline(goal):
         return
     name = resolve_execution_mode(goal).name
@@ -42,7 +42,20 @@ def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
             f'is {name}, which needs times',
             'give every point a time_from_start, or set execution to PRIMITIVES',
         )
-    _check_support(goal, name, options)
+    if not options.calibration_known:
+        raise NotAvailable(
+            'execution',
+            f'is {name}, which sends joint positions, but the calibration of this robot is '
+            'unknown',
+            'set execution to PRIMITIVES',
+        )
+
+
+def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse points that no spline joins."""
+    if not is_spline(goal):
+        return
+    name = resolve_execution_mode(goal).name
     _check_points(goal)
     segments = goal.segments
     is_plain = np.isin(segments.types, (SegmentType.AUTO, SegmentType.LINEAR))
@@ -84,33 +97,6 @@ def _check_points(goal: GoalTable) -> None:
                     f'contains a number beyond {bound:g}, more than any of these robots can do',
                     'check the units (m, rad, s)',
                 )
-
-
-def _check_support(goal: GoalTable, name: str, options: PlanningOptions) -> None:
-    remedy = 'set execution to PRIMITIVES'
-    if not options.calibration_known:
-        raise NotAvailable(
-            'execution',
-            f'is {name}, which sends joint positions, but the calibration of this robot is '
-            'unknown',
-            remedy,
-        )
-    traits = resolve_execution_mode(goal).traits
-    if traits.streams_setpoints:
-        if not options.dialect.is_own:
-            raise NotAvailable(
-                'execution',
-                f'is {name}, which robot programs of wire dialect '
-                f'{options.dialect.name} do not support',
-                remedy,
-            )
-    elif options.dialect.is_coarse:
-        raise NotAvailable(
-            'execution',
-            f'is {name}, but robot programs of wire dialect {options.dialect.name} '
-            'count in milliseconds, too coarse for splines',
-            remedy,
-        )
 
 
 def _check_segment(index: int, segment: Segment, name: str) -> None:

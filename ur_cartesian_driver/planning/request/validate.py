@@ -55,14 +55,14 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_timed,
     OPTIMIZED_TYPES,
     point_field,
-    resolve_execution_mode,
     segment_field,
     STRAIGHT_TYPES,
 )
 from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RULES
 from ur_cartesian_driver.planning.request.path_offset import check_path_offset
 from ur_cartesian_driver.planning.request.point_events.registry import check_outputs, check_stops
-from ur_cartesian_driver.planning.request.spline_rules import check_spline
+from ur_cartesian_driver.planning.request.program_features import check_program
+from ur_cartesian_driver.planning.request.spline_rules import check_spline, check_spline_mode
 
 #: How far in the future a stamp may be [s].
 MAX_STAMP_AHEAD = 60.0
@@ -146,14 +146,6 @@ def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _supported(goal: GoalTable, options: PlanningOptions) -> None:
-    mode = resolve_execution_mode(goal)
-    if goal.keep_open and not (mode.traits.streams_setpoints or options.dialect.supports_append):
-        raise NotAvailable(
-            'keep_open',
-            f'is set, but a robot program of wire dialect {options.dialect.name} needs the '
-            'number of points at the start',
-            'send all points at once, or use a robot program of wire dialect 2.14',
-        )
     check_mode(goal, GOAL_RULES['on_path_tolerance'])
     tolerance = apply_default_tolerances(goal, options).path_tolerance
     limits = (*tolerance.position, *tolerance.orientation, *tolerance.twist)
@@ -260,6 +252,8 @@ RULES: tuple[Rule, ...] = (
     _stamp,
     _supported,
     _times,
+    check_spline_mode,
+    check_program,
     check_spline,
     _segment_rules,
     check_free_axes,

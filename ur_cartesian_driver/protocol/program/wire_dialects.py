@@ -30,6 +30,10 @@ Types 4 and 5 came with 2.2, so 2.0 omits them: a program silently skips a type 
 know. On the reverse socket only the stream actions differ. It is not recorded which library
 version introduced which script command, and a program skips unknown commands, too. So only the
 newest dialect sets a temporary TCP for a goal.
+
+Two modules ask a :class:`Dialect` for more than whether the program is our own:
+:mod:`~.trajectory_points` for the points, and
+:mod:`~ur_cartesian_driver.planning.request.program_features` for the demands of goals.
 """
 
 from __future__ import annotations

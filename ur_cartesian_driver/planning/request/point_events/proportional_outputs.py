@@ -27,7 +27,6 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
 
     field = 'proportional_outputs'
     mode_rule = switches_nothing('proportional_outputs')
-    cannot = 'have none'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse two that drive one output at a time, and a command to it meanwhile."""

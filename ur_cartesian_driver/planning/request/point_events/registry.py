@@ -19,11 +19,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.field_rules import check_record
-from ur_cartesian_driver.planning.request.goal_fields import (
-    is_spline,
-    is_timed,
-    resolve_execution_mode,
-)
+from ur_cartesian_driver.planning.request.goal_fields import is_spline, is_timed
 from ur_cartesian_driver.planning.request.mode_rules import check_mode
 from ur_cartesian_driver.planning.request.point_events.dwells import (
     Dwells,
@@ -77,12 +73,11 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     Refuse outputs that cannot be switched while the arm moves.
 
     :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode, or a robot program that is not ours, cannot do it.
+    :raises NotAvailable: the execution mode cannot do it.
     """
     for kind in OUTPUT_EVENTS:
         check_mode(goal, kind.mode_rule)
-        kind.check_dialect(goal, options)
-    check_safe_outputs(goal, options)
+    check_safe_outputs(goal)
     for kind in OUTPUT_EVENTS:
         kind.check(goal, options)
 
@@ -92,22 +87,14 @@ def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     Refuse events that the robot cannot carry out at a point, or where the arm does not stop.
 
     :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the robot program is not ours, or the goal is kept open.
+    :raises NotAvailable: the execution mode cannot do it, or the goal is kept open.
     """
-    mode = resolve_execution_mode(goal)
     for kind in STOP_EVENTS:
         check_mode(goal, kind.mode_rule)
     refuse_dwells_of_open_goals(goal.segments, keep_open=goal.keep_open)
     for kind in STOP_EVENTS:
         for field, waypoint in kind.places(goal):
             check_point(field, waypoint, goal)
-            if not (mode.traits.streams_setpoints or options.dialect.is_own):
-                raise NotAvailable(
-                    field,
-                    f'is set, but robot programs of wire dialect {options.dialect.name} do '
-                    f'nothing at points of {mode.name}',
-                    'split the goal there, or let the driver send its own robot program',
-                )
             if goal.keep_open:
                 raise NotAvailable(
                     field,

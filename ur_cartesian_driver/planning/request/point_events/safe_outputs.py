@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.goal.output_names import (
@@ -18,20 +18,12 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import check_output
 
 
-def check_safe_outputs(goal: GoalTable, options: PlanningOptions) -> None:
+def check_safe_outputs(goal: GoalTable) -> None:
     """
-    Check the outputs that a goal, or the parameter, wants to be safe.
+    Check the outputs that a goal wants to be safe.
 
     :raises InvalidGoal: names field, value and bound.
-    :raises NotAvailable: the robot program is not ours.
     """
-    if (goal.safe_outputs or options.safe_outputs) and not options.dialect.is_own:
-        raise NotAvailable(
-            'safe_outputs',
-            'is not empty, but robot programs of wire dialect '
-            f'{options.dialect.name} do not know it',
-            'leave it empty (the parameter too), or let the driver send its own robot program',
-        )
     for i, output in enumerate(goal.safe_outputs):
         check_output(f'safe_outputs[{i}]', output)
     if (twice := repeated_output(goal.safe_outputs)) is not None:

@@ -32,7 +32,6 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
     field = 'io_commands'
     mode_rule = switches_nothing('io_commands')
-    cannot = 'cannot switch outputs during a motion'
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """Refuse points and outputs that there are not."""

@@ -12,9 +12,23 @@ from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
+    Goal,
+    IOCommand,
+    OutputKind,
+    PathOffset,
+    Posture,
+    ProportionalOutput,
+    SafeOutput,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.request.program_features import FEATURES
+from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan, encode_points
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
@@ -41,6 +55,78 @@ def planned(cell, name, *points, **options):
 
 
 JOINT = Segment(type=SegmentType.JOINT)
+#: A demand for each feature, and the refusal by an older program, in the order of the table.
+DEMANDS = (
+    (
+        {'keep_open': True},
+        'keep_open is set, but a robot program of wire dialect 2.0 needs the number of points at '
+        'the start; send all points at once, or use a robot program of wire dialect 2.14.',
+    ),
+    (
+        {
+            'io_commands': (
+                IOCommand(
+                    waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0
+                ),
+            )
+        },
+        'io_commands is not empty, but robot programs of wire dialect 2.0 cannot switch outputs '
+        'during a motion; leave it empty, or let the driver send its own robot program.',
+    ),
+    (
+        {
+            'proportional_outputs': (
+                ProportionalOutput(first_waypoint=0, last_waypoint=1, pin=0, gain=1.0),
+            )
+        },
+        'proportional_outputs is not empty, but robot programs of wire dialect 2.0 have none; '
+        'leave it empty, or let the driver send its own robot program.',
+    ),
+    (
+        {'safe_outputs': (SafeOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0),)},
+        'safe_outputs is not empty, but robot programs of wire dialect 2.0 do not know it; leave '
+        'it empty (the parameter too), or let the driver send its own robot program.',
+    ),
+    (
+        {'execution': ExecutionMode.SERVO},
+        'execution is SERVO, which robot programs of wire dialect 2.0 do not support; set '
+        'execution to PRIMITIVES.',
+    ),
+    (
+        {'execution': ExecutionMode.SPLINE},
+        'execution is SPLINE, but robot programs of wire dialect 2.0 count in milliseconds, too '
+        'coarse for splines; set execution to PRIMITIVES.',
+    ),
+    (
+        {'segments': (Segment(dwell=0.5), Segment())},
+        'segments[0].dwell is set, but robot programs of wire dialect 2.0 do nothing at points of '
+        'PRIMITIVES; split the goal there, or let the driver send its own robot program.',
+    ),
+    (
+        {'path_offset': PathOffset(limits=(0.0, 0.005, 0.0))},
+        'path_offset is set, but robot programs of wire dialect 2.0 add no offsets to their '
+        'motions; let the driver send its own robot program.',
+    ),
+)
+
+
+@pytest.mark.parametrize(('demand', 'sentence'), DEMANDS, ids=[next(iter(d)) for d, _ in DEMANDS])
+def test_each_feature_that_an_older_program_lacks_is_refused(demand, sentence):
+    points = tuple(Waypoint(pose=Pose((0.1 * i, 0.0, 0.0)), time=float(i)) for i in (1, 2))
+    goal = Goal(waypoints=points, **demand)
+    check(goal, PlanningOptions())
+    with pytest.raises(NotAvailable) as refusal:
+        check(goal, PlanningOptions(dialect=DIALECTS['2.0']))
+    assert str(refusal.value) == sentence
+
+
+def test_the_demands_are_those_of_the_table():
+    assert len(DEMANDS) == len(FEATURES)
+    with pytest.raises(NotAvailable, match='safe_outputs is not empty'):
+        check(
+            Goal(waypoints=(Waypoint(pose=Pose()),)),
+            PlanningOptions(dialect=DIALECTS['2.12'], safe_outputs=('standard_digital 0 1',)),
+        )
 
 
 @pytest.mark.parametrize('name', DIALECTS)
