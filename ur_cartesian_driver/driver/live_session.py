@@ -159,10 +159,9 @@ class InteractiveMotions(ABC):
 
         :raises RobotNotReady: there is none, or the robot program lacks the function.
         """
-        if not self.config.dialect.is_own:
+        if not self.config.runs_own_program:
             raise RobotNotReady(
-                f'Only the robot program of this driver can {what}; wire_dialect '
-                f'says that another one, {self.config.wire_dialect}, runs.'
+                f'Only the robot program of this driver can {what}; {self.config.other_program}.'
             )
         state = self.state
         if state is None:

@@ -33,7 +33,6 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age, StaleStates
 from ur_cartesian_driver.program import PROGRAM_NAME
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
-from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.connection_status import (
     ConnectionStatus,
@@ -255,7 +254,7 @@ class RobotLink:
         await self.program.open(
             host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address))
         )
-        if s.dialect is NEWEST_DIALECT:  # else the program on the robot is another one
+        if s.runs_own_program:
             self.program.render(s.reverse_ip or host, version)
         self._status.update(ports=self.program.ports)
 

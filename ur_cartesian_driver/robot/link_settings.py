@@ -141,8 +141,18 @@ class LinkSettings:
         """The messages that the robot program understands."""
         return DIALECTS[self.wire_dialect]
 
+    @property
+    def runs_own_program(self) -> bool:
+        """Whether the robot runs the program of this driver, not an older one saved on it."""
+        return self.dialect.is_own
+
+    @property
+    def other_program(self) -> str:
+        """The program that runs instead of ours, as a clause."""
+        return f'wire_dialect says that another one, {self.wire_dialect}, runs'
+
     def _check_dialect(self) -> None:
-        if self.headless_mode and self.dialect is not NEWEST_DIALECT:
+        if self.headless_mode and not self.runs_own_program:
             raise ValueError(
                 f"wire_dialect is '{self.wire_dialect}' and headless_mode is true, but "
                 'headless_mode sends our own robot program, which understands '

@@ -17,7 +17,7 @@ from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.execution.monitoring.joint_tolerance_check import JointToleranceCheck
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
-from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
+from ur_cartesian_driver.execution.monitoring.speed_check import REMEDY, SpeedCheck
 from ur_cartesian_driver.execution.monitoring.standstill import Standstill
 from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
 from ur_cartesian_driver.motion.events import PathPlace, Progress
@@ -307,8 +307,7 @@ class GoalMonitor:
             if 0.0 < limit < value:
                 return (
                     f'the robot program reports the end {value:.4f} m or rad away from the last '
-                    'point: it skipped motions that it does not know; set wire_dialect to the '
-                    'version of that program'
+                    f'point: it skipped motions that it does not know; {REMEDY}'
                 )
         return ''
 

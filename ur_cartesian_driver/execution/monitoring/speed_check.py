@@ -25,10 +25,9 @@ PEAK_TO_MEAN = 2.0
 MIN_SPEED_LIMITS = (0.02, 0.1)
 #: Longest duration as a multiple of the planned one, beside the time to begin [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
-_CAUSE = (
-    'the robot program reads the points in another wire dialect; set '
-    'wire_dialect to the version of that program'
-)
+#: What to do about a robot program that reads the points in another way than they were meant.
+REMEDY = 'set wire_dialect to the version of that program'
+_CAUSE = f'the robot program reads the points in another wire dialect; {REMEDY}'
 
 
 class SpeedCheck:

@@ -18,7 +18,7 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.link_status import LinkStatus, OUT_OF_REACH
 from ur_cartesian_driver.robot.primary_client import PrimaryClient
 from ur_cartesian_driver.robot.program.auto_start import ProgramAutoStart
-from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
+from ur_cartesian_driver.robot.program.program_sockets import HAS_OLDER_PROGRAM, ProgramSockets
 from ur_cartesian_driver.robot.program.program_tracker import ProgramTracker
 from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
 
@@ -124,9 +124,7 @@ class ProgramControl:
                 'another program runs on the robot, maybe that of another driver; let it end, '
                 'or stop it'
             )
-        if not self._sockets.text:
-            return 'wire_dialect says that the robot has an older one; play that on the pendant'
-        return ''
+        return '' if self._sockets.text else HAS_OLDER_PROGRAM
 
     def stop(self, reason: str) -> None:
         """End the robot program, so that its motion cannot resume."""

@@ -31,6 +31,9 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
+#: Why the driver has no program for the robot.
+HAS_OLDER_PROGRAM = 'wire_dialect says that the robot has an older one; play that on the pendant'
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramCallbacks:
