@@ -12,6 +12,7 @@ leave one that lacks an `end` without an answer.) Any other line is a command or
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 import re
 from typing import TypeAlias
 
@@ -106,6 +107,7 @@ class UploadDecoder:
         return UploadedProgram(text)
 
 
+@lru_cache(maxsize=4096)  # clients send the same program again and again
 def _block_balance(line: str) -> int:
     """Return how many more blocks a line opens than it closes."""
     if not _BLOCK_WORD.search(line):
