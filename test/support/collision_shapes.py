@@ -3,12 +3,12 @@
 """Where the collision shapes of an arm are, for comparison with its kinematics and its meshes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-Floats = NDArray[np.float64]
+Floats = Floats
 
 
 def body_surfaces(bodies: CollisionBodies, q: Floats, n: int = 24) -> list[Floats]:

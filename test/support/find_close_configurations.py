@@ -17,13 +17,13 @@ import sys
 
 import fcl
 import numpy as np
-from numpy.typing import NDArray
 import pinocchio
 import trimesh
 
 from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_meshes
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-Floats = NDArray[np.float64]
+Floats = Floats
 #: Joints [rad] and distance [m].
 Row = list[float]
 #: Random configurations to measure, those of a pair to keep, and those to approach from.

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 import pytest
 
 from ur_cartesian_driver.importing import (
@@ -17,6 +16,7 @@ from ur_cartesian_driver.importing import (
     parse_code_output,
 )
 from ur_cartesian_driver.importing.gcode.codes import CODES
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 #: Words beside a code that is left out, where its own name is not enough.
 WORDS = {
@@ -114,7 +114,7 @@ def imported(folder: Path, text: str, *outputs: str, **options: Any) -> Imported
     return import_file(file, ImportOptions(outputs=codes, **options))
 
 
-def positions(found: ImportedGoal) -> NDArray[np.float64]:
+def positions(found: ImportedGoal) -> Floats:
     """Return the points (n, 3) [mm]."""
     return 1e3 * np.array(found.goal.waypoints.poses)[:, :3]
 

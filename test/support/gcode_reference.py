@@ -13,9 +13,10 @@ import re
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+
+Floats = Floats
 _Modes = dict[str, Any]
 #: Codes that leave the path as it is.
 _NO_MOTION = {'G40', 'G49', 'G54', 'G61', 'G64', 'G94', 'M3', 'M4', 'M5', 'M7', 'M8', 'M9'}

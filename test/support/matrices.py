@@ -4,13 +4,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose, Quaternion
 
 
-def pose_from_matrix(matrix: NDArray[np.float64] | Sequence[Sequence[float]]) -> Pose:
+def pose_from_matrix(matrix: Floats | Sequence[Sequence[float]]) -> Pose:
     """The pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
     (a, b, c, x), (d, e, f, y), (g, h, i, z) = (
         (float(v) for v in row) for row in list(matrix)[:3]

@@ -9,11 +9,11 @@ from typing import Any
 
 from append_goals import AppendMotion, clear_network_log, moved
 import numpy as np
-from numpy.typing import NDArray
 from plain_clients import RtdeRecorder
 from robot_cell import RobotCell, RTDE
 from virtual_network import HOST
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -84,23 +84,23 @@ class Readings:
         self._recorder.rows.clear()
 
     @property
-    def rows(self) -> NDArray[np.float64]:
+    def rows(self) -> Floats:
         """All rows (n, 13): time [s], target_q [rad], target_qd [rad/s]."""
         self.take()
         return self._rows[: self._count]
 
     @property
-    def moving(self) -> NDArray[np.float64]:
+    def moving(self) -> Floats:
         """Those from the first in which the arm moves to the last."""
         rows = self.rows
         moves = np.flatnonzero((np.abs(rows[:, 7:]) > 1e-4).any(axis=1))
         return rows[moves[0] : moves[-1] + 1]
 
     @property
-    def accelerations(self) -> NDArray[np.float64]:
+    def accelerations(self) -> Floats:
         """Of the moving arm, by differences (n, 6) [rad/s^2]."""
         rows = self.moving
-        steps: NDArray[np.float64] = np.diff(rows[:, 7:], axis=0) / np.diff(rows[:, :1], axis=0)
+        steps: Floats = np.diff(rows[:, 7:], axis=0) / np.diff(rows[:, :1], axis=0)
         return steps
 
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from ur_cartesian_driver.goal_files.goal_schema import Message, PACKED
 from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalColumn, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal, IOCommand, Posture, SegmentType

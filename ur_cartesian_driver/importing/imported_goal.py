@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.importing.import_options import ImportOptions, ToolOrientation
 from ur_cartesian_driver.importing.imported_path import (
@@ -22,12 +21,12 @@ from ur_cartesian_driver.importing.imported_path import (
 )
 from ur_cartesian_driver.importing.path_times import with_times
 from ur_cartesian_driver.importing.simplification import simplify
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     cross_rows,
     distance_rows,
-    Floats,
     keep_hemisphere,
     normalized_rows,
     transform_rows,
@@ -59,7 +58,7 @@ class ImportedGoal:
     goal: GoalTable
     remarks: tuple[ImportNote, ...]
     #: (n,) lines of the points; 0 = added by an option.
-    lines: NDArray[np.int64]
+    lines: Int64s
 
 
 def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedGoal:
@@ -176,7 +175,7 @@ def _orientations(path: ImportedPath, options: ImportOptions, remarks: ImportNot
     return found
 
 
-def _against(normals: Floats, lines: NDArray[np.int64]) -> Floats:
+def _against(normals: Floats, lines: Int64s) -> Floats:
     """Return orientations with z against the normals, and x along y of the frame, or x."""
     lengths = np.linalg.norm(normals, axis=1)
     if not (lengths > 1e-6).all():

@@ -13,9 +13,8 @@ from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.goal.goal import (
     ArcMode,
@@ -125,14 +124,14 @@ class ImportedPath:
 
     positions: Floats
     #: (n,) 1-based lines of the file; 0 = unknown.
-    lines: NDArray[np.int64]
+    lines: Int64s
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
-    types: NDArray[np.int64]
+    types: Int64s
     #: (n,) whether the tool only travels, and whether it has to be lifted for that.
-    travels: NDArray[np.bool_]
-    lifts: NDArray[np.bool_]
+    travels: Flags
+    lifts: Flags
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`.
-    arc_modes: NDArray[np.int64]
+    arc_modes: Int64s
     #: (n, 3) points on arcs, (n, 4) unit quaternions, (n, 3) normals of the surface.
     vias: Floats
     quaternions: Floats
@@ -155,13 +154,13 @@ class ImportedPath:
         return len(self.positions)
 
     @property
-    def rests(self) -> NDArray[np.bool_]:
+    def rests(self) -> Flags:
         """At which points (n,) the arm rests for a time, or waits for an input."""
         found = self.dwells > 0.0
         found[[wait.waypoint for wait in self.waits]] = True
         return found
 
-    def take(self, rows: NDArray[np.int64]) -> ImportedPath:
+    def take(self, rows: Int64s) -> ImportedPath:
         """Return rows, in rising order; outputs of a row that is gone move to the one before."""
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(

@@ -15,7 +15,7 @@ import numpy as np
 
 from ur_cartesian_driver.importing.import_options import ImportOptions
 from ur_cartesian_driver.importing.imported_path import ImportedPath, ImportNotes
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
 #: A tool that stands for so long rests [s]; shorter, it may be slow: it has 5 um to go.

@@ -20,10 +20,10 @@ from math import pi, radians
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.importing.imported_path import ImportedPath
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, interpolate_rows
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
 #: How far the orientation of a point that is left out may be from the new path [rad].
@@ -135,7 +135,7 @@ class _Simplifier:
             via = self._arc(start, end)
         return _Piece(end, via)
 
-    def _first_test(self) -> NDArray[np.bool_]:
+    def _first_test(self) -> Flags:
         """Return for each row whether the point after it may be left out: a quick look at all."""
         a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
         chord = c - a

@@ -17,9 +17,9 @@ from math import cos, sin
 from typing import Any, Generic, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, N, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
@@ -108,7 +108,7 @@ class Arm:
             return Pose((x, y, z), (-qx, -qy, -qz, -qw))
         return Pose((x, y, z), (qx, qy, qz, qw))
 
-    def forward_rows(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def forward_rows(self, q: Floats) -> Floats:
         """
         Return ``T_base_flange`` for rows of joint positions.
 
@@ -135,7 +135,7 @@ class Arm:
         distances = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
         return float(np.linalg.norm(distances, axis=1).max())
 
-    def jacobian(self, q: Sequence[float], T_flange_tcp: Pose = IDENTITY) -> NDArray[np.float64]:
+    def jacobian(self, q: Sequence[float], T_flange_tcp: Pose = IDENTITY) -> Floats:
         """
         Return the Jacobian of the TCP in base axes.
 
@@ -157,7 +157,7 @@ class Arm:
             1.0,
         )
 
-    def frames_rows(self, q: NDArray[np.float64]) -> ChainFramesOf[NDArray[np.float64]]:
+    def frames_rows(self, q: Floats) -> ChainFramesOf[Floats]:
         """Return the frames for joint positions (n, 6); each value is an array (n,)."""
         angles = np.ascontiguousarray(q.T) + np.array(self.geometry.theta)[:, None]
         return self._frames(
@@ -192,7 +192,7 @@ class Arm:
         )
 
 
-def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
+def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> Floats:
     """
     Return the Jacobian of a point [m] fixed to the last link, in base axes.
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from math import tau
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.closed_form import (
     FLANGE_ROUNDING,
@@ -23,10 +22,8 @@ from ur_cartesian_driver.kinematics.closed_form import (
     WRIST_SINGULAR,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import rotation_from_quaternion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 #: The signs of shoulder, elbow and wrist of the eight branches, in the order of their numbers.
 BRANCHES = tuple(
@@ -52,7 +49,7 @@ class BranchMeasures:
     wrist: Floats
 
     @property
-    def branch(self) -> NDArray[np.int64]:
+    def branch(self) -> Int64s:
         """Branch number, 0 to 7, an index of :data:`BRANCHES`."""
         return (4 * (self.shoulder < 0) + 2 * (self.elbow < 0) + (self.wrist < 0)).astype(np.int64)
 
@@ -70,7 +67,7 @@ class TargetPoses:
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
         return cls((px, py, pz), rotation_from_quaternion((x, y, z, w)))
 
-    def rows(self, index: NDArray[np.int64]) -> TargetPoses:
+    def rows(self, index: Int64s) -> TargetPoses:
         """Return the poses at these indices."""
         px, py, pz = (p[index] for p in self.position)
         return TargetPoses((px, py, pz), tuple(r[index] for r in self.rotation))

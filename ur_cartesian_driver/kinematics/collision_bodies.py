@@ -26,14 +26,12 @@ from math import hypot, inf
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.body_sizes import BODY_SIZES, BodySizes
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 
-Floats: TypeAlias = NDArray[np.float64]
-Flags: TypeAlias = NDArray[np.bool_]
 _Skeletons: TypeAlias = tuple[Floats, Floats, Floats]
 
 
@@ -375,7 +373,7 @@ def _link_bodies(size: BodySizes) -> list[_LinkBody]:
     return bodies
 
 
-def _ends_on_axes(arm: Arm, bodies: list[_LinkBody]) -> tuple[NDArray[np.intp], Floats]:
+def _ends_on_axes(arm: Arm, bodies: list[_LinkBody]) -> tuple[Indices, Floats]:
     """
     Return the axis and the distance along it of both ends of each body, (2, k) each.
 

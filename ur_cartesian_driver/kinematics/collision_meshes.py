@@ -15,10 +15,9 @@ from functools import lru_cache
 from importlib.util import find_spec
 from itertools import combinations
 from math import hypot
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
 from ur_cartesian_driver.kinematics.collision_bodies import CONNECTOR_PAIR, Link
@@ -30,10 +29,8 @@ from ur_cartesian_driver.kinematics.link_shapes import (
     mesh_tolerance,
     shortest_turn_of_z,
 )
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
-
-Floats: TypeAlias = NDArray[np.float64]
-Flags: TypeAlias = NDArray[np.bool_]
 
 
 @lru_cache

@@ -12,12 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
-
-Floats = NDArray[np.float64]
 
 # Far below the smallest singular value at which the arm may move.
 _MIN_SINGULAR_VALUE = 1e-12

@@ -17,10 +17,10 @@ from functools import lru_cache
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames
 from ur_cartesian_driver.kinematics.robot_models import dh_table
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
@@ -59,14 +59,12 @@ def ideal_arm_of(arm: Arm) -> IdealArm:
     return IdealArm(*vector6(lengths.tolist()), vector6(offsets.tolist()), misfit)
 
 
-def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:
+def _nominal_lengths(arm: Arm) -> Floats:
     a, d = arm.model.geometry.a, arm.model.geometry.d
     return np.array([d[0], a[1], a[2], d[3], d[4], d[5]])
 
 
-def _fit(
-    arm: Arm, lengths: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _fit(arm: Arm, lengths: Floats) -> tuple[Floats, Floats, float]:
     """Fit by Gauss-Newton over samples of the joint space; the problem is nearly linear."""
     samples = np.random.default_rng(1).uniform(-np.pi, np.pi, (_SAMPLES, 6))
     targets = [arm.forward(q) for q in samples]
@@ -89,7 +87,7 @@ def _fit(
     return lengths, offsets, misfit
 
 
-def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
+def _derivatives(frames: ChainFrames) -> Floats:
     """
     Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the joint positions.
 
@@ -109,7 +107,7 @@ def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
     return derivatives
 
 
-def _twist(T_base_from: Pose, T_base_to: Pose) -> NDArray[np.float64]:
+def _twist(T_base_from: Pose, T_base_to: Pose) -> Floats:
     """Return translation and rotation vector between two poses, both in base."""
     turn = rotation_vector_from_quaternion(
         multiply(T_base_to.quaternion, conjugate(T_base_from.quaternion))

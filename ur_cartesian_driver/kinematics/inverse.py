@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import ceil, copysign, dist, hypot, inf, pi, remainder, sin, tau
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at, pose_error
 from ur_cartesian_driver.kinematics.closed_form import (
@@ -25,6 +24,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits, RobotModel
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 
@@ -195,7 +195,7 @@ def _twins(arm: Arm, q: Joints) -> list[Joints]:
     return twins
 
 
-def _step_along(q: Joints, direction: NDArray[np.float64], distance: float) -> Joints:
+def _step_along(q: Joints, direction: Floats, distance: float) -> Joints:
     return vector6(a + distance * float(b) for a, b in zip(q, direction, strict=True))
 
 

@@ -25,13 +25,12 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
     branch_rows,
     BRANCHES,
     BranchMeasures,
-    Flags,
-    Floats,
     ideal_branch_measures,
     TargetPoses,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, nearest
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 

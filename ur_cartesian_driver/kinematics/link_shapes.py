@@ -25,10 +25,10 @@ from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, CONNECTOR, Link
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     IDENTITY,
@@ -41,7 +41,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-Floats: TypeAlias = NDArray[np.float64]
 #: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
 #: meshes of the e-Series are convex hulls of the links, those of the UR5e's long links in parts; a
 #: cylinder fills the gaps between the parts of its forearm.

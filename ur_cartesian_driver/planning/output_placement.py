@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SpeedLaw
 from ur_cartesian_driver.planning.request.point_events.registry import OUTPUT_EVENTS

@@ -11,7 +11,7 @@ from math import hypot
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.robot_state import RobotState

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import ARM_LINKS, link_shapes, LinkFrames
 from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.goal.goal import Goal

@@ -15,11 +15,11 @@ from itertools import groupby
 from math import ceil, degrees
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
@@ -32,11 +32,11 @@ class Preview:
     """A plan, sampled; one row for each time."""
 
     #: (n,) from the start of the motion [s], the last one is its end.
-    time: NDArray[np.float64]
+    time: Floats
     #: (n, 7) of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
-    poses: NDArray[np.float64]
+    poses: Floats
     #: (n, 6) [rad]; NaN where the calibrated arm has no solution.
-    joints: NDArray[np.float64]
+    joints: Floats
 
 
 def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
@@ -139,8 +139,8 @@ def _between(reference: ReferencePath, row: int, fraction: float) -> Pose:
 
 
 def _joints(
-    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], row_position: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], row_position: Floats
+) -> Floats:
     """
     Return joint positions for poses at row positions (row + fraction) of the reference path.
 

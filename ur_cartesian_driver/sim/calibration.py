@@ -17,11 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
-
-Array = NDArray[np.float64]
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 #: Standard deviations of the axes of a random calibration [rad, m]; they put the flange 1 to 2 mm
 #: off, as on real arms.
@@ -40,10 +38,10 @@ class _Axes:
     """An arm with all joints at 0, in base axes."""
 
     #: (6, 3) a point on each axis [m], and its direction.
-    points: Array
-    directions: Array
+    points: Floats
+    directions: Floats
     #: (4, 4) the flange; z along the last axis, origin on it.
-    flange: Array
+    flange: Floats
 
 
 def read_calibration(path: Path, model: RobotModel) -> DhTable:
@@ -88,7 +86,7 @@ def random_calibration(model: RobotModel, seed: int) -> DhTable:
     return _table(axes, model)
 
 
-def _link(path: Path, links: Mapping[Any, Any], name: str) -> Array:
+def _link(path: Path, links: Mapping[Any, Any], name: str) -> Floats:
     """Return the pose of a joint in the link before (4, 4)."""
     link = links.get(name)
     values = []
@@ -106,7 +104,7 @@ def _link(path: Path, links: Mapping[Any, Any], name: str) -> Array:
     return T
 
 
-def _axes_of_links(links: list[Array], path: Path) -> _Axes:
+def _axes_of_links(links: list[Floats], path: Path) -> _Axes:
     T = np.eye(4)
     points, directions = [], []
     for link in links:
@@ -156,8 +154,8 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 
 
 def _common_normal(
-    origin: Array, z: Array, point: Array, following: Array
-) -> tuple[Array, float, float]:
+    origin: Floats, z: Floats, point: Floats, following: Floats
+) -> tuple[Floats, float, float]:
     """Return the direction of the common normal, where on the first axis it begins, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
@@ -172,7 +170,7 @@ def _common_normal(
     return across / a, 0.0, a
 
 
-def _flange_on(axes: _Axes) -> Array:
+def _flange_on(axes: _Axes) -> Floats:
     """Return the flange with its z along the last axis and its origin on it."""
     z, point, flange = axes.directions[5], axes.points[5], axes.flange
     x = flange[:3, 0] - z * (z @ flange[:3, 0])
@@ -183,17 +181,17 @@ def _flange_on(axes: _Axes) -> Array:
     return T
 
 
-def _angle(axis: Array, start: Array, end: Array) -> float:
+def _angle(axis: Floats, start: Floats, end: Floats) -> float:
     return atan2(float(axis @ np.cross(start, end)), float(start @ end))
 
 
-def _turned(direction: Array, by: Array) -> Array:
+def _turned(direction: Floats, by: Floats) -> Floats:
     """Return a direction turned by a small rotation vector [rad]."""
     turned = direction + np.cross(by, direction)
     return turned / np.linalg.norm(turned)
 
 
-def _turn(axis: str, angle: float) -> Array:
+def _turn(axis: str, angle: float) -> Floats:
     T = np.eye(4)
     i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
     T[i, i] = T[j, j] = np.cos(angle)
@@ -202,7 +200,7 @@ def _turn(axis: str, angle: float) -> Array:
     return T
 
 
-def _shift(x: float, y: float, z: float) -> Array:
+def _shift(x: float, y: float, z: float) -> Floats:
     T = np.eye(4)
     T[:3, 3] = x, y, z
     return T

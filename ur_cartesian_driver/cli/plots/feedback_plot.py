@@ -6,12 +6,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats: TypeAlias = NDArray[np.float64]
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 
 def draw(record: Path, drawing: Path, title: str) -> None:

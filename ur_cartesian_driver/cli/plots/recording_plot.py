@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.cli.progress import timed
 from ur_cartesian_driver.driver.recordings.recording import Recording
@@ -22,6 +21,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import (
     OUTPUT_NAMES,
     PART_SUFFIX,
 )
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 
 #: Largest number of packets in a picture.
@@ -157,7 +157,7 @@ def _draw_path(figure: Any, recording: Recording) -> None:
     figure.legend(handles[:shown], labels[:shown], loc='upper left', ncols=4)
 
 
-def _switch_places(recording: Recording) -> NDArray[np.float64]:
+def _switch_places(recording: Recording) -> Floats:
     """Return the tool poses at which the robot reported a switched digital output."""
     digital = recording.digital_output
     changed = (digital[1:] != digital[:-1]) & (digital[:-1] >= 0)
@@ -227,7 +227,7 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
     axes.legend(loc='lower left', ncols=2)
 
 
-def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
+def _timeline(recording: Recording) -> list[tuple[str, Floats]]:
     """Return the rows of the chart, each from 0 to 1 over time: outputs, program pauses."""
     digital, rows = recording.digital_output, []
     for bit, name in enumerate(OUTPUT_NAMES):
@@ -241,9 +241,7 @@ def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
     return [*rows, ('paused', paused.astype(np.float64))] if paused.any() else rows
 
 
-def _draw_timeline(
-    axes: Any, recording: Recording, rows: list[tuple[str, NDArray[np.float64]]]
-) -> None:
+def _draw_timeline(axes: Any, recording: Recording, rows: list[tuple[str, Floats]]) -> None:
     """Draw points, outputs and pauses as rows of one chart."""
     points = [
         (at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings.export_options import ExportOptions
 from ur_cartesian_driver.driver.recordings.message_definitions import message_definition
-from ur_cartesian_driver.driver.recordings.recording import Floats, Recording
+from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import conjugate, rotate
 from ur_cartesian_driver.motion.goal.known_frames import BASE, TCP
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 import json
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 import zipfile
 
 import numpy as np
@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_format import Event
 from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
-
-Floats: TypeAlias = NDArray[np.float64]
-Integers: TypeAlias = NDArray[np.int32]
 
 
 class _NoRecording(ValueError):
@@ -48,7 +46,7 @@ class RecordedDeviation:
     #: (n,) when the plan, at full speed, is where the target is [s].
     planned_time: Floats
     #: (n,) the goal's point that this place leads to.
-    waypoint: Integers
+    waypoint: Int32s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,19 +85,19 @@ class Recording:
     #: (n, 2) [A] or [V]; NaN = unknown.
     analog_output: Floats = field(repr=False)
     #: (n,) bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
-    digital_output: Integers = field(repr=False)
+    digital_output: Int32s = field(repr=False)
     #: (n,) motions that the robot program has begun, and the goal's point that the last one leads
     #: to; -1 = it has not said.
-    points_begun: Integers = field(repr=False)
-    waypoint: Integers = field(repr=False)
+    points_begun: Int32s = field(repr=False)
+    waypoint: Int32s = field(repr=False)
     #: (n,) numbers of the controller.
-    robot_mode: Integers = field(repr=False)
-    safety_mode: Integers = field(repr=False)
-    runtime_state: Integers = field(repr=False)
+    robot_mode: Int32s = field(repr=False)
+    safety_mode: Int32s = field(repr=False)
+    runtime_state: Int32s = field(repr=False)
     #: (m,) [s], (m, 7), (m,) index of the goal's point that the sample leads to.
     planned_time: Floats = field(repr=False)
     planned_pose: Floats = field(repr=False)
-    planned_point: Integers = field(repr=False)
+    planned_point: Int32s = field(repr=False)
 
     @classmethod
     def load(cls, path: str | Path, max_rows: int = 0) -> Recording:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings import recording_format as disk
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 
 #: Names of recordings; other files in the directory are left alone.
@@ -56,7 +57,7 @@ class RecordingFolder:
         self._max_size, self._warn = max_size, warn
         self._is_broken = False
         #: When the samples of the plan that came last are due.
-        self._last_times: NDArray[np.float64] = np.empty(0)
+        self._last_times: Floats = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.lost_rows = 0
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.execution.monitoring.press_window import PressWindow
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
@@ -73,15 +73,15 @@ class MotionJob:
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: (records,) index of the waypoint to which each record leads or belongs; empty = record i is
     #: the motion to waypoint i.
-    waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    waypoint: Int32s = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     #: (records,) mask of the motions, which the robot program counts; empty = all are.
-    is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    is_motion: Flags = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
     #: Empty = when the reference path arrives at their waypoints.
-    end_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    end_times: Floats = field(default_factory=lambda: np.empty(0))
     #: (records,) when the robot program asks for the next record [s]: when this one ends, or when
     #: its blend begins. Empty = at ``end_times``.
-    request_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    request_times: Floats = field(default_factory=lambda: np.empty(0))
     #: Whether points may be appended (keep_open).
     keep_open: bool = False
     #: How far ahead of the arm its motion may be final [s]; 0 = not limited.

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from math import hypot, inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.geometry.workspace import Plane
@@ -95,7 +95,7 @@ class WorkspaceGuard:
         index = int(np.where(worse, slacks, inf).argmin())
         return self._clause(index, float(slacks[index]))
 
-    def _clearance_slacks(self, q: Joints) -> NDArray[np.float64]:
+    def _clearance_slacks(self, q: Joints) -> Floats:
         """Return all distances, less the margin or clearance that they must keep [m]."""
         row = np.array([q])
         slacks = np.empty(0)

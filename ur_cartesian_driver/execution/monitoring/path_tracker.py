@@ -25,9 +25,9 @@ from operator import mul
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.events import PathPlace
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import norm, scale, Vector3, Vector6, ZERO3
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
@@ -449,7 +449,7 @@ def _position(row: int, fraction: float) -> PathPosition:
     return PathPosition(row + 1, 0.0) if fraction >= 1.0 else PathPosition(row, fraction)
 
 
-def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _continuous_signs(quaternions: Floats) -> Floats:
     """Return the signs that make neighbouring quaternions of a path close to each other."""
     dots = np.einsum('ij,ij->i', quaternions[1:], quaternions[:-1])
     return np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))

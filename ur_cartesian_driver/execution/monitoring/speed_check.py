@@ -14,8 +14,8 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
@@ -69,7 +69,7 @@ class SpeedCheck:
         return None
 
 
-def _max_speed(lengths: NDArray[np.float64], times: NDArray[np.float64]) -> float:
+def _max_speed(lengths: Floats, times: Floats) -> float:
     """Return the largest average speed of the edges; infinite where one takes no time."""
     moving = lengths > 1e-9
     if not moving.any():

@@ -16,7 +16,6 @@ from __future__ import annotations
 from math import copysign
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.execution.goal.feeder import Displaced
 from ur_cartesian_driver.execution.offsets.offset_requests import OffsetRequests
@@ -24,6 +23,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import MIN_STEP
 from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_incremental import track_pose
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import (
     add,
@@ -109,7 +109,7 @@ class OffsetSetpoints(Displaced):
         #: How far the joints of the newest set-point are from the path [rad].
         self._change: Vector6 = ZERO6
         # The newest set-points: joints, shift in the base, offset in the frame of the path.
-        self._history: NDArray[np.float64] = np.zeros((HISTORY, 12))
+        self._history: Floats = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
 
     # ---- set-points ---------------------------------------------------------------------------

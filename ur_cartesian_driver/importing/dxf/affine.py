@@ -9,7 +9,7 @@ from math import cos, sin
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import cross, norm, unit, Vector3, ZERO3
 
 

@@ -22,10 +22,9 @@ from __future__ import annotations
 from math import ceil, cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.importing.simplification import farthest_row
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
 #: The share of the tolerance for the pieces; smaller ones take more time and save few chords.
 _FINE = 1.0 / 8.0
@@ -140,7 +139,7 @@ def _beside(windows: Floats) -> tuple[Floats, Floats]:
     return np.sqrt(np.einsum('mij,mij->mi', off, off)), along
 
 
-def _halved(curves: Floats, which: NDArray[np.bool_]) -> Floats:
+def _halved(curves: Floats, which: Flags) -> Floats:
     """Return the curves in their order, some as two halves (de Casteljau)."""
     halves = curves[which]
     left, right = np.empty_like(halves), np.empty_like(halves)
@@ -177,9 +176,9 @@ def _merged(points: Floats, tolerance: float) -> list[int]:
     return found
 
 
-def _are_straight(windows: Floats, tolerance: float) -> NDArray[np.bool_]:
+def _are_straight(windows: Floats, tolerance: float) -> Flags:
     """Tell of points (m, k, 3) in rows whether all are near the line from first to last."""
     off, along = _beside(windows - windows[:, :1])
     back = (np.maximum.accumulate(along, axis=1) - along).max(axis=1)
-    straight: NDArray[np.bool_] = (off.max(axis=1) <= tolerance) & (back <= tolerance)
+    straight: Flags = (off.max(axis=1) <= tolerance) & (back <= tolerance)
     return straight

@@ -13,7 +13,7 @@ import numpy as np
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes, MAX_DISTANCE
 from ur_cartesian_driver.importing.tables.column_names import POSITION, ROLES
 from ur_cartesian_driver.importing.tables.table_columns import Column
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 #: Python's float() takes more: underscores, digits of other scripts, nan.
 _NUMBER = re.compile(r'\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*', re.IGNORECASE | re.ASCII)

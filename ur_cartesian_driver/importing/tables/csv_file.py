@@ -31,7 +31,8 @@ from ur_cartesian_driver.importing.tables.column_names import (
 from ur_cartesian_driver.importing.tables.table_columns import find_columns, is_header
 from ur_cartesian_driver.importing.tables.table_text import read_table
 from ur_cartesian_driver.importing.text_file import file_lines, file_text
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats, multiply_rows, normalized_rows
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows, normalized_rows
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 

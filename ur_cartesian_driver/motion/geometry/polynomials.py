@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 
 class MotionRows(NamedTuple):

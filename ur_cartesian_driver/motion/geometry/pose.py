@@ -20,13 +20,13 @@ from math import acos, atan2, cos, hypot, sin, sqrt
 from typing import TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
 #: One number, or the numbers of a batch.
-N = TypeVar('N', float, NDArray[np.float64])
+N = TypeVar('N', float, Floats)
 
 _SMALL_ANGLE = 1e-9
 
@@ -52,7 +52,7 @@ class Pose:
         """Return ``x y z rx ry rz`` [m, rad], the angle within [0, pi]."""
         return (*self.position, *rotation_vector_from_quaternion(self.quaternion))
 
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Floats:
         """Return the homogeneous matrix (4, 4)."""
         matrix = np.eye(4)
         matrix[:3, :3] = np.array(rotation_from_quaternion(self.quaternion)).reshape(3, 3)
@@ -227,12 +227,12 @@ def rotation_from_quaternion(q: tuple[N, N, N, N]) -> tuple[N, ...]:
     )
 
 
-def pose_rows(poses: Iterable[Pose]) -> NDArray[np.float64]:
+def pose_rows(poses: Iterable[Pose]) -> Floats:
     """Return a batch of poses, (n, 7): x y z [m] and the unit quaternion x y z w."""
     return np.array([pose.row() for pose in poses], dtype=np.float64).reshape(-1, 7)
 
 
-def pose_from_row(row: Sequence[float] | NDArray[np.float64]) -> Pose:
+def pose_from_row(row: Sequence[float] | Floats) -> Pose:
     """Return the pose of one row ``x y z qx qy qz qw``."""
     x, y, z, qx, qy, qz, qw = row.tolist() if isinstance(row, np.ndarray) else row
     return Pose((x, y, z), (qx, qy, qz, qw))

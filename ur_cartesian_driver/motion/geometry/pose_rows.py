@@ -10,11 +10,9 @@ so many poses that an object for each would take longer than the inverse kinemat
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
-
-Floats = NDArray[np.float64]
 
 _SMALL_ANGLE = 1e-9
 

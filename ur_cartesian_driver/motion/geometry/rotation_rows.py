@@ -19,8 +19,9 @@ from math import factorial
 
 import numpy as np
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
-from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows
 
 # Terms of the series: exact to rounding for turns up to two full turns.
 _TERMS = 26

@@ -37,11 +37,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.field_table import ColumnOf, Form, Mark, Range, Sent
@@ -251,20 +248,20 @@ class SegmentColumns:
     """The segments of a goal in columns: none, or a row for each point."""
 
     #: (n,) each, enumerations as their numbers
-    types: Annotated[NDArray[np.int64], ColumnOf('type', always=True)]
-    arc_modes: Annotated[NDArray[np.int64], ColumnOf('arc_mode', always=True)]
+    types: Annotated[Int64s, ColumnOf('type', always=True)]
+    arc_modes: Annotated[Int64s, ColumnOf('arc_mode', always=True)]
     blend_radii: Annotated[Floats, ColumnOf('blend_radius')]
     dwells: Annotated[Floats, ColumnOf('dwell')]
     velocities: Annotated[Floats, ColumnOf('velocity')]
     accelerations: Annotated[Floats, ColumnOf('acceleration', packed='segment_accelerations')]
     #: (n, 7) poses on the arcs, and whether there is one (n,)
     vias: Annotated[Floats, ColumnOf('via', after='free_maxima')]
-    has_via: NDArray[np.bool_]
+    has_via: Flags
     #: Those that are not empty, by row.
     via_postures: Annotated[Mapping[int, Posture], ColumnOf('via_posture')] = field(
         default_factory=dict
     )
-    free_axes: Annotated[NDArray[np.int64], ColumnOf('free_axis')]
+    free_axes: Annotated[Int64s, ColumnOf('free_axis')]
     free_minima: Annotated[Floats, ColumnOf('free_min')]
     free_maxima: Annotated[Floats, ColumnOf('free_max')]
 

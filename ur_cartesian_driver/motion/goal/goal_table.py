@@ -18,10 +18,9 @@ from operator import eq
 from typing import Any, ClassVar, overload, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types
 from ur_cartesian_driver.motion.goal.field_table import (
@@ -39,8 +38,6 @@ from ur_cartesian_driver.motion.goal.goal import (
     WaypointColumns,
 )
 
-Integers = NDArray[np.int64]
-
 T = TypeVar('T')
 R = TypeVar('R', bound='Rows[Any]')
 G = TypeVar('G', bound='GoalRows[Any]')
@@ -49,7 +46,7 @@ G = TypeVar('G', bound='GoalRows[Any]')
 _BLOCK = 4096
 
 
-def rows_where(mask: NDArray[np.bool_] | np.bool_) -> list[int]:
+def rows_where(mask: Flags | np.bool_) -> list[int]:
     """Return the rows of a mask (n,) that are true, in order."""
     rows: list[int] = np.flatnonzero(mask).tolist()
     return rows

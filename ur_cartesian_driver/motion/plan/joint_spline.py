@@ -15,8 +15,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
@@ -26,7 +26,6 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, ZERO6
 from ur_cartesian_driver.motion.plan.primitive import Spline
 
-Floats = NDArray[np.float64]
 #: Times that differ by less are the same [s]; the wire counts in microseconds.
 SAME_TIME = 5e-7
 

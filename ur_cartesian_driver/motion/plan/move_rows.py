@@ -14,12 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6
-from ur_cartesian_driver.motion.goal.goal_table import Integers, Rows
+from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.motion.plan.primitive import (
     MoveJ,
     MoveL,
@@ -40,12 +39,12 @@ class MoveRows(Rows[Primitive]):
     """Motions to poses of the TCP in base; units as in the primitives."""
 
     #: (n,) indices into :data:`MOVES`
-    kinds: Integers
+    kinds: Int64s
     #: (n, 7) x y z [m], unit quaternion x y z w
     targets: Floats
     #: (n, 6) [rad], and whether there is one (n,)
     q_near: Floats
-    has_q_near: NDArray[np.bool_]
+    has_q_near: Flags
     #: (n,) each; durations of MoveJ and MoveL only
     velocities: Floats
     accelerations: Floats
@@ -96,7 +95,7 @@ class SplineRows(Rows[Primitive]):
     #: (n,)
     durations: Floats
     #: (n,) whether the accelerations count
-    quintic: NDArray[np.bool_]
+    quintic: Flags
 
     def __len__(self) -> int:
         return len(self.durations)

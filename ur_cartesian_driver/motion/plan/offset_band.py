@@ -13,9 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, ZERO3
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 
@@ -62,16 +60,16 @@ class OffsetBand:
     #: Of the rows below [s].
     step: float
     #: (n, 3 axes, 3) in the base, at the times 0, step, 2 step, ... of the motion.
-    axes: NDArray[np.float64]
+    axes: Floats
     #: (n,) whether the path may give way there; if not, the offset fades out.
-    is_open: NDArray[np.bool_]
+    is_open: Flags
 
-    def axes_at(self, time: float) -> NDArray[np.float64]:
+    def axes_at(self, time: float) -> Floats:
         """Return the axes at a time of the motion [s] in the base (3 axes, 3)."""
         row = min(max(time / self.step, 0.0), len(self.axes) - 1.0)
         k = min(int(row), len(self.axes) - 2)
         part = row - k
-        axes: NDArray[np.float64] = (1.0 - part) * self.axes[k] + part * self.axes[k + 1]
+        axes: Floats = (1.0 - part) * self.axes[k] + part * self.axes[k + 1]
         return axes
 
     def shift(self, time: float, offset: Vector3) -> Vector3:

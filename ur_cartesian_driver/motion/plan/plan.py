@@ -14,8 +14,8 @@ from functools import cache
 from typing import NamedTuple, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -44,17 +44,17 @@ class ReferencePath:
     """
 
     #: (m, 7) x y z [m], unit quaternion x y z w.
-    poses: NDArray[np.float64]
+    poses: Floats
     #: (m,) the index of the goal's point to which the sample belongs (the one it leads to).
-    point: NDArray[np.int32]
+    point: Int32s
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
-    time: NDArray[np.float64]
+    time: Floats
     #: (m, 2) [m], [rad] how far the robot's own blend may lie beside the sample: 0 outside blends,
     #: of which UR publishes the size and not the shape. Empty = 0 everywhere.
-    blend_tolerance: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    blend_tolerance: Floats = field(default_factory=lambda: np.empty((0, 2)))
     #: (m,) how much of its segment lies before the sample, as in :class:`~.events.PathPlace`.
     #: Empty = 0 everywhere.
-    fraction: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    fraction: Floats = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
@@ -151,14 +151,14 @@ class PlannedRows(Rows[PlannedSegment]):
     """The segments of a plan in columns; units as in a planned segment."""
 
     #: (n,)
-    waypoints: NDArray[np.int32]
-    lengths: NDArray[np.float64]
-    angles: NDArray[np.float64]
-    durations: NDArray[np.float64]
+    waypoints: Int32s
+    lengths: Floats
+    angles: Floats
+    durations: Floats
     #: (n, 5) the blend entries, zeros where there is no blend.
-    blend_entries: NDArray[np.float64]
+    blend_entries: Floats
     #: (n, 6)
-    joints: NDArray[np.float64]
+    joints: Floats
     primitives: Sequence[Primitive]
     #: Lines of the report, and the outputs' additions to some of them.
     report_lines: Sequence[str]
@@ -187,7 +187,7 @@ class PlannedRows(Rows[PlannedSegment]):
         )
 
     @property
-    def records(self) -> NDArray[np.intp]:
+    def records(self) -> Indices:
         """The number of records of each on the wire (n,): its primitive and its outputs."""
         counts = np.ones(len(self), dtype=np.intp)
         for row, outputs in self.outputs.items():

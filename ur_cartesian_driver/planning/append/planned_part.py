@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Indices, Int32s
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
@@ -28,8 +28,8 @@ class PlannedPart:
     spline: JointSpline
     #: Of each piece up to its last point: the point to which it leads, and how many records of
     #: the goal are before it.
-    waypoints: NDArray[np.int32]
-    records_before: NDArray[np.intp]
+    waypoints: Int32s
+    records_before: Indices
 
     def begin(self, row: int) -> float:
         """Return when a piece begins [s]; the one behind the last: when that ends."""

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from math import degrees, inf, nan, pi, tau
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import (
     IDENTITY,
     multiply,
@@ -32,7 +32,6 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     conjugate_rows,
     cross_rows,
     distance_rows,
-    Floats,
     interpolate_rows,
     multiply_rows,
     normalized_rows,
@@ -87,7 +86,6 @@ _AXES: dict[int, Vector3] = {
     FreeAxis.Z: (0.0, 0.0, 1.0),
 }
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
-Flags = NDArray[np.bool_]
 
 
 def as_named(goal: GoalTable) -> GoalTable:
@@ -312,14 +310,14 @@ class _FreePath:
             options=self.options,
         )
 
-    def _knots(self, lengths: Floats, tilts: Floats) -> NDArray[np.intp]:
+    def _knots(self, lengths: Floats, tilts: Floats) -> Indices:
         """Return the rows whose rotations are searched; those between them follow evenly."""
         extent = np.maximum(lengths / _KNOT_LENGTH, tilts / _KNOT_TILT)
         full = np.diff(np.floor(np.cumsum(np.minimum(extent, 1.0))), prepend=0.0) > 0.0
         after_any = np.append(self.is_any[1:] & ~self.is_joint[1:], False)
         return np.flatnonzero(full | ~self.is_any | ~after_any | self.is_joint)
 
-    def _layers(self, ends: NDArray[np.intp], whole: Floats, tilts: Floats) -> list[Layer]:
+    def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
         # The commanded change of the rotation must be possible where it is not free.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field
 from math import inf, pi, tau
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form_rows import (
@@ -34,17 +33,15 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats, multiply_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tightest_margins import (
     singularity_distance_rows,
     SINGULARITY_MEASURES,
 )
-
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 #: Rotations of a full turn in the coarse search, and its step [rad]. The finer searches try so
 #: many rotations to either side of the best one, each with a third of the step before.
@@ -132,7 +129,7 @@ class RotationPath:
     #: (layers,) [rad].
     rotations: Floats
     #: (layers,) number of the branch; (layers, 6) joint positions [rad].
-    branches: Ints
+    branches: Int64s
     joints: Floats
 
 
@@ -161,9 +158,9 @@ class _Tables:
     q: Floats
     cost: Floats
 
-    def look_up(self, sample: int, rotations: Floats) -> Ints:
+    def look_up(self, sample: int, rotations: Floats) -> Int64s:
         """Return the numbers of the nearest rotations."""
-        index: Ints = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
+        index: Int64s = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
         count = self.q.shape[3]
         return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
 
@@ -246,7 +243,7 @@ class RotationLattice:
         solution = branch_rows(ideal_arm_of(self.arm), TargetPoses.of(poses), BRANCHES[branch])
         return solution.q.T
 
-    def sample_branches(self, path: RotationPath) -> Ints:
+    def sample_branches(self, path: RotationPath) -> Int64s:
         """Return the branch of a path at each sample (n,)."""
         begins = [layer.begin for layer in self.layers]
         return np.repeat(path.branches, np.diff([*begins, len(self.samples)]))
@@ -257,7 +254,7 @@ class RotationLattice:
 
     # -- tables ----------------------------------------------------------------------------------
 
-    def _flange_poses(self, samples: Ints, rotations: Floats) -> Floats:
+    def _flange_poses(self, samples: Int64s, rotations: Floats) -> Floats:
         """Return the flange (n, 7) at rotated samples."""
         half = 0.5 * rotations[:, None]
         turn = np.concatenate([np.sin(half) * np.array(self.axis), np.cos(half)], axis=1)
@@ -266,7 +263,7 @@ class RotationLattice:
         return compose_rows(rows, self.T_controlled_flange)
 
     def _tables(
-        self, first: Floats, step: float, count: int, branches: tuple[int, ...] | Ints
+        self, first: Floats, step: float, count: int, branches: tuple[int, ...] | Int64s
     ) -> _Tables:
         """
         Solve the arm on all samples.
@@ -355,7 +352,7 @@ class RotationLattice:
             branches, cost = around.branches[:, None], np.zeros((1, 1))
         q = np.broadcast_to(np.array(self.q_start)[:, None, None], (6, len(cost), 1))
         rotations = np.zeros(1)
-        back: list[tuple[Ints, Floats, Floats]] = []
+        back: list[tuple[Int64s, Floats, Floats]] = []
         for number, (layer, targets) in enumerate(zip(self.layers, nodes, strict=True)):
             if layer.is_joint:
                 near = None if around is None else around.joints[number]
@@ -372,7 +369,7 @@ class RotationLattice:
 
     @staticmethod
     def _read_back(
-        back: list[tuple[Ints, Floats, Floats]], cost: Floats, branches: Ints
+        back: list[tuple[Int64s, Floats, Floats]], cost: Floats, branches: Int64s
     ) -> RotationPath:
         """
         Return the way to the best node of the last layer.
@@ -399,7 +396,7 @@ class RotationLattice:
         cost: Floats,
         q: Floats,
         step: float,
-    ) -> tuple[Floats, Floats, Ints, Floats]:
+    ) -> tuple[Floats, Floats, Int64s, Floats]:
         """Return cost (b, k), joints (6, b, k) and source (b, k) of the nodes of a layer."""
         reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
         alive = np.flatnonzero(np.isfinite(cost).any(axis=0))
@@ -456,7 +453,7 @@ class RotationLattice:
         cost: Floats,
         q: Floats,
         near: Floats | None,
-    ) -> tuple[Floats, Floats, Ints, Floats]:
+    ) -> tuple[Floats, Floats, Int64s, Floats]:
         """
         Return the same of a layer to which a joint move leads: from any node to any other.
 

@@ -12,13 +12,12 @@ joint moves this happens in joint space, else in Cartesian space.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import N
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
-    Floats,
     multiply_rows,
     normalized_rows,
 )
@@ -65,7 +64,7 @@ class BlendShapes:
         middle: Floats,
         end: Floats,
         radius: Floats,
-        fillet: NDArray[np.bool_],
+        fillet: Flags,
     ) -> None:
         """Measure turns and openings."""
         self.start, self.middle, self.end = start[:, :3], middle[:, :3], end[:, :3]
@@ -96,7 +95,7 @@ class BlendShapes:
     def _circle_radii(self) -> Floats:
         return np.maximum(fillet_radius(self.radius, self.opening), _MIN_RADIUS)
 
-    def samples(self) -> NDArray[np.intp]:
+    def samples(self) -> Indices:
         """Return the numbers of chords that follow them closely enough."""
         # At its ends the blend turns at twice its mean rate.
         turns = np.ceil(2.0 * self.turns / MAX_TURN_PER_SAMPLE)

@@ -13,13 +13,12 @@ from collections.abc import Mapping
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     distance_rows,
-    Floats,
     interpolate_rows,
 )
 from ur_cartesian_driver.planning.geometry.blend_shapes import (
@@ -34,9 +33,6 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SegmentCurve,
     tcp_rows,
 )
-
-Integers = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
@@ -54,7 +50,7 @@ class CurveSequence(Protocol):
     #: Whether the arm rests at the points without a blend.
     rests_at_points: ClassVar[bool]
 
-    def rows(self, number: Integers, t: Floats) -> Floats:
+    def rows(self, number: Indices, t: Floats) -> Floats:
         """
         Return poses (n, 7) on many curves.
 
@@ -65,7 +61,7 @@ class CurveSequence(Protocol):
     def extent(self, number: int) -> tuple[float, float]:
         """Return length [m], and turn of tool or leading joint [rad], of a curve."""
 
-    def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
+    def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
         """Return the segments (n,) that places count to, and the fractions (n,) of them."""
 
 
@@ -118,14 +114,14 @@ class CurveRows:
         self.others.pop(row, None)
 
     @property
-    def samples(self) -> Integers:
+    def samples(self) -> Indices:
         """(n,) into how many pieces to cut each so that chords follow it."""
         samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
         for row, curve in self.others.items():
             samples[row] = curve.samples
         return samples
 
-    def rows(self, row: Integers, u: Floats) -> Floats:
+    def rows(self, row: Indices, u: Floats) -> Floats:
         """Return poses (n, 7) on many curves; ``row`` must not decrease."""
         on_line = self.is_line[row]
         if on_line.all():
@@ -138,7 +134,7 @@ class CurveRows:
             rows[first:last] = self.others[k].rows(u[first:last])
         return rows
 
-    def trim(self, row: Integers, radius: Floats, *, at_end: bool = False) -> Floats:
+    def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
         """Return the ``u`` (n,) at which curves leave balls around their starts, or ends [m]."""
         length = self.length[row]
         u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
@@ -192,11 +188,11 @@ class BlendedPath:
         self.radius[first:stop], self.u_leave[first:stop] = 0.0, 1.0
         self.u_join[first + 1 : stop + 1] = 0.0
 
-    def leave(self, row: Integers, radius: Floats) -> None:
+    def leave(self, row: Indices, radius: Floats) -> None:
         """Leave curves where blends will begin, the second curves of which are not known yet."""
         self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
-    def make_blends(self, row: Integers, radius: Floats, fillet: Flags) -> None:
+    def make_blends(self, row: Indices, radius: Floats, fillet: Flags) -> None:
         """Make the blends after curves."""
         if not len(row):
             return
@@ -220,7 +216,7 @@ class BlendedPath:
             positions = self.blend_rows(np.full(len(s), k), s)[:, :3]
             self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
 
-    def extents(self, number: Integers) -> tuple[Floats, Floats]:
+    def extents(self, number: Indices) -> tuple[Floats, Floats]:
         """Return the lengths (n,) [m], and the turns (n,) of tool or leading joint [rad]."""
         row, is_blend = number // 2, number % 2 == 1
         travel, own = self.curves.joint_travel, self.curves.joint_travel[row]
@@ -240,7 +236,7 @@ class BlendedPath:
         length, turn = self.extents(np.array([number]))
         return float(length[0]), float(turn[0])
 
-    def rows(self, number: Integers, t: Floats) -> Floats:
+    def rows(self, number: Indices, t: Floats) -> Floats:
         """See :class:`CurveSequence`."""
         rows = np.empty((len(t), 7))
         for begin in range(0, len(t), _BLOCK):
@@ -248,7 +244,7 @@ class BlendedPath:
             rows[block] = self._rows(number[block], t[block])
         return rows
 
-    def _rows(self, number: Integers, t: Floats) -> Floats:
+    def _rows(self, number: Indices, t: Floats) -> Floats:
         row, on_blend = number // 2, number % 2 == 1
         if not on_blend.any():
             return self.curves.rows(row, t)
@@ -257,7 +253,7 @@ class BlendedPath:
         rows[on_blend] = self.blend_rows(row[on_blend], t[on_blend])
         return rows
 
-    def blend_rows(self, row: Integers, s: Floats) -> Floats:
+    def blend_rows(self, row: Indices, s: Floats) -> Floats:
         """Return poses (n, 7) in the blends after curves; ``row`` must not decrease."""
         curves = self.curves
         in_joint_space = curves.is_joint_line[row] & curves.is_joint_line[row + 1]
@@ -287,7 +283,7 @@ class BlendedPath:
         rows: Floats = first.joint_rows(a) + second.joint_rows(b) - np.array(second.q_start)
         return rows
 
-    def _crossfaded(self, row: Integers, s: Floats) -> Floats:
+    def _crossfaded(self, row: Indices, s: Floats) -> Floats:
         """Return poses in blends that crossfade poses."""
         curves, after = self.curves, row + 1
         a, b = crossfade(self.u_leave[row], self.u_join[after], s)
@@ -305,7 +301,7 @@ class BlendedPath:
             )
         return rows
 
-    def locate(self, number: Integers, t: Floats) -> tuple[Integers, Floats]:
+    def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
         """See :class:`CurveSequence`; the second half of a blend counts to the next segment."""
         row, on_blend = number // 2, number % 2 == 1
         after = on_blend & (t > 0.5)

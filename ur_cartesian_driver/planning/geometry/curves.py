@@ -18,6 +18,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import (
     distance,
     multiply,
@@ -27,7 +28,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     distance_rows,
-    Floats,
     interpolate_rows,
     multiply_rows,
     normalized_rows,

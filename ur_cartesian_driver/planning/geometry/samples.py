@@ -19,16 +19,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
-from ur_cartesian_driver.planning.geometry.blended_path import (
-    BlendedPath,
-    CurveSequence,
-    Flags,
-    Integers,
-)
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveSequence
 
-Ints = NDArray[np.int32]
 T = TypeVar('T', bound=np.generic)
 
 #: Maximum distance of two samples [m], [rad].
@@ -45,18 +39,18 @@ def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
-def counted(counts: Integers) -> tuple[Integers, Integers]:
+def counted(counts: Indices) -> tuple[Indices, Indices]:
     """Return for counts (n,) the rows 0, 0, ..., 1, 1, ... and the numbers 1, 2, ..., 1, 2, ..."""
     rows = np.repeat(np.arange(len(counts)), counts)
     return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def group_begins(segments: Ints) -> Integers:
+def group_begins(segments: Int32s) -> Indices:
     """Return the first row of each segment; ``segments`` (n,) must not decrease."""
     return np.flatnonzero(np.diff(segments, prepend=segments[0] - 1))
 
 
-def first_least(values: Floats, segments: Ints) -> Integers:
+def first_least(values: Floats, segments: Int32s) -> Indices:
     """
     Return the row of the least value of each segment, the first one if there are several.
 
@@ -68,7 +62,7 @@ def first_least(values: Floats, segments: Ints) -> Integers:
     return rows[group_begins(segments[rows])]
 
 
-def last_greatest(values: Floats, segments: Ints) -> Integers:
+def last_greatest(values: Floats, segments: Int32s) -> Indices:
     """Return the row of the greatest value of each segment; see :func:`first_least`."""
     return len(values) - 1 - first_least(-values[::-1], -segments[::-1])[::-1]
 
@@ -81,14 +75,14 @@ class CurvePieces:
     #: Index of the waypoint at the end of the path's first segment.
     first: int
     #: The number of the curve, and its range: ``u`` of a segment's curve, ``s`` of a blend.
-    number: Integers
+    number: Indices
     begin: Floats
     end: Floats
-    sample_count: Integers
+    sample_count: Indices
 
     @classmethod
     def of(
-        cls, path: BlendedPath, first: int, number: Integers, begin: Floats, end: Floats
+        cls, path: BlendedPath, first: int, number: Indices, begin: Floats, end: Floats
     ) -> CurvePieces:
         """Return parts of segments' curves, and whole blends, of a path with both."""
         length, turn = path.extents(number)
@@ -111,7 +105,7 @@ class CurvePieces:
         return len(self.number)
 
     @property
-    def index(self) -> Ints:
+    def index(self) -> Int32s:
         """Index of the waypoint at the end of each curve; of a blend the one that it rounds."""
         return (self.first + self.number // 2).astype(np.int32)
 
@@ -129,11 +123,11 @@ class CurvePieces:
         """Return a pose on the curve of a piece."""
         return pose_from_row(self.rows(np.array([k]), np.array([t]))[0])
 
-    def rows(self, piece: Integers, t: Floats) -> Floats:
+    def rows(self, piece: Indices, t: Floats) -> Floats:
         """Return poses (n, 7) on pieces (n,), which must not decrease."""
         return self.path.rows(self.number[piece], t)
 
-    def locate(self, piece: Integers, t: Floats) -> tuple[Ints, Floats]:
+    def locate(self, piece: Indices, t: Floats) -> tuple[Int32s, Floats]:
         """Return the segments (n,) to which places on pieces count, and the fractions of them."""
         row, fraction = self.path.locate(self.number[piece], t)
         return (self.first + row).astype(np.int32), fraction
@@ -149,7 +143,7 @@ class PoseSamples:
     """Rows of samples on pieces: the number of the piece, the parameter, and the pose."""
 
     #: (n,) not decreasing.
-    piece: Integers
+    piece: Indices
     #: (n,) the ``u`` or ``s``.
     t: Floats
     #: (n, 7) the TCP in base.
@@ -162,7 +156,7 @@ def sample_poses(pieces: CurvePieces) -> PoseSamples:
     return PoseSamples(piece, t, pieces.rows(piece, t))
 
 
-def sample_parameters(pieces: CurvePieces) -> tuple[Integers, Floats]:
+def sample_parameters(pieces: CurvePieces) -> tuple[Indices, Floats]:
     """Return the piece (n,) and the parameter (n,) of each sample."""
     n = pieces.sample_count
     piece, k = counted(n)

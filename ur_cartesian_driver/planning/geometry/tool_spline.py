@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     evaluate,
@@ -27,7 +27,6 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
     distance_rows,
-    Floats,
     multiply_rows,
     normalized_rows,
 )
@@ -37,8 +36,6 @@ from ur_cartesian_driver.motion.geometry.rotation_rows import (
     log_rows,
     rotation_rates,
 )
-
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,7 +101,7 @@ class ToolSpline:
             ),
         )
 
-    def rows(self, piece: Ints, t: Floats) -> ToolRows:
+    def rows(self, piece: Indices, t: Floats) -> ToolRows:
         """
         Return the tool on pieces (m,).
 
@@ -112,19 +109,19 @@ class ToolSpline:
         """
         return ToolRows(self.poses(piece, t), *self.rates(piece, t))
 
-    def rates(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
+    def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return the twists and the accelerations of :meth:`rows` (m, 6)."""
         x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
         w, e = angular_rates(turn)
         return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
 
-    def poses(self, piece: Ints, t: Floats) -> Floats:
+    def poses(self, piece: Indices, t: Floats) -> Floats:
         """Return the poses of :meth:`rows` (m, 7)."""
         position, turn = self.vectors(piece, t)
         turned = multiply_rows(exp_rows(turn), self.orientations[piece])
         return np.concatenate([position, normalized_rows(turned)], axis=1)
 
-    def vectors(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
+    def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
         return values(self.positions[piece], t), values(self.turns[piece], t)
 
@@ -153,9 +150,9 @@ class ToolSplinePath:
     rests_at_points: ClassVar[bool] = False
     spline: ToolSpline
     #: (n,) the numbers of samples with which to measure them.
-    sample_count: Ints
+    sample_count: Indices
 
-    def rows(self, number: Ints, t: Floats) -> Floats:
+    def rows(self, number: Indices, t: Floats) -> Floats:
         """See :class:`~.blended_path.CurveSequence`."""
         piece = number // 2
         return self.spline.poses(piece, t * np.diff(self.spline.times)[piece])
@@ -167,6 +164,6 @@ class ToolSplinePath:
         turn = angle_rows(a[:, 3:], b[:, 3:]).sum()
         return float(distance_rows(a, b).sum()), float(turn)
 
-    def locate(self, number: Ints, t: Floats) -> tuple[Ints, Floats]:
+    def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
         """See :class:`~.blended_path.CurveSequence`."""
         return number // 2, t

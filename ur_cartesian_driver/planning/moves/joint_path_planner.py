@@ -24,8 +24,9 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     Unreachable,
 )
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Posture, Segment, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import (
@@ -34,7 +35,6 @@ from ur_cartesian_driver.motion.goal.goal_table import (
     SegmentRows,
     WaypointRows,
 )
-from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SAME_ANGLE, SAME_POSITION
 from ur_cartesian_driver.planning.geometry.samples import CurvePieces, joined
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples, PathSamples, speed_bounds

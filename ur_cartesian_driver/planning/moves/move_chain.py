@@ -19,12 +19,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.plan.plan import BlendEntry
-
-Rows = NDArray[np.intp]
 
 #: To be in time, the part behind a blend is driven at most this much faster than the mean.
 _MAX_CATCH_UP = 2.0
@@ -51,11 +48,11 @@ class _Columns:
         """Return the columns of rows (n, m)."""
         return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls.__slots__)).T.copy())
 
-    def take(self, rows: Rows) -> Self:
+    def take(self, rows: Indices) -> Self:
         """Return some rows."""
         return type(self)(*[getattr(self, name)[rows] for name in self.__slots__])
 
-    def put(self, rows: Rows, other: Self) -> None:
+    def put(self, rows: Indices, other: Self) -> None:
         """Replace some rows."""
         for name in self.__slots__:
             getattr(self, name)[rows] = getattr(other, name)
@@ -226,7 +223,7 @@ class MoveChain:
         before = np.stack((*handed, self.times.blend_half), axis=1)
         return np.concatenate((before[1:], np.zeros((1, 5))))
 
-    def follow(self, rows: Rows) -> None:
+    def follow(self, rows: Indices) -> None:
         """Compute rows whose moves have changed, and those behind them that it concerns."""
         while len(rows):
             moves = self.moves.take(rows)
@@ -242,7 +239,7 @@ class MoveChain:
             rows = rows[changed] + 1
             self._handed.put(rows, new.take(np.flatnonzero(changed)))
 
-    def durations_with(self, rows: Rows, moves: Moves) -> Floats:
+    def durations_with(self, rows: Indices, moves: Moves) -> Floats:
         """Return the durations of some moves with other speeds, all others as they are [s]."""
         times = _carry_out(moves, self._handed.take(rows))
         after = np.minimum(rows + 1, len(self.moves.length) - 1)
@@ -256,7 +253,7 @@ class MoveChain:
         wanted: Floats,
         rate: Floats,
         max_rate: Floats,
-        at_rate: Callable[[Rows, Floats], Moves],
+        at_rate: Callable[[Indices, Floats], Moves],
     ) -> None:
         """
         Change speeds so that the moves take given times, as far as they can.
@@ -362,8 +359,8 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
 
 
 def _fit(
-    durations: Callable[[Rows, Floats], Floats],
-    rows: Rows,
+    durations: Callable[[Indices, Floats], Floats],
+    rows: Indices,
     wanted: Floats,
     rate: Floats,
     lowest: Floats,

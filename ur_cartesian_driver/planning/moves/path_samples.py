@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.vectors import Joints
-from ur_cartesian_driver.planning.geometry.blended_path import Flags
-from ur_cartesian_driver.planning.geometry.samples import group_begins, Ints, last_greatest
+from ur_cartesian_driver.planning.geometry.samples import group_begins, last_greatest
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 
 # Samples whose parameters differ by less say nothing about a speed.
@@ -28,7 +26,7 @@ class JointSpeedBounds:
     #: At the rate of the sample where the joints are fastest [s]; the leading joint there, and the
     #: fraction of the segment.
     times: Floats
-    joints: NDArray[np.intp]
+    joints: Indices
     fractions: Floats
     #: At the rate of the sample where they are slowest; with some joint at its limit everywhere.
     shortest_times: Floats
@@ -40,26 +38,26 @@ class BlendSamples:
     """The samples in all blends of a goal; columns (n,)."""
 
     #: The waypoint that the blend rounds, and the parameter half-way to the sample before.
-    index: Ints
+    index: Int32s
     s: Floats
     #: For a unit of ``s`` there: time at the joint speed limits [s], with the joint that takes
     #: longest, and distance of the tool [m].
     joint_time: Floats
-    joint: NDArray[np.intp]
+    joint: Indices
     tool_distance: Floats
 
 
 class PathSamples(NamedTuple):
     """Samples that the arm can follow, in order of time; columns (n,)."""
 
-    segment: Ints
+    segment: Int32s
     fraction: Floats
     #: (n, 6) [rad], (n, 7), and (n, 3) distances from singularities, inf where they do not count.
     q: Floats
     poses: Floats
     measures: Floats
     #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
-    waypoint: Ints
+    waypoint: Int32s
     is_blend: Flags
     #: The parameter on the curve, and its change from the sample before.
     t: Floats

@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
 
@@ -51,7 +51,7 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     )
 
 
-def _places(path: BlendedPath, times: MoveTimes) -> tuple[Integers, Floats]:
+def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
     """Return the curves (n,) of all rows but the start, by number, and the places on them (n,)."""
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
@@ -82,8 +82,8 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Integers, Floats]:
 def _times(
     path: BlendedPath,
     times: MoveTimes,
-    number: NDArray[np.intp],
-    on_blend: NDArray[np.bool_],
+    number: Indices,
+    on_blend: Flags,
     at: Floats,
 ) -> Floats:
     """

@@ -14,11 +14,12 @@ from math import degrees, dist, pi
 import numpy as np
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import distance_rows
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows, Flags
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, CurveRows
 from ur_cartesian_driver.planning.geometry.curves import (
     ArcCurve,
     HALF_TURN,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
-from ur_cartesian_driver.motion.goal.goal_table import Integers, SegmentRows, WaypointRows
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Flags
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int64s
+from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.moves.path_samples import JointSpeedBounds
 from ur_cartesian_driver.planning.preflight.tightest_margins import TightestMargins
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
@@ -26,7 +26,7 @@ class SegmentGeometries:
     begin: int
     #: (n,) the numbers of the types that are sent: AUTO resolved, JOINT where that replaces a line
     #: or an arc.
-    kinds: Integers
+    kinds: Int64s
     waypoints: WaypointRows
     segments: SegmentRows
     #: The curves with their blends: ``path.curves``, ``path.u_join``, ``path.u_leave``, ...

@@ -16,12 +16,11 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment
-from ur_cartesian_driver.planning.geometry.blended_path import Flags, Integers
-from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves, Rows
+from ur_cartesian_driver.planning.moves.move_chain import MoveChain, Moves
 from ur_cartesian_driver.planning.moves.path_samples import BlendSamples
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.speed_requests import RAMP_SHARE, SpeedRequests
@@ -104,7 +103,7 @@ class SegmentTimings:
         #: So much before their times points are passed, for the sake of the next ones [s].
         self._ahead = np.zeros(n)
         #: The sample in a blend that slows a segment, where that is no limit of its own; else -1.
-        self._slowed_at: Integers = np.full(n, -1)
+        self._slowed_at: Indices = np.full(n, -1)
         self._moves = requests.moves()
         # No time on the wire is less than the robot needs from rest to rest, however it blends.
         self._max_rate = np.where(
@@ -175,7 +174,7 @@ class SegmentTimings:
         self.accelerations = np.where(on_wire, cruise / (RAMP_SHARE * time), sent)
         self.wire_times = moves.time
 
-    def _at_rate(self, rows: Rows, rate: Floats) -> Moves:
+    def _at_rate(self, rows: Indices, rate: Floats) -> Moves:
         """Return moves at rates; a rate beyond the greatest speed stands for more acceleration."""
         moves, speed = self._moves.take(rows), self._speed[rows]
         asked = rate * moves.length

@@ -15,12 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
-from ur_cartesian_driver.planning.geometry.blended_path import Flags
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table

@@ -15,10 +15,10 @@ from math import inf
 import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
-from ur_cartesian_driver.planning.geometry.blended_path import CurveRows, Flags, Integers
+from ur_cartesian_driver.planning.geometry.blended_path import CurveRows
 from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -92,7 +92,7 @@ class SpeedLimits:
             f'the joint speed limits ({name} at {100.0 * fraction:.0f} % of the segment{source})'
         )
 
-    def _joint_moves(self, rows: Integers, curves: CurveRows) -> tuple[Floats, Integers]:
+    def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
         """Return how fast joint moves may be (m,), and the joints that limit them."""
         travel = np.array([curves.joint_line(row).travel for row in rows.tolist()])
         speeds = np.array(self._model.max_joint_speed) * self.length[rows, None]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 from ur_cartesian_driver.motion.plan.plan import PlannedSegment

@@ -16,24 +16,20 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import inf
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, missing_meshes
 from ur_cartesian_driver.kinematics.link_shapes import mesh_model, MODELS_WITH_MESHES
 from ur_cartesian_driver.motion.errors import CollisionPredicted
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
-
-Flags: TypeAlias = NDArray[np.bool_]
 
 # Rows that are checked together: bounds memory, and ends early where a goal is refused.
 _BLOCK = 4096
@@ -138,9 +134,7 @@ def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
-def clearance_remarks(
-    clear: ClearanceResult, segment: NDArray[np.int32], fraction: Floats
-) -> list[str]:
+def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats) -> list[str]:
     """
     Return the report lines about the clearance.
 
@@ -173,7 +167,7 @@ def clearance_lines(
     options: PlanningOptions,
     q: Floats,
     q_start: Joints,
-    segment: NDArray[np.int32],
+    segment: Int32s,
     fraction: Floats,
 ) -> list[str]:
     """

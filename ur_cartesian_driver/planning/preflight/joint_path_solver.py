@@ -17,18 +17,17 @@ from math import hypot, pi
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_path
 from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_rows
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
-from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Integers
+from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePieces,
-    Ints,
     joined,
     PoseSamples,
     sample_parameters,
@@ -58,7 +57,7 @@ class JointPath:
 
     pieces: CurvePieces
     #: (n,) number of the piece, not decreasing; (n,); (n, 7); (n, 6).
-    piece: NDArray[np.intp]
+    piece: Indices
     t: Floats
     poses: Floats
     q: Floats
@@ -66,7 +65,7 @@ class JointPath:
     refusal: GoalRefused | None = None
     refused_segment: int = -1
     #: (n,) segment of each sample, and the fraction (n,) of it.
-    segments: Ints = field(init=False)
+    segments: Int32s = field(init=False)
     fractions: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -77,7 +76,7 @@ class JointPath:
 
 
 #: Samples with their joints: piece, parameter, pose and joint positions.
-_Samples: TypeAlias = tuple[Integers, Floats, Floats, Floats]
+_Samples: TypeAlias = tuple[Indices, Floats, Floats, Floats]
 _NO_SAMPLES: _Samples = (
     np.empty(0, dtype=np.intp),
     np.empty(0),

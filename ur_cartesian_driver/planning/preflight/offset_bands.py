@@ -18,7 +18,6 @@ from itertools import product
 from math import ceil, hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows, solve_path
@@ -29,8 +28,9 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     TooFast,
 )
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, Floats, interpolate_rows
+from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, interpolate_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, norm, Vector3, vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import PathOffset
 from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
@@ -198,9 +198,7 @@ def _smoothed(vectors: Floats) -> Floats:
     return means
 
 
-def _turns_too_fast(
-    frames: Floats, reach: float, speed: float, acceleration: float
-) -> NDArray[np.bool_]:
+def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: float) -> Flags:
     """Tell where a tool at a distance from the path is moved too much by its turning (n,)."""
     change = np.diff(frames, axis=0)
     rates = _sizes(change) / STEP

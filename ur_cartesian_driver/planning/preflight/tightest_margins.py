@@ -16,14 +16,13 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import format_distinct
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import GoalRefused, JointLimitExceeded, NearSingularity
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices, Int32s
 from ur_cartesian_driver.motion.goal.goal_table import Rows
 from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -72,8 +71,8 @@ class TightestMargins(Rows[str]):
 
     #: (n,) each: the segment; the number of the singularity, or 3 + the number of the joint; the
     #: distance; the fraction of the segment; the distance as a fraction of its scale.
-    segments: NDArray[np.int32]
-    kinds: NDArray[np.intp]
+    segments: Int32s
+    kinds: Indices
     values: Floats
     fractions: Floats
     normalized: Floats
@@ -182,9 +181,7 @@ def _format_below(value: float, bound: float) -> str:
     return text if float(text) < bound else format_distinct(value, bound)[0]
 
 
-def _is_leaving(
-    joint_path: JointPath, rows: NDArray[np.intp], measures: Floats
-) -> NDArray[np.bool_]:
+def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags:
     """
     Tell which samples (n, 3) of a segment lead out of a singularity in which it starts.
 
@@ -201,9 +198,7 @@ def _is_leaving(
     return excused
 
 
-def is_leaving_rows(
-    measures: Floats, length: Floats, angle: Floats, *, rests: bool
-) -> NDArray[np.bool_]:
+def is_leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool) -> Flags:
     """
     Tell which samples (n, 3) of a whole motion lead out of a singularity in which it starts.
 
@@ -212,12 +207,12 @@ def is_leaving_rows(
     """
     at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
     grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING
-    excused: NDArray[np.bool_] = np.logical_and.accumulate(grows | at_start, axis=0)
+    excused: Flags = np.logical_and.accumulate(grows | at_start, axis=0)
     return excused
 
 
 def tightest_margins(
-    arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32], fractions: Floats
+    arm: Arm, q: Floats, measures: Floats, segments: Int32s, fractions: Floats
 ) -> TightestMargins:
     """
     Return the tightest margin of each segment.

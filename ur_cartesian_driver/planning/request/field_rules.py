@@ -14,11 +14,10 @@ from math import hypot, isfinite, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, Quaternion
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.goal.field_table import Form, goal_fields, GoalField
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import GoalRows, GoalTable, rows_where
@@ -134,10 +133,10 @@ def check_finite(field: str, values: Iterable[float]) -> None:
             raise InvalidGoal(field, f'contains {value}; every number must be finite')
 
 
-def _are_units(quaternions: Floats) -> NDArray[np.bool_]:
+def _are_units(quaternions: Floats) -> Flags:
     """Tell of quaternions (n, 4) whether :func:`_check_unit` has nothing to say."""
     squares = np.einsum('ij,ij->i', quaternions, quaternions)
-    are_units: NDArray[np.bool_] = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
+    are_units: Flags = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
     return are_units
 
 

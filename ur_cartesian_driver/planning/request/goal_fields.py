@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
@@ -24,7 +24,7 @@ STRAIGHT_TYPES = (
 OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 
 
-def type_table(types: Collection[SegmentType]) -> NDArray[np.bool_]:
+def type_table(types: Collection[SegmentType]) -> Flags:
     """Return by the numbers of segment types which are among some: faster than numpy's isin."""
     return np.array([kind in types for kind in SegmentType])
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
@@ -52,9 +52,7 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
     return remarks
 
 
-def add_remark(
-    remarks: list[str], first: int, rows: NDArray[np.bool_] | np.bool_, what: str
-) -> None:
+def add_remark(remarks: list[str], first: int, rows: Flags | np.bool_, what: str) -> None:
     """Add a remark about points, if there are any; that of row 0 has the number ``first``."""
     points = [first + row for row in rows_where(rows)]
     if points:

@@ -15,8 +15,8 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MAX_JOINT_VALUE
 from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, NotAvailable
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.declared_types import with_declared_types, WrongType
 from ur_cartesian_driver.motion.goal.joint_goal import (

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import NotAvailable
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.motion.goal.execution_modes import ModeTraits
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where

@@ -13,14 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
 from ur_cartesian_driver.motion.geometry.polynomials import evaluate, MotionRows
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, keep_hemisphere
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, WaypointRows, zeros
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
@@ -90,7 +90,7 @@ class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
     #: (m,) the piece, and the fraction of its time; (m,) [s]
-    piece: NDArray[np.intp]
+    piece: Indices
     u: Floats
     times: Floats
     #: (m, 6) each
@@ -100,7 +100,7 @@ class _Samples:
     twists: Floats
     accelerations: Floats
     #: (m,) the point to which each piece leads
-    points: NDArray[np.int32]
+    points: Int32s
 
 
 def plan_joint_goal(

@@ -14,18 +14,18 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import TooFast
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import (
     cubic_rows,
     MotionRows,
     quintic_rows,
     values,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows, Floats
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, compose_rows
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -52,7 +52,7 @@ class JointPolynomials:
     #: (n + 1, 6) each
     joints: MotionRows
     #: (n,) the piece of the tool spline that each is a part of.
-    piece: NDArray[np.intp]
+    piece: Indices
     quintic: bool
     #: Maximum deviation of the tool from the tool spline [m], [rad].
     distance: float
@@ -127,7 +127,7 @@ class _PieceRefinement:
             angle=angle,
         )
 
-    def _joints(self, piece: NDArray[np.intp], t: Floats, times: Floats) -> MotionRows:
+    def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:
         """Return the joints at times ``t`` since pieces of the tool spline began."""
         tool = self.path.spline.rows(piece, t)
         near = self.path.q[
@@ -142,12 +142,12 @@ class _PieceRefinement:
         # At rest is exactly at rest.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
-    def _coefficients(self, rows: NDArray[np.intp]) -> Floats:
+    def _coefficients(self, rows: Indices) -> Floats:
         between = quintic_rows if self.quintic else cubic_rows
         start, end = (MotionRows(*(x[rows + k] for x in self.joints)) for k in (0, 1))
         return between(np.diff(self.times)[rows], start, end)
 
-    def _deviations(self, rows: NDArray[np.intp]) -> Floats:
+    def _deviations(self, rows: Indices) -> Floats:
         """Return the maximum deviations of the tool on pieces (n, 2) [m], [rad]."""
         begin, end = self.times[rows], self.times[rows + 1]
         sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
@@ -164,7 +164,7 @@ class _PieceRefinement:
         largest: Floats = deviation.reshape(len(rows), count, 2).max(axis=1)
         return largest
 
-    def _halve(self, rows: NDArray[np.intp]) -> None:
+    def _halve(self, rows: Indices) -> None:
         begin, end = self.times[rows], self.times[rows + 1]
         middle = to_ticks(0.5 * (begin + end))
         short = np.flatnonzero(end - begin < 2.0 * _MIN_PIECE_TIME)

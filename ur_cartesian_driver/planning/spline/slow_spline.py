@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
-from ur_cartesian_driver.motion.goal.goal_table import Integers
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int64s
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowCause, SLOWER_BY, SlowStretch
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
@@ -90,7 +89,7 @@ def slow_spline_stretches(
     return tuple(found)
 
 
-def _places(path: SplinePath) -> tuple[Integers, Floats, Floats]:
+def _places(path: SplinePath) -> tuple[Int64s, Floats, Floats]:
     """Return pieces, fractions of their times and times (n,) [s], denser than the samples."""
     rows = np.arange(_PER_SAMPLE * (len(path.u) - 1) + 1) / _PER_SAMPLE
     times = np.interp(rows, np.arange(len(path.u)), path.times)
@@ -100,7 +99,7 @@ def _places(path: SplinePath) -> tuple[Integers, Floats, Floats]:
 
 
 def _asked_speeds(
-    path: SplinePath, piece: Integers, u: Floats, twists: Floats, stretch: float
+    path: SplinePath, piece: Int64s, u: Floats, twists: Floats, stretch: float
 ) -> Floats:
     """Return the speeds asked for at places [m/s]; 0 where the tool is carried nowhere."""
     n = len(twists)

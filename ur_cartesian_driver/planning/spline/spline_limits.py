@@ -15,12 +15,11 @@ from math import ceil
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Int32s
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
@@ -104,7 +103,7 @@ class RateSamples:
     """Tool and joints in samples of a spline."""
 
     #: (m,) the point to which the sample's piece leads, and the fraction of the piece's time.
-    points: NDArray[np.int32]
+    points: Int32s
     u: Floats
     #: (m, 6) each: of the TCP in base and of the joints.
     twists: Floats

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from math import degrees, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
@@ -24,7 +23,8 @@ from ur_cartesian_driver.motion.errors import (
     JointLimitExceeded,
     NearSingularity,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices, Int32s
+from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows
 from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
@@ -68,7 +68,7 @@ class SplinePath:
     #: The number of the point at the end of the first piece.
     first: int
     #: (m,) the piece of each sample and the fraction of the piece's time; row 0 is the start.
-    piece: NDArray[np.intp]
+    piece: Indices
     u: Floats
     #: (m, 7) the TCP in base, (m, 6) [rad].
     poses: Floats
@@ -87,7 +87,7 @@ class SplinePath:
         return times
 
     @property
-    def points(self) -> NDArray[np.int32]:
+    def points(self) -> Int32s:
         """(m,) the segment of each sample."""
         return (self.first + self.piece).astype(np.int32)
 
@@ -192,7 +192,7 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
     return refusal
 
 
-def coarse_samples(times: Floats) -> tuple[NDArray[np.intp], Floats]:
+def coarse_samples(times: Floats) -> tuple[Indices, Floats]:
     """Return samples on all pieces between times (n + 1,): piece and time since its start."""
     h = np.diff(times)
     piece = np.repeat(np.arange(len(h)), _COARSE_SAMPLES)
@@ -202,7 +202,7 @@ def coarse_samples(times: Floats) -> tuple[NDArray[np.intp], Floats]:
 def _check_sizes(
     kinematics: TcpKinematics,
     spline: ToolSpline,
-    coarse: tuple[NDArray[np.intp], Floats],
+    coarse: tuple[Indices, Floats],
     first: int,
 ) -> None:
     """Refuse pieces with an ambiguous turn, and rates that carry the tool far away."""
@@ -237,7 +237,7 @@ def _check_sizes(
 
 def sample_count(
     times: Floats, speed: Floats, turn_rate: Floats, acceleration: Floats, first: int
-) -> NDArray[np.intp]:
+) -> Indices:
     """
     Return the number of samples of each piece.
 
@@ -268,7 +268,7 @@ def sample_count(
             f'check needs {count.sum():.3g} samples, more than {MAX_SAMPLES:,}',
             'check twists and accelerations, or split the goal',
         )
-    found: NDArray[np.intp] = count.astype(np.intp)
+    found: Indices = count.astype(np.intp)
     return found
 
 

@@ -22,9 +22,10 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import JointLimitExceeded
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats, keep_hemisphere
+from ur_cartesian_driver.motion.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import PIECES_PER_HORIZON
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, zeros

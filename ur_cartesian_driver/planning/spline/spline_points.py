@@ -15,10 +15,10 @@ from functools import partial
 
 import numpy as np
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     conjugate_rows,
-    Floats,
     multiply_rows,
     normalized_rows,
 )

@@ -71,11 +71,10 @@ from enum import IntEnum
 from typing import cast, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, ContactEnd, InputKind, OutputKind
@@ -364,9 +363,9 @@ def spline_fields(pieces: SplineRows) -> Floats:
     )
 
 
-def are_plain_moves(moves: MoveRows) -> NDArray[np.bool_]:
+def are_plain_moves(moves: MoveRows) -> Flags:
     """Return a mask (n,) of the rows that :func:`check_fields` is known to accept."""
-    are_plain: NDArray[np.bool_] = (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
+    are_plain: Flags = (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
     are_plain &= (moves.blend_radii >= 0.0) & ~np.isin(_POSE_TYPES[moves.kinds], list(_OPTIMOVES))
     are_plain[list(moves.others)] = False
     return are_plain

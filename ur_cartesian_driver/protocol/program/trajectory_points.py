@@ -30,7 +30,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.move_rows import MoveRows, SplineRows
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows
 from ur_cartesian_driver.motion.plan.primitive import Instruction

@@ -44,10 +44,9 @@ from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Int32s
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
 from ur_cartesian_driver.protocol.program.point_fields import (
@@ -146,7 +145,7 @@ class Dialect:
             )
         check_fields(fields)
 
-    def accepts(self, fields: Floats) -> NDArray[np.bool_]:
+    def accepts(self, fields: Floats) -> Flags:
         """Return a mask (n,) of the rows (n, 21) whose motions and durations the program has."""
         kinds, durations = fields[:, PointField.TYPE].astype(int), fields[:, PointField.DURATION]
         accepted = np.isin(kinds, list(self.motion_types))
@@ -156,7 +155,7 @@ class Dialect:
             accepted &= ~np.isin(kinds, list(MOVE_TYPES))
         return accepted
 
-    def arrange(self, words: NDArray[np.int32]) -> NDArray[np.int32]:
+    def arrange(self, words: Int32s) -> Int32s:
         """Return points (n, 21) in the order in which the program reads their words."""
         if self.supports_q_near:
             return words

@@ -10,8 +10,8 @@ from math import dist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
@@ -168,8 +168,8 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
     )
 
 
-def _distance(recorder: RtdeRecorder, name: str) -> NDArray[np.float64]:
+def _distance(recorder: RtdeRecorder, name: str) -> Floats:
     """Return how far a pose is from where it was at first (n,) [m]."""
     positions = recorder.column(name)[:, :3]
-    distances: NDArray[np.float64] = np.linalg.norm(positions - positions[0], axis=1)
+    distances: Floats = np.linalg.norm(positions - positions[0], axis=1)
     return distances

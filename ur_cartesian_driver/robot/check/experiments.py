@@ -12,14 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from math import degrees, radians
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Speed and acceleration of the joint motion [rad/s, rad/s^2], of the tool [m/s, m/s^2].
 JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
@@ -52,16 +50,16 @@ class MotionSamples:
     :param stop_sent: when the program was told to stop, on the same clock; NaN = it was not.
     """
 
-    time: Array
-    target_q: Array
-    actual_q: Array
-    tool_speed: Array
-    scaling: Array
-    fraction: Array
+    time: Floats
+    target_q: Floats
+    actual_q: Floats
+    tool_speed: Floats
+    scaling: Floats
+    fraction: Floats
     stop_sent: float = float('nan')
     #: How far the target TCP and the measured one are from where they were at first (n,) [m].
-    target_distance: Array = field(default_factory=lambda: np.empty(0))
-    actual_distance: Array = field(default_factory=lambda: np.empty(0))
+    target_distance: Floats = field(default_factory=lambda: np.empty(0))
+    actual_distance: Floats = field(default_factory=lambda: np.empty(0))
 
     def as_lists(self) -> dict[str, Any]:
         """Return everything as JSON has it, to the microradian."""
@@ -69,7 +67,7 @@ class MotionSamples:
         return {name: np.round(column, 6).tolist() for name, column in columns.items()}
 
     @property
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> Flags:
         """Tell for each row whether the target differs from that before, (n,)."""
         steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
         return np.concatenate([[False], steps])

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
@@ -62,7 +62,7 @@ class RtdeRecorder:
         """The values of the newest row by their names; empty before the first."""
         return dict(zip(self.names, self.rows[-1], strict=True)) if self.rows else {}
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Floats:
         """Return the values of an output, (n,) or (n, 6); NaN if the robot lacks it."""
         if name not in self.names:
             return np.full(len(self.rows), np.nan)

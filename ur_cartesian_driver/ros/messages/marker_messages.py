@@ -12,7 +12,7 @@ import numpy as np
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.message_fields import pose_message
 

@@ -15,14 +15,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.inverse_rows import solve_path
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.pose_rows import (
     compose_rows,
     conjugate_rows,
-    Floats,
     multiply_rows,
 )
 from ur_cartesian_driver.motion.geometry.rotation_rows import log_rows
@@ -130,9 +129,7 @@ class CycleBatch:
         count = len(kept) if kept.all() else int(np.argmin(kept))
         return self._as_cycles(q[: count + 1], poses[: count + 1], times[:count])
 
-    def _as_cycles(
-        self, q: Floats, poses: Floats, times: NDArray[np.float64]
-    ) -> list[list[float]]:
+    def _as_cycles(self, q: Floats, poses: Floats, times: Floats) -> list[list[float]]:
         """Return cycles with their rates, the last one first; row 0 is where the arm is."""
         rate = 1.0 / self._target.cycle
         qd = rate * np.diff(q, axis=0)

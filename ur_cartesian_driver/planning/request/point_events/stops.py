@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import vector6, ZERO6
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.plan import LateLines, PlannedRows, ReferencePath

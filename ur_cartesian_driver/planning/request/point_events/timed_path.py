@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import conjugate, Pose, pose_from_row, rotate
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import subtract, Vector6
 from ur_cartesian_driver.motion.plan.plan import PlannedRows, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import (

@@ -7,17 +7,16 @@ from __future__ import annotations
 from math import cos, inf, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     multiply,
     Pose,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
 from ur_cartesian_driver.motion.geometry.vectors import (
     scale,
     scale6,
@@ -29,8 +28,6 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
-
-Flags = NDArray[np.bool_]
 
 # Assumptions; the robot's numbers are not published:
 #: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.

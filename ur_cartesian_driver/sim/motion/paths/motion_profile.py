@@ -16,7 +16,7 @@ from math import sqrt
 
 import numpy as np
 
-from ur_cartesian_driver.motion.geometry.pose_rows import Floats
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 _BISECTIONS = 80
 #: A timed move without speed and acceleration accelerates and brakes for this part of its time.

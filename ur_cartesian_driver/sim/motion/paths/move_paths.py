@@ -18,6 +18,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import (
     conjugate,
     distance,
@@ -27,7 +28,6 @@ from ur_cartesian_driver.motion.geometry.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.geometry.pose_rows import (
-    Floats,
     interpolate_rows,
     multiply_rows,
     normalized_rows,
