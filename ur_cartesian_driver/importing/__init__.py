@@ -4,7 +4,8 @@
 Goals from files of others: CSV, G-code, DXF, messages of ROS, recordings, URScript.
 
 Each format has a module that collects points; `imported_goal` makes a goal of them, the same for
-all. What the goal has not is said, with the lines of the file: nothing is dropped in silence.
+all. Remarks list everything that the goal lacks, with the lines of the file: nothing is dropped in
+silence.
 Other packages add formats: doc/adding_a_format.md.
 """
 

@@ -3,8 +3,8 @@
 """
 A format of files: its reader, and the treatment of each term that it knows.
 
-Reader and documentation use the same table of terms, so that what the page promises is what the
-reader does. Nothing is read as something else, and nothing is dropped in silence.
+Reader and documentation use the same table of terms, so the reader keeps the promises of the page.
+Nothing is read as something else, and nothing is dropped in silence.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ur_cartesian_driver.importing.imported_path import PathCollector
 
 
 class Treatment(Enum):
-    """What a reader does with a term of its format."""
+    """The treatment of a term by the reader of its format."""
 
     #: It has its effect on the goal.
     HONOURED = 'honoured'

@@ -38,7 +38,7 @@ _CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 
 
 class ToolOrientation(Enum):
-    """Where the orientation of the tool comes from."""
+    """The source of the tool's orientation."""
 
     #: The orientations of the file, else its normals, else down.
     FILE = 'file'
@@ -50,7 +50,7 @@ class ToolOrientation(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CodeOutput:
-    """What a code of a program does to an output."""
+    """The output that a code of a program switches, and its value."""
 
     kind: OutputKind
     pin: int
@@ -112,9 +112,9 @@ def parse_length(text: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportOptions:
-    """How a file becomes a goal."""
+    """Options for making a goal of a file."""
 
-    #: The frame of the points; empty = that of the file, else the robot's base.
+    #: The frame of the points; empty = the file's, else the robot's base.
     frame: str = ''
     #: Where the origin of the file is in the frame.
     origin: Pose = IDENTITY
@@ -123,13 +123,13 @@ class ImportOptions:
     #: Factor on all lengths, about the origin of the file.
     scale: float = 1.0
     orientation: ToolOrientation = ToolOrientation.FILE
-    #: Of all motions but travel [m/s]; None = that of the file, else the driver's parameter.
+    #: Of all motions but travel [m/s]; None = the file's, else the driver's parameter.
     speed: float | None = None
     #: Of travel (G0, and between two contours) [m/s]; None = the driver's parameter.
     travel_speed: float | None = None
-    #: Of all motions [m/s^2]; None = that of the file, else the driver's parameter.
+    #: Of all motions [m/s^2]; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: For the way to the first point [s], where the file has times; None = that of the file.
+    #: For the way to the first point [s], where the file has times; None = the file's.
     approach_time: float | None = None
     #: At inner points [m]; smaller where the lines are short.
     blend: float = 0.0

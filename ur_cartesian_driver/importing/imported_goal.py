@@ -53,7 +53,7 @@ _MIN_ARC_HEIGHT = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedGoal:
-    """A goal, and what the file has that the goal has not."""
+    """A goal, with remarks on everything in the file that it lacks."""
 
     goal: GoalTable
     remarks: tuple[ImportNote, ...]
@@ -292,7 +292,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
     raised = np.zeros(len(order), dtype=bool)
     positions = path.positions[order]
     last = first + count - 1
-    # What is switched at a point is switched after its last copy, and before the tool goes up.
+    # Outputs at a point are switched after its last copy, and before the tool goes up.
     outputs = tuple(replace(o, waypoint=int(last[o.waypoint])) for o in path.outputs)
     waits = tuple(replace(w, waypoint=int(last[w.waypoint])) for w in path.waits)
     for row in rows:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What was read from a file, before the options are applied.
+The contents of an imported file, before the options are applied.
 
 Each point remembers its line, so that all that is said about it can name it.
 """
@@ -49,7 +49,7 @@ class BrokenFile(ValueError):
         """
         Put the line before a sentence without a full stop; 0 = no line to blame.
 
-        :param unit: what is counted where a file has no lines.
+        :param unit: the unit that is counted in a file without lines.
         """
         super().__init__(f'{unit} {line}: {text}.' if line else f'{text}.')
         self.line = line
@@ -224,7 +224,7 @@ class PathCollector:
         time: float | None = None,
         dwell: float | None = None,
     ) -> None:
-        """Add a point; the fields are those of :class:`ImportedPath`, None = unknown."""
+        """Add a point; its fields are named as in :class:`ImportedPath`, None = unknown."""
         row = len(self._positions)
         self._positions.append(position)
         self._plain.append((line, kind, travel, lift, arc_mode))

@@ -68,7 +68,7 @@ def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -
     try:
         recording = Recording.load(str(file))
     except ValueError as error:
-        # What the libraries say differs between versions.
+        # The messages of the libraries differ between versions.
         why = str(error).removeprefix(str(file)).strip(' .')
         why = why if error.__cause__ is None else 'is damaged: its arrays cannot be read'
         raise BrokenFile(0, f'the file {why}') from None

@@ -13,7 +13,7 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 # str.splitlines() also splits at form feeds, 0x85 and U+2028, which end a line in none of the
 # formats: the numbers of all later lines would be wrong.
 _LINE_END = re.compile(r'\r\n|\n|\r')
-# The longer mark first: that of UTF-16 begins that of UTF-32.
+# The longer mark first: the UTF-32 mark begins with the UTF-16 mark.
 _MARKS = (
     (codecs.BOM_UTF32_LE, 'utf-32'),
     (codecs.BOM_UTF32_BE, 'utf-32'),
@@ -37,7 +37,7 @@ def decoded(data: bytes, code_page: str = 'cp1252') -> str:
     """
     Return the text of a file as :func:`file_text` does.
 
-    :param code_page: the codec of what is no UTF-8; an unknown one counts as Windows-1252.
+    :param code_page: the codec if the text is no UTF-8; an unknown one counts as Windows-1252.
     :raises BrokenFile: it is binary.
     """
     encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')

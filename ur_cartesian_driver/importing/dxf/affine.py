@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import cross, norm, unit, Vecto
 
 @dataclass(frozen=True, slots=True)
 class Affine:
-    """Where the axes and the origin of some coordinates are in others."""
+    """An affine map: the axes and the origin of a coordinate system, given in another one."""
 
     x: Vector3 = (1.0, 0.0, 0.0)
     y: Vector3 = (0.0, 1.0, 0.0)

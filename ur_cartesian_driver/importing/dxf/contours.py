@@ -136,7 +136,7 @@ def _places(points: Sequence[Vector3], distance: float) -> list[int]:
             i = root[i]
         return i
 
-    # Cells of twice the distance: what is near is in this one, or in its nearer neighbours.
+    # Cells of twice the distance: near points are in the same one, or in its nearer neighbours.
     cells: dict[tuple[int, ...], list[Vector3]] = {}
     for point, number in numbers.items():
         scaled = [value / (2.0 * distance) for value in point]

@@ -166,7 +166,7 @@ class Seen:
 
     def entities(self, place: Affine) -> Iterator[tuple[Record, Affine]]:
         """
-        Yield what is seen in the order of the file, with the map of its coordinates.
+        Yield the visible entities in the order of the file, with the map of their coordinates.
 
         :param place: where the coordinates of the drawing are.
         :raises BrokenFile: a block cannot be placed.
@@ -195,9 +195,9 @@ class Seen:
         self, record: Record, place: Affine, layer: str, inside: tuple[str, ...]
     ) -> Iterator[tuple[Record, Affine]]:
         """
-        Yield an entity, or those of its block.
+        Yield an entity; for an INSERT, the entities of its block.
 
-        :param layer: that of the INSERT, where entities of layer 0 are.
+        :param layer: the layer of the enclosing INSERT, which entities on layer 0 take.
         :param inside: names of the blocks that the entity is in.
         """
         own = record.text(8, '0').upper()

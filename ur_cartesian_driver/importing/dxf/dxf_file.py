@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""DXF drawings: what is seen of the model space, as contours."""
+"""DXF drawings: the visible entities of the model space, as contours."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def collect_dxf(file: Path, options: ImportOptions, into: PathCollector) -> None
 
 
 def _unit(drawing: Drawing, options: ImportOptions, left_out: LeftOut) -> float:
-    """Return the length of a unit [m]: that of the options, else that of the drawing."""
+    """Return the length of a unit [m], from the options or else from the drawing."""
     variable = drawing.header.get('$INSUNITS')
     number = variable.integer(70) if variable else 0
     name, length = UNITS.get(number, ('', 0.0))

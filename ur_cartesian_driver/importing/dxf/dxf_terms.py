@@ -5,7 +5,7 @@ Terms of DXF: kinds of entities, their group codes, units.
 
 A group code is named with its kind of entity, ``LWPOLYLINE 42``; alone, ``39``, it holds for all
 kinds. A point has its first code only: ``LINE 11`` stands for 11, 21 and 31. ``POLYLINE 70=16`` is
-a bit of a group code. Names and meanings are those of the AutoCAD DXF reference.
+a bit of a group code. Names and meanings follow the AutoCAD DXF reference.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ def _term(kind: str, code: str) -> Term | None:
 
 @cache
 def _first_code(code: int) -> int:
-    """Return the code of x for that of a coordinate y or z."""
+    """Return the group code of a point's x for the code of its y or z."""
     for first, last, x in ((20, 28, 10), (30, 37, 10), (220, 223, 210), (230, 233, 210)):
         if first <= code <= last:
             return x + code - first
@@ -210,7 +210,7 @@ def _notable(kind: str, codes: tuple[int, ...]) -> tuple[tuple[int, str], ...]:
 
 
 class LeftOut:
-    """Collects what is left out of a drawing, with the lines and handles of its records."""
+    """Collects the omissions from a drawing, with the lines and handles of its records."""
 
     def __init__(self) -> None:
         """Begin with nothing."""

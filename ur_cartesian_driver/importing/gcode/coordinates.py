@@ -179,7 +179,7 @@ class Coordinates:
         self.has_changed = self.is_away = False
 
     def finish(self, into: PathCollector) -> None:
-        """Leave out the rows whose place nobody has said, and say what is assumed."""
+        """Leave out the rows whose place nobody has said, and name the assumptions."""
         for axis, name in enumerate(AXES if len(into) else ''):
             if not self._is_named[axis]:
                 into.remarks.add(0, f'no {name} in the file', f'{name} is 0')

@@ -200,7 +200,7 @@ class GcodeMachine:
             )
 
     def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
-        """Take the words that belong to no code, and leave those of a motion."""
+        """Take the words that belong to no code; the words of a motion are left."""
         if words.keys() <= _OF_MOTION:
             return
         for letter in [each for each in words if each not in _OF_MOTION]:

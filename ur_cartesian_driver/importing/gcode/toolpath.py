@@ -56,7 +56,7 @@ class Toolpath:
         """
         Carry out a motion.
 
-        :param words: its coordinates, and those of an arc.
+        :param words: its coordinates, and the centre or radius of an arc.
         :raises BrokenFile: it cannot be meant.
         """
         if self.motion == 'G80':

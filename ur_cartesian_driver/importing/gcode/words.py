@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a line of a program to its codes and words.
+The codes and words of a line of a program.
 
-The grammar is that of RS274/NGC: blanks and case mean nothing, a number has no exponent, a letter
+The grammar follows RS274/NGC: blanks and case mean nothing, a number has no exponent, a letter
 stands once in a line. Commands of printers have other forms; they are known by their beginning.
 """
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where the arm is while a program runs, as far as the file tells.
+The place of the arm while a program runs, as far as the file tells.
 
-Before the first move nobody knows it, and after lines alone nobody knows the joints. Most programs
-never ask for them, so inverse kinematics waits until one does.
+Before the first move the place is unknown, and after nothing but lines the joints are. Most
+programs never ask for them, so inverse kinematics waits until one does.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ArmPlace:
         self._motion.T_flange_tcp = options.T_flange_tcp
         #: Whether the pose, and the joints, follow from the file.
         self.is_known = self.knows_joints = False
-        #: The last pose of the tool, and its TCP; None = that of the joints.
+        #: The last pose of the tool, and its TCP; None = the pose follows from the joints.
         self._last: tuple[Pose, Pose] | None = None
         #: Poses of the flange since the joints were asked for last.
         self._flange_poses: list[Pose] = []
@@ -54,11 +54,11 @@ class ArmPlace:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the joints are those of the last pose."""
+        """Whether the joints have been solved for the last pose."""
         return not self._flange_poses
 
     def of_arm(self, tcp: Pose) -> str:
-        """Return what the places of joint positions depend on."""
+        """Return the clause that names the arm and the TCP behind places of joint positions."""
         return f'their places are those of a {self._model} with the TCP {_text(tcp)}'
 
     def forward(self, q: Vector6, tcp: Pose) -> Pose:
@@ -108,7 +108,7 @@ class ArmPlace:
         )
 
     def assumption(self, say: Callable[[str], None], *, of_joints: bool) -> None:
-        """Say what is taken for a place that the file does not tell."""
+        """Report the assumption for a place that is not in the file."""
         if not self.is_known:
             say(
                 'where the arm stands before its first move is not in the file; '

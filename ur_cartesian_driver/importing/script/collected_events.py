@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The points that a program leads to, and what it does at them."""
+"""The points of a program, with the outputs and waits at them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CollectedPoint:
     """A point, which later calls may still make a stop."""
 
     kind: SegmentType
-    #: Of the TCP that is active; None = that of the joints.
+    #: Of the active TCP; None = the pose follows from the joints.
     pose: Pose | None
     joints: Vector6 | None = None
     acceleration: float
@@ -154,7 +154,7 @@ class CollectedEvents:
         self._events.append(wait)
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the last point, after what the arm waits for there."""
+        """Switch an output at the last point, after the waits there."""
         if not self.acts:
             self.run.say(
                 'an output', 'when a thread switches it beside the moves is not in the file'

@@ -40,7 +40,7 @@ from ur_cartesian_driver.sim.simulator_config import TURN_RATIO
 from ur_cartesian_driver.urscript import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
 
-#: Defaults of the manual for the tool [m/s^2, m/s], and for fractions of what the arm can do.
+#: Defaults of the manual for the tool [m/s^2, m/s], and for fractions of the arm's limits.
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
 #: Larger numbers are millimetres or degrees [m], [rad].
 FAR, MAX_ANGLE = 3.0, 12.6

@@ -25,7 +25,7 @@ _INPUT_KINDS = {
 
 
 class OutputFunctions:
-    """What a program does between moves; it reads its own outputs back."""
+    """Sleeps, waits and outputs of a program, which also reads its own outputs back."""
 
     def __init__(self, events: CollectedEvents, controller: Controller) -> None:
         """Collect into these events."""
@@ -44,7 +44,7 @@ class OutputFunctions:
         """Wait for a digital input, in the place of a loop that does."""
         while not self._events.acts:
             yield
-        if function == 'get_digital_in':  # the old numbering: 8 and 9 are those of the tool
+        if function == 'get_digital_in':  # the old numbering: 8 and 9 are on the tool
             pin = index(n, 'n', 10)
             kind = InputKind.STANDARD_DIGITAL if pin < 8 else InputKind.TOOL_DIGITAL
             pin %= 8
@@ -59,7 +59,7 @@ class OutputFunctions:
         yield
 
     def set_digital_out(self, n: Value, b: Value) -> None:
-        """Switch an output by its old number: 8 and 9 are those of the tool."""
+        """Switch an output by its old number: 8 and 9 are on the tool."""
         pin = index(n, 'n', 10)
         kind = OutputKind.STANDARD_DIGITAL if pin < 8 else OutputKind.TOOL_DIGITAL
         self._switch(kind, pin % 8, b)

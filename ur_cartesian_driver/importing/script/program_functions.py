@@ -3,9 +3,9 @@
 """
 All functions that a program can call, each treated as the table of terms says.
 
-What is honoured and neither moves nor switches is done by the functions of the simulated
-controller, which compute or read. What is left out is done by them as well, as far as it takes no
-time, so that wrong arguments are found.
+Honoured functions that neither move nor switch run in the simulated controller, which computes and
+reads. Functions that are left out run there, too, as far as they take no time, so that wrong
+arguments are found.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ class ProgramFunctions:
     # ---- the arm -------------------------------------------------------------------------------
 
     def _reader(self, name: str, does: Any) -> Any:
-        """Return a function that says what it takes for a place that the file does not tell."""
+        """Return a function that reports its assumption for a place that is not in the file."""
         place, of_joints, signature = self._place, _READERS[name], inspect.signature(does)
 
         @functools.wraps(does)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The program that runs: its line and thread, and what is said about it."""
+"""The running program: its line and thread, and the remarks about it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class RunningScript:
         self.interpreter: ScriptInterpreter | None = None
         #: The function that was called last of those whose value is another one on a robot.
         self._assumed = ''
-        #: By reason: what is said for it, and the lines.
+        #: By reason: the subjects of its remarks, and the lines.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property

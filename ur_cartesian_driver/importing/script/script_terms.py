@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What becomes of each statement and function of URScript.
+The treatment of each statement and function of URScript.
 
-The functions are those of the script manuals 3.15 (CB3), 5.11 to 5.25 (e-Series) and 10 (PolyScope
-X), with the ones that PolyScope itself writes into saved programs.
+The functions come from the script manuals 3.15 (CB3), 5.11 to 5.25 (e-Series) and 10 (PolyScope
+X), and from the programs that PolyScope saves.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEE
 
 #: A program that takes longer does not end: cycles, points, and nodes of the syntax tree.
 MAX_CYCLES, MAX_POINTS, MAX_NODES = 100_000, 100_000, 10_000_000
-#: What a thread may compute between two moves. A row of statements counts as a whole, and that of
-#: a sliced part is long.
+#: Bound on the computation of a thread between two moves. A sequence of statements counts as a
+#: whole, and slicers write long ones.
 MAX_NODES_AT_ONCE = 5_000_000
 
 

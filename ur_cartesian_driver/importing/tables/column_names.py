@@ -33,7 +33,7 @@ BLEND = 'radius of the blend'
 OTHER = 'others'
 
 _XYZ, _RXYZ, _QXYZW = ('x', 'y', 'z'), ('rx', 'ry', 'rz'), ('qx', 'qy', 'qz', 'qw')
-#: What the columns of a group stand for.
+#: The roles of the columns of a group.
 ROLES: Mapping[str, tuple[str, ...]] = {
     POSITION: _XYZ,
     POSE: (*_XYZ, *_RXYZ),

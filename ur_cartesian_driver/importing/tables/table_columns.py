@@ -112,7 +112,7 @@ def find_columns(
     return taken
 
 
-#: What the groups of columns give, by the names of their terms.
+#: The kinds of numbers in the groups of columns, by the names of their terms.
 _KINDS = {
     name: [KINDS[role] for role in ROLES[term.topic] if role in KINDS]
     for name, term in TERMS.items()
