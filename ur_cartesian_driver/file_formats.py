@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Formats of files by name and suffix: ours, and those of other packages.
+File formats by name and suffix: ours, and formats that other packages declare.
 
 Another package declares its formats as entry points, so their names are known without importing
 it. A format is imported when a file needs it: a broken package disturbs only those who ask for its
@@ -33,8 +33,8 @@ class FileFormats(Generic[_Format]):
 
         :param group: the group of the entry points of other packages.
         :param built_in: names and suffixes, separated by spaces, by ``module:object``.
-        :param refusals: exceptions that tell what is wrong with a file; all others are faults of
-            the package.
+        :param refusals: exceptions that explain the fault of a file; all others are faults of the
+            package.
         """
         self.built_in = {
             name: EntryPoint(name, value, group)

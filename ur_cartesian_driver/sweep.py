@@ -156,7 +156,7 @@ def on_models(variants: Variant | Iterable[Variant], names: Iterable[str]) -> li
 
 def calibrated(variants: Variant | Iterable[Variant], count: int, seed: int = 0) -> list[Variant]:
     """
-    Return each variant on ``count`` arms whose axes deviate at random, as those of real arms do.
+    Return each variant on ``count`` arms whose axes deviate at random, as on real arms.
 
     The flange of such an arm is 1 to 2 mm off; the same seed makes the same arms.
     """

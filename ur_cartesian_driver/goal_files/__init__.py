@@ -3,7 +3,7 @@
 """
 Goals as files: the YAML of the action, read and written without ROS.
 
-The fields are those of the messages. So what reads a file also reads a message.
+The fields are named as in the messages, so the same code reads files and messages.
 """
 
 from ur_cartesian_driver.goal_files.goal_file import goal_text, GoalFileError, read_goal_file

@@ -15,7 +15,7 @@ def uncollected() -> Iterator[None]:
     Let the garbage collector rest; also a decorator.
 
     It would visit all new objects again and again: files of 10,000 lines are read and written in
-    half the time. What is dropped meanwhile is free at once, unless it is part of a cycle.
+    half the time. Objects dropped meanwhile are freed at once, unless they are part of a cycle.
     """
     was_enabled = gc.isenabled()
     gc.disable()

@@ -13,11 +13,11 @@ are assumed. They are a UR20's, scaled by the footprints of the data sheets (204
 Robots. Tests check that the bodies contain the meshes of the first two packages.
 
 Connectors are at +y of ``base`` in all of these shapes. UR3 and UR5 have theirs in the meshes
-(ir-support has that of the UR5 longer); the UR10's ends inside its base. That of UR3e and UR5e is
-assumed to fill a cylinder as wide as the ball by which airo-models stands for it; it holds the
-cable of the drawn base as far as that is above the mounting surface. UR10e: the socket and the
-cable of the two shapes, and 15 mm for a plug. The larger ones' are assumed from it. The cable
-itself, which goes where it is laid, is not part of the arm.
+(ir-support draws the UR5's longer); the UR10's ends inside its base. On UR3e and UR5e the
+connector is assumed to fill a cylinder as wide as the ball that represents it in airo-models; the
+cylinder holds the cable of the drawn base as far as it is above the mounting surface. UR10e: the
+socket and the cable of the two shapes, and 15 mm for a plug. The larger models' connectors are
+assumed from it. The cable itself, which goes where it is laid, is not part of the arm.
 """
 
 from __future__ import annotations

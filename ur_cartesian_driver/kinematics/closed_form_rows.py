@@ -3,7 +3,7 @@
 """
 Closed-form inverse kinematics of many poses, for one branch at a time.
 
-The formulas are those of :mod:`~.closed_form`, which finds all solutions of one pose. Here the
+The formulas come from :mod:`~.closed_form`, which finds all solutions of one pose. Here the
 three choices (shoulder, elbow, wrist) are given as signs, and all poses are solved for them. The
 quantities with these signs are zero where the arm is singular, so :class:`BranchMeasures` both
 identifies a branch and measures its distance from a singularity.
@@ -36,7 +36,7 @@ class BranchMeasures:
     """
     Three signed measures per row: the signs are the branch, zero is a singularity.
 
-    For a calibrated arm they are those of its ideal arm, exact to the misfit.
+    For a calibrated arm they are measured on its ideal arm, exact to the misfit.
     """
 
     #: Distance of the wrist centre in front of the plane of axes 1 and 2 [m]. The centre cannot

@@ -116,8 +116,8 @@ class _LinkBody:
     """
     A cylinder between two points, each given by an axis and a distance along it [m].
 
-    Axes 0..5 are those of the joints, 6 is the middle line of the connector, 7 the line from
-    flange to TCP.
+    Axes 0..5 are the joint axes, 6 is the middle line of the connector, 7 the line from flange to
+    TCP.
 
     :param across: half the length [m] of a cylinder about the axis of its start, along which it
         moves to its end; 0 = the cylinder is about the line from start to end.

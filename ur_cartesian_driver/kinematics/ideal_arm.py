@@ -3,8 +3,8 @@
 """
 Fit an ideal arm to a calibrated one, as a start for the closed-form inverse kinematics.
 
-The closed form needs axes that are exactly parallel or perpendicular; those of a calibrated arm
-are not. The ideal lengths cannot be read from the calibrated DH table: the axes of shoulder lift,
+The closed form needs axes that are exactly parallel or perpendicular, which a calibrated arm does
+not have. The ideal lengths cannot be read from the calibrated DH table: the axes of shoulder lift,
 elbow and wrist 1 are so nearly parallel that their common normals may lie metres away. Then d2, d3
 and d4 are large and cancel, and theta 2 to 4 mean little one by one. So the ideal arm is fitted to
 the flange poses of the real one: six lengths and six joint offsets, by least squares.

@@ -32,7 +32,7 @@ _DAMPING = 1e-14
 
 def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
     """
-    Return the joint positions of a pose near those of a nearby pose [rad].
+    Return the joint positions of a pose [rad], starting from the joints of a nearby pose.
 
     :param q_before: joint positions of a pose at most centimetres away [rad].
     :returns: None if the iteration does not converge: out of reach, or nearly singular.

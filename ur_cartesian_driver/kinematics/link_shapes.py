@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The links of an arm as shapes: where their frames are, and a mesh or cylinders for each.
+The links of an arm as shapes: the frame of each link, and its mesh or cylinders.
 
-Link frames are those of the robot descriptions for ROS: z is the axis of the joint that moves the
-link, and wrist 3 has the flange's origin and axes. On a calibrated arm each frame stands on the
-joint's real axis, as near as possible to where it is on the nominal arm while all joints are at 0.
+Link frames are placed as in the robot descriptions for ROS: z is the axis of the joint that moves
+the link, and wrist 3 has the flange's origin and axes. On a calibrated arm each frame stands on
+the joint's real axis, as near as possible to its place on the nominal arm with all joints at 0.
 
-The meshes are the manufacturer's. Those of UR3, UR5 and UR10 come from the package
-example-robot-data (BSD), those of UR3e and UR5e (also a UR7e) from the package airo-models (MIT).
-Both are optional; links without a mesh are the cylinders of :mod:`~.collision_bodies`. The meshes
-of the e-Series have no connector at the base.
+The meshes are the manufacturer's. UR3, UR5 and UR10 are in the package example-robot-data (BSD),
+UR3e and UR5e (also for a UR7e) in the package airo-models (MIT). Both packages are optional; links
+without a mesh are the cylinders of :mod:`~.collision_bodies`. The meshes of the e-Series have no
+connector at the base.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 #: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
-#: meshes of the e-Series are convex hulls of the links, those of the UR5e's long links in parts; a
-#: cylinder fills the gaps between the parts of its forearm.
+#: meshes of the e-Series are convex hulls of the links. The UR5e's long links are hulls in parts;
+#: a cylinder fills the gaps between the parts of its forearm.
 Detail: TypeAlias = Literal['visual', 'collision']
 
 #: The links in the order of the joints that move them; the tool is not one of the arm's.
@@ -87,7 +87,7 @@ _PACKAGE_ROOTS = {'airo-models': _airo_models, 'example-robot-data': _example_ro
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _MeshSource:
-    """Where a package keeps the meshes of one model, and how they stand in their frames."""
+    """The meshes of one model in a package: their files, and their places in the link frames."""
 
     package: str
     #: Folder of the model inside the package.
@@ -289,7 +289,7 @@ class LinkFrames:
                 for frame, origin, axis in zip(nominal[1:], true.origins, true.axes, strict=True)
             ),
         )
-        #: Each joint's frame in that of the link before, at 0; it turns about its z.
+        #: Each joint's frame in the frame of the link before, at 0; it turns about its z.
         self.joints: tuple[Pose, ...] = tuple(
             before.inverse() @ after
             for before, after in zip(self.at_zero[:-1], self.at_zero[1:], strict=True)

@@ -145,7 +145,7 @@ class RestToRest:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration of the motion [s]."""
         return self.time(self.length)
 
     def time(self, s: float) -> float:

@@ -76,8 +76,8 @@ class Path(PathWithEvents):
         )
         driver.execute(square).raise_for_error()
 
-    The start is no point of the goal: it is where the arm is to stand, what the first :meth:`by`
-    counts from, and its orientation holds until another one is given.
+    The start is no point of the goal. The arm is to stand there, the first :meth:`by` counts from
+    there, and its orientation holds until another one is given.
     """
 
     # ---- the path as a whole -------------------------------------------------------------------

@@ -31,17 +31,17 @@ class WireRecords:
 
     @property
     def total(self) -> int:
-        """How many records there are, those that were forgotten included."""
+        """Number of records of the goal so far, including the forgotten ones."""
         return self._first + len(self._waypoints)
 
     @property
     def kept(self) -> int:
-        """How many records are in memory."""
+        """Number of records in memory."""
         return len(self._waypoints)
 
     @property
     def points(self) -> int:
-        """How many points the goal has."""
+        """Number of points of the goal."""
         return self._waypoints[-1] + 1
 
     def begun_records(self, motions: int) -> int:
@@ -68,7 +68,7 @@ class WireRecords:
         )
 
     def count_before_waypoint(self, waypoint: int) -> int:
-        """Return how many records come before those of a point."""
+        """Return the number of records before the first one of a point."""
         return self._first + bisect_left(self._waypoints, waypoint)
 
     def motions_before(self, record: int) -> int:

@@ -8,7 +8,7 @@ A pose is small and there is one per control cycle, so the single pose is a valu
 arrays of rows ``x y z qx qy qz qw``, see :func:`pose_rows`.
 
 Rotations are unit quaternions ``(x, y, z, w)``, the order of ROS. Rotation vectors (axis times
-angle, what the robot calls ``rx ry rz``) exist only at the robot's border; the conversions here
+angle, the robot's ``rx ry rz``) exist only at the robot's border; the conversions here
 are the only ones.
 """
 

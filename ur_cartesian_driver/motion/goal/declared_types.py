@@ -34,7 +34,7 @@ class WrongType(ValueError):
         """
         Build the sentence.
 
-        :param problem: what is wrong with the value.
+        :param problem: the fault of the value, a clause.
         :param field: where, for example ``waypoints[2].time``.
         """
         super().__init__(f'{field} {problem}.')
@@ -104,7 +104,7 @@ def _converter(kind: Hashable) -> Convert:
         return _member_of(kind)
     if isinstance(kind, type) and is_dataclass(kind):
         return _dataclass(kind)
-    return lambda value: value  # what the field's own checks know
+    return lambda value: value  # checked by the field itself
 
 
 @cache

@@ -18,7 +18,7 @@ from enum import IntEnum
 
 
 class ExecutionMode(IntEnum):
-    """How to execute a goal; the numbers of the action's ``execution``."""
+    """Execution mode of a goal, numbered as the action's ``execution``."""
 
     AUTO = 0
     PRIMITIVES = 1

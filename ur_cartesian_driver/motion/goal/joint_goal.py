@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointPoint:
-    """Where the joints of a goal are at one time, in the order of its ``joint_names``."""
+    """The joints of a goal at one time, in the order of its ``joint_names``."""
 
     #: When to be there, from the start of the motion [s].
     time: float

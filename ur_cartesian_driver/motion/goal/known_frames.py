@@ -55,7 +55,7 @@ class StaticFrame:
         """
         Read ``name parent x y z qx qy qz qw`` [m, unit quaternion].
 
-        :raises ValueError: the text has another form; the sentence says what is wrong.
+        :raises ValueError: the text has another form; the sentence explains the fault.
         """
         words = text.split()
         if len(words) != 9:
@@ -93,7 +93,7 @@ class ArmSnapshot:
 
 
 class FrameLookup(Protocol):
-    """Where frames of others are looked up: ``ros.tf.tf_lookup`` does, in tf2."""
+    """Looks up the frames of others; ``ros.tf.tf_lookup`` does so in tf2."""
 
     def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
         """Return the pose of the source frame in the target frame at a time [ns], 0 = now."""
@@ -132,7 +132,7 @@ class Frames:
         )
 
     def with_transforms(self, transforms: FrameLookup | None) -> Frames:
-        """Return these frames with those of tf2."""
+        """Return these frames, with others looked up in tf2."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames

@@ -24,7 +24,7 @@ def output_name(kind: OutputKind, pin: int) -> str:
 
 
 def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, str] | None:
-    """Return the field that is wrong, what is wrong, and what to do; None if nothing is."""
+    """Return the wrong field, its fault, and a remedy; None if nothing is wrong."""
     name, pins = OUTPUTS[kind]
     if not 0 <= pin < pins:
         return 'pin', f'is {pin}, but there are {name}s 0 to {pins - 1}', 'name one of these'

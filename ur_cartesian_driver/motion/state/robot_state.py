@@ -112,9 +112,9 @@ class RobotState:
 
     Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
 
-    This is the only table of these fields: what is read by RTDE, the shared memory and the
-    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come after
-    the others, what the driver computes comes last. A field of the same name in DriverStatus.msg
+    This is the only table of these fields: the RTDE recipe, the shared memory and the ``~/status``
+    message follow from names, types and :class:`Rtde`. Optional outputs come after the others,
+    and the driver's computed fields come last. A field of the same name in DriverStatus.msg
     shows it; the simulator computes its outputs.
     """
 

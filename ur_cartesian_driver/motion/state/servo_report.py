@@ -28,7 +28,7 @@ class ServoFeedback:
     """
     One RTDE packet of the registers of the buffered servo.
 
-    The counts are those of our own robot program; a program after the manufacturer's guide leaves
+    Only our own robot program writes the counts; a program after the manufacturer's guide leaves
     them at 0.
     """
 

@@ -5,7 +5,7 @@ The age of the robot's states when they are read, and its bound.
 
 A link that carries less than the robot sends does not break: packets queue up, arrive as regularly
 as before, and are older each time. The same happens to a process that is not given enough time.
-What is compared here is the controller's clock, which stamps each packet, with ours::
+So the controller's clock, which stamps each packet, is compared with ours::
 
     offset = arrival - timestamp            contains the unknown difference of the two clocks
     age    = offset - base                  base: the offset of a state that is not old at all
@@ -16,8 +16,8 @@ What is compared here is the controller's clock, which stamps each packet, with 
 * The base rises by :data:`DRIFT`, because clocks differ and are adjusted, and by nothing else. A
   minimum over a sliding window would forget the fast packets, and with a window of 10 s accept a
   queue that grows by 20 ms in each second. So a queue is hidden only if it grows by less than 1 ms
-  in a second, which takes a link that carries all but a thousandth of what is sent.
-* A timestamp that goes back is that of a clock that was set anew, and so is the base.
+  in a second, which takes a link that carries all but a thousandth of the data.
+* A timestamp that goes back means that the clock was reset; the base is reset with it.
 * A controller that stands still (one in a virtual machine, perhaps) loses the time, and all its
   later states seem old: from here that looks the same as a link with a new delay. Therefore a
   connection whose states stay too old is closed after :data:`STALE_TIMEOUT`. The next one has

@@ -5,11 +5,11 @@ The timing of a chain of moves, as the controller carries it out; a row for each
 
 The controller knows one move ahead. It plans each move to rest at its waypoint. The call of the
 next one comes where the blend begins: there the path is cut, the rate of the blend changes evenly,
-and what is left of the next move begins with the speed at the end of the blend. So a move depends
-on the one before by what that hands over (:class:`Handover`), and most moves forget it. All rows
-are computed at once, then those again whose handover has changed, until none has.
+and the rest of the next move begins with the speed at the end of the blend. So a move depends on
+the one before only by its handover (:class:`Handover`), and most moves forget it. All rows are
+computed at once, then the rows with a changed handover again, until none has changed.
 
-Lengths are those that the robot counts: metres, or radians where the turn or a joint leads.
+Lengths are measured as the robot does: in metres, or radians where the turn or a joint leads.
 """
 
 from __future__ import annotations
@@ -341,10 +341,9 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     """
     Return the rates at which blends begin and end.
 
-    A rate changes to the next cruising speed, within three bounds: neither part gets
-    faster than it accelerates (r'' = 2 r s'^2), and what is left must suffice to brake. A move
-    with a time accelerates as from rest to rest, or as the next one does in proportion to their
-    lengths.
+    A rate changes to the next cruising speed, within three bounds: neither part gets faster than
+    it accelerates (r'' = 2 r s'^2), and the rest of the move must suffice to brake. A move with a
+    time accelerates as from rest to rest, or as the next one does in proportion to their lengths.
     """
     blended, timed = handed.rate > 0.0, moves.time > 0.0
     time = np.maximum(moves.time + handed.remaining, _TINY)

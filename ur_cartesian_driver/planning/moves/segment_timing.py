@@ -4,8 +4,8 @@
 The speed of each segment, so that times are met within the limits.
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
-derived so that the time is met. How moves and blends follow each other is that of
-:mod:`~.move_chain`; what they are asked for is found in :mod:`~.speed_requests`.
+derived so that the time is met. :mod:`~.move_chain` computes how moves and blends follow each
+other; :mod:`~.speed_requests` finds the speeds and times that the goal asks of them.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class SegmentTimings:
         """Begin with the requested speeds and times, and change them until all limits are kept."""
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
-        # How long the samples take at the speed limit of the tool, and at that of an arc [s].
+        # Time for a unit of the blend's parameter at the tool's speed limit, and at the arc's [s].
         distance = blend_samples.tool_distance
         self._tool_time = distance / (options.max_tool_speed or inf)
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]

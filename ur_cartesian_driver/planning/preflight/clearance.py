@@ -5,8 +5,8 @@ Check the clearance of the arm from itself and from the workspace planes along i
 
 Cylinders are checked in every row; where they come close, meshes measure exactly, for the models
 that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether less than
-`min_clearance` refuses or warns depends on `self_collision` and the model, never on what is
-installed. An arm that starts too close can move away: rows pass as long as a pair that is too
+`min_clearance` refuses or warns depends on `self_collision` and the model, never on installed
+meshes. An arm that starts too close can move away: rows pass as long as a pair that is too
 close at the start only separates, until it is clear; from then on it is treated like all others.
 """
 
@@ -45,7 +45,7 @@ class Violation:
 
     #: Index into the rows that were given.
     row: int
-    #: A clause: what is too close to what, the distance, and the bound.
+    #: A clause: the pair that is too close, its distance, and the bound.
     text: str
     #: What to do.
     remedy: str
@@ -173,7 +173,7 @@ def clearance_lines(
     """
     Return the report lines about the clearance with each of some tool tips.
 
-    Parameters and errors are those of :meth:`Clearance.check` and :func:`clearance_remarks`.
+    For parameters and errors see :meth:`Clearance.check` and :func:`clearance_remarks`.
     """
     lines = (
         line
@@ -301,7 +301,7 @@ def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
 
 
 def self_collision_remark(name: str, options: PlanningOptions) -> str:
-    """Return what the check of a model has to do without, a sentence; '' where nothing counts."""
+    """Return a sentence on the meshes that the check of a model lacks; '' where none count."""
     missing, refuses = missing_meshes(name), refuses_self_collision(name, options)
     if not missing or options.self_collision == 'off':
         return ''

@@ -56,8 +56,8 @@ _MIN_ANGLE_SINE = 0.05
 #: How much longer than the law of the offset needs it has to fade out.
 _FADE_MARGIN = 1.1
 #: How much later an offset is gone that the robot program moves and the controller filters [s]:
-#: five times the time constant of the filter, a packet to the robot and back, and what the program
-#: lags behind after a change of the speed scaling.
+#: five times the time constant of the filter, a packet to the robot and back, and the lag of the
+#: program after a change of the speed scaling.
 FILTER_SETTLING = 0.2
 #: The paths of the robot's own motions have few samples: time between two for the checks [s].
 _CHECK_STEP = 0.02

@@ -53,7 +53,7 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
 
 
 def add_remark(remarks: list[str], first: int, rows: Flags | np.bool_, what: str) -> None:
-    """Add a remark about points, if there are any; that of row 0 has the number ``first``."""
+    """Add a remark about points, if there are any; row 0 is the point ``first``."""
     points = [first + row for row in rows_where(rows)]
     if points:
         remarks.append(f'{name_points(points)}: {what}')

@@ -202,10 +202,10 @@ def _end_of(polynomials: JointPolynomials) -> SplineState:
 
 def _max_piece_time(goal: GoalTable) -> float:
     """
-    Return how long a piece may be [s].
+    Return the longest duration of a piece [s].
 
-    The robot gets whole pieces, so those of a goal whose tail is replaced are a third of its
-    horizon; set-points have no such limit.
+    The robot gets whole pieces. A goal with a replaceable tail therefore has pieces of at most a
+    third of its horizon; set-points have no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
         return inf

@@ -3,8 +3,8 @@
 """
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-A point whose twist is 0 is a stop. NaN is chosen: a velocity from the parabola through the
-point and its neighbours, an acceleration as the mean of those of the cubics before and after the
+A point whose twist is 0 is a stop. NaN is chosen: a velocity from the parabola through the point
+and its neighbours, an acceleration as the mean of its values on the cubics before and after the
 point.
 """
 
