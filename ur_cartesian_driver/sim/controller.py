@@ -53,8 +53,8 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Time from full speed to zero by the slider or a pause, and by a protective stop [s]. Those of a
-#: real robot are not published.
+#: Time from full speed to zero by the slider or a pause, and by a protective stop [s]. The
+#: manufacturer publishes neither.
 SLIDER_TIME = 0.25
 PROTECTIVE_STOP_TIME = 0.1
 #: The same for a program that ends on its path: a recorded UR5e of URSim loses 6.25 per second.

@@ -70,8 +70,7 @@ class SimulatorConfig:
     #: False = the feature is off in the robot's settings: scripts are taken, and the dashboard
     #: says that the robot is not in remote control.
     has_remote_control: bool = True
-    #: Turn of a movel that counts as much as a metre [rad]; 4 was recorded, 1 is what the manual
-    #: says.
+    #: Turn of a movel that counts as much as a metre [rad]; 4 was recorded, 1 is the manual's.
     turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
     geometry: DhTable | None = None
@@ -79,7 +78,7 @@ class SimulatorConfig:
     #: and the configuration on the primary interface contains them.
     joint_limits: JointLimits | None = None
     #: How far the arm fails to follow its targets, and the controller to keep up; None = not at
-    #: all. `sim.motion.imperfect_arm.typical_imperfections` has those of a model.
+    #: all. `sim.motion.imperfect_arm.typical_imperfections` returns typical values of a model.
     imperfections: Imperfections | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None

@@ -3,7 +3,7 @@
 """
 Builtins of every controller that need no robot: mathematics, lists, text.
 
-Parameter names are those of the script manual, because programs may pass arguments by name.
+Parameters are named as in the script manual, because programs may pass arguments by name.
 Outside its domain a function raises an error instead of returning nan.
 """
 

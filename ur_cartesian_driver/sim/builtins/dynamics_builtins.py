@@ -3,7 +3,7 @@
 """
 Functions of a program that controls the arm by torques: Jacobians, inertia, centrifugal torques.
 
-The links of this arm weigh nothing, so mass matrix and torques are those of the payload, a point.
+The links of this arm weigh nothing: mass matrix and torques come from the payload, a point mass.
 """
 
 from __future__ import annotations

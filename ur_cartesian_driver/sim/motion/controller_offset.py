@@ -4,8 +4,8 @@
 The controller's path offset: a Cartesian offset on top of the motion of a program.
 
 The motion goes on as if there were none, and in each cycle the target is displaced by the
-filtered offset. Frames, filter, limits and the stop with which it ends are those of the script
-manual. Where that is silent the law is ours:
+filtered offset. Frames, filter, limits and the final stop follow the script manual. Where it is
+silent the law is ours:
 
 * the newest offset replaces the one before, also if that was set in another frame;
 * the offset is held at rest, in pauses and in stops; it does not count while set-points (servoj,

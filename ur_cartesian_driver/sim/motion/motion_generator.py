@@ -75,7 +75,7 @@ class MotionGenerator:
     """
     The target of the arm, one control cycle after the other; see :class:`ArmTarget`.
 
-    ``warnings`` collects what the controller has to report; it takes them out. After a ``fault``
+    ``warnings`` collects reports for the controller, which takes them out. After a ``fault``
     the arm stands until ``clear_fault``. ``max_tool_speed`` [m/s] is kept by all motion but stops.
 
     :param cycle: [s].

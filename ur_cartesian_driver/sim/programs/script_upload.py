@@ -19,8 +19,8 @@ from typing import TypeAlias
 from ur_cartesian_driver.urscript.parsing.scanner import scan, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Bound on the length of a program [bytes], which takes some ten seconds to compile. That of a
-#: robot is not published.
+#: Longest program [bytes]; it takes some ten seconds to compile. The manufacturer publishes no
+#: such bound.
 MAX_UPLOAD_SIZE = 1024 * 1024
 
 _BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})

@@ -118,7 +118,7 @@ class ScriptInterpreter:
         self._random = interleaving
         self._thread_delay = thread_delay
         self._budget = instruction_budget
-        #: What is left of the total budget; None = there is no bound.
+        #: The rest of the total budget; None = there is no bound.
         self.fuel_left = total_budget
         self._is_secondary = program.kind == 'sec'
         self._current: _Thread | None = None
@@ -158,7 +158,7 @@ class ScriptInterpreter:
 
     @property
     def threads(self) -> int:
-        """How many threads there are, the main one included."""
+        """Number of living threads, including the main one."""
         return sum(thread.alive for thread in self._threads)
 
     @property

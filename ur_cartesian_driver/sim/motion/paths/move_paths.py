@@ -292,7 +292,7 @@ class FilletBlendPath:
     A circular arc tangent to two lines at equal distances d from the waypoint.
 
     Where the direction turns by phi its radius is d / tan(phi/2): d itself in a right angle.
-    The orientation is that of :class:`ToolBlendPath`, the position has a constant speed.
+    The orientation changes as in :class:`ToolBlendPath`, the position has a constant speed.
     """
 
     def __init__(

@@ -271,9 +271,9 @@ def _blend_profiles(
     """
     Return the profiles of the blend (0 to 1) and of the rest of the path behind it.
 
-    The rate of the blend changes evenly from that of the entry to that of the next cruising
-    speed, within three bounds: it does not grow beyond what keeps both parts within their
-    accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must
+    The rate of the blend changes evenly from its value at the entry to the value for the next
+    cruising speed, within three bounds: it does not grow beyond what keeps both parts within
+    their accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must
     suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway. A
     move with a time has no acceleration of its own: in its blend it accelerates as from rest to
     rest, or as the next move does in proportion to their lengths.
