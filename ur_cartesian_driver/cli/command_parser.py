@@ -221,7 +221,7 @@ def _add_send(command: CommandParser) -> None:
 
 
 def _add_planning(command: CommandParser, optional: bool = False) -> None:
-    """Add the goal, which may be optional, and what the driver reads from the robot."""
+    """Add the goal, which may be optional, and the facts that the driver reads from the robot."""
     _add_goal(command, optional)
     command.add_argument(
         '--ur-type',

@@ -3,9 +3,8 @@
 """
 The place where a file's goal was stopped, kept beside it for ``ur-cartesian send --resume``.
 
-``seam.yaml`` has ``seam.yaml.stopped``: the place, and a hash of the goal to which it belongs.
-That of an example of the package, or of a folder that cannot be written, is in the working
-directory.
+``seam.yaml.stopped`` holds the place, and a hash of the goal in ``seam.yaml``. It is written to
+the working directory if the goal is an example of the package, or its folder is read-only.
 """
 
 from __future__ import annotations

@@ -83,8 +83,8 @@ class MotionHandle:
             the ending that was planned, a spline behind its last point.
         :param replace_from_point: the first point that the new ones replace, together with all
             points behind it (SPLINE and SERVO).
-        :param replace_from_time: or the time from which on they do, as those of points [s]; the
-            motion goes on from there to the first of them.
+        :param replace_from_time: or the time from which on they replace the old ones [s], from
+            the start of the goal; the motion goes on from there to the first new point.
         :raises AlreadySent: the tail to replace is final; the error says from where on points can
             still be replaced.
         :raises GoalRefused: none of the points was taken, and the goal goes on; the text says why.

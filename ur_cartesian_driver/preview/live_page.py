@@ -69,7 +69,7 @@ def live_page(
     Serve a page that follows a robot, until the end of the context.
 
     :param state: returns the robot's present state.
-    :param plan: what it is expected to do.
+    :param plan: the motion that is expected of it.
     :param host: the address that is listened on: everybody who reaches it sees the robot.
     :param port: the first one that is tried; a free one is found from there on.
     :raises ImportError: viser is not installed; the text says how to get it.

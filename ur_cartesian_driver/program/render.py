@@ -14,15 +14,15 @@ program that start with ``#!`` are instructions for this module:
 ``#! prelude``
     insert the script prelude, as it is.
 ``#! calls``
-    insert what calls its functions by their numbers.
+    insert the code that calls its functions by their numbers.
 ``#! if FEATURE`` ... ``#! end``
     keep these lines only if the controller's software has the feature, because a controller
     refuses a program that names an unknown function. ``freedrive`` does not depend on the
     software: its lines are kept if freedrive is allowed. Nor does ``prelude``: if there is one.
 
-What is sent has no comments, except the markers of the External Control node, and no empty lines.
-Programs on the pendant share one name space with ours, so each name that the program defines on
-its first level (variables, functions, threads) gets a :data:`PREFIX` there.
+The program is sent without empty lines, and without comments except the markers of the External
+Control node. Programs on the pendant share one name space with ours, so each name that the program
+defines on its first level (variables, functions, threads) gets a :data:`PREFIX` there.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ SPLINE_CONSTANTS: dict[str, float] = {
     'MAX_SPEED': 20.0,
     #: Largest distance of a first point without time from the arm [rad].
     'START_TOLERANCE': 0.01,
-    #: A spline ends at most so far from its end [rad]: what is left is a movej, at an acceleration
+    #: A spline ends at most so far from its end [rad]: the rest is a movej, at an acceleration
     #: [rad/s^2] and a speed [rad/s].
     'END_TOLERANCE': 1e-05,
     'END_ACCELERATION': 15.0,
@@ -138,7 +138,7 @@ OFFSET_CONSTANTS: dict[str, float] = {
     #: near [m]; in the driver too.
     'BRAKING': BRAKING_FRACTION,
     'TOLERANCE': ARRIVAL_TOLERANCE,
-    #: How fast the rate of the offset's time follows that of the motion [1/s].
+    #: Largest change of the offset's time rate, which follows the motion's [1/s].
     'RATE_CHANGE': 10.0,
     #: In a shorter time the offset does not move [s].
     'MIN_TIME': 1e-6,
@@ -159,7 +159,7 @@ OUTPUT_COLUMNS = {
 }
 
 
-#: What is kept for an analog output that follows the speed: its law as a record has it, whether it
+#: State of an analog output that follows the speed: its law as a record has it, whether it
 #: follows, and the filtered speed [m/s].
 FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
 

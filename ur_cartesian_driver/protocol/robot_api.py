@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The Robot API of PolyScope X: what the dashboard is to other robots, as HTTP requests with JSON.
+The Robot API of PolyScope X, in place of other robots' dashboard: HTTP requests with JSON.
 
 Commands keep the names that they have on the dashboard, so one call serves every generation;
 :data:`API_COMMANDS` has the request of each. The robot describes its own version of the API at
@@ -11,8 +11,8 @@ A request that changes the robot is answered when the robot has done it. Its sta
 the robot is in remote control, 409 if the robot cannot do it in its present state, 504 if it takes
 too long. An error has the fields ``message`` and ``details``; one in the request ``detail``.
 
-Paths, bodies and first versions are those of Universal Robots' client library 2.14
-(``dashboard_client_implementation_x.cpp``); the statuses are those that it and other clients list.
+Paths, bodies and first versions come from Universal Robots' client library 2.14
+(``dashboard_client_implementation_x.cpp``); it and other clients list the statuses.
 """
 
 from __future__ import annotations

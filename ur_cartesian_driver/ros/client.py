@@ -3,8 +3,8 @@
 """
 An action client: read a goal from YAML, send it, wait for its result.
 
-``ur-cartesian send`` and the demo use it. The YAML is that of ``ros2 action send_goal``, whose
-reader (rosidl_runtime_py) is not among the wheels of ROS 2.
+``ur-cartesian send`` and the demo use it. The YAML is the same as for ``ros2 action send_goal``,
+whose reader (rosidl_runtime_py) is not among the wheels of ROS 2.
 """
 
 from __future__ import annotations
@@ -133,8 +133,8 @@ class GoalClient:
         Create the node.
 
         :param driver: name of the driver's node, with its namespace if it has one.
-        :param node: the one to use instead. If an executor spins it, call the client from another
-            thread than that of the executor; if none does, the client spins it while it waits.
+        :param node: an existing node to use instead. If an executor spins it, call the client
+            outside the executor's thread; if none does, the client spins it while it waits.
         """
         #: The signal that cancelled the goal sent last; 0 = none.
         self.signal_number = 0
@@ -278,8 +278,8 @@ class GoalClient:
 
         May be called from anywhere while the goal runs, also from the callback of :meth:`send`.
 
-        :param along: [m], in the frame of the path, as ``across`` and ``normal``; what is beyond
-            ``path_offset.limits`` of the goal is cut.
+        :param along: [m], in the frame of the path, as ``across`` and ``normal``; cut at the
+            ``path_offset.limits`` of the goal.
         """
         if self._offsets is None:
             self._offsets = self._node.create_publisher(
@@ -306,9 +306,9 @@ class GoalClient:
         :param path: with times from the start of the goal; of a message count the points, segments
             and outputs. None = no point, with ``last``.
         :param last: nothing follows.
-        :param replace_from_point: the first point whose place the new ones take, and that of all
+        :param replace_from_point: the first point that the new ones replace, together with all
             points behind it.
-        :param replace_from_time: or the time from which on they do [s].
+        :param replace_from_time: or the time from which on they replace the old ones [s].
         :return: a future of the response of ``~/append_points``. A refusal is such a response,
             too: ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
         :raises RuntimeError: no goal of this client runs.

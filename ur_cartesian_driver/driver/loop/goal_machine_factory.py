@@ -70,7 +70,7 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
 
 
 def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return the feeder of set-points of a spline, or to live targets, or that of freedrive."""
+    """Return the feeder for freedrive, or for set-points of a spline or to live targets."""
     job = request.job
     settings = ServoSettings(
         target_lag=config.servo_target_lag,

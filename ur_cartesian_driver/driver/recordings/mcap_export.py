@@ -3,8 +3,8 @@
 """
 A recording as MCAP with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others.
 
-Topics that the node publishes too have its names and types, so one layout serves both. Times are
-those of the packets, from the moment at which the recording was begun.
+Topics that the node publishes too have its names and types, so one layout serves both. Messages
+carry the times of their packets, counted from the moment at which the recording began.
 """
 
 from __future__ import annotations

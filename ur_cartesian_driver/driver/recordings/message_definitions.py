@@ -3,8 +3,8 @@
 """
 Definitions of ROS 2 messages as text, as MCAP files carry them (``ros2msg``).
 
-They are read from the interface packages that are installed, as rosbag2 does it: a definition,
-followed by those of the messages that it contains.
+They are read from the installed interface packages, as rosbag2 does it: a definition, followed by
+the definitions of the messages that it contains.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def motion_metadata(
     Return the metadata of a motion that begins now.
 
     :param robot: its model, software and calibration.
-    :param parameters: those of the driver, a dataclass.
+    :param parameters: the configuration of the driver, a dataclass.
     :param plan_metadata_json: the result of :func:`plan_metadata`.
     :param mode: the kind of a motion without a plan.
     """

@@ -54,7 +54,7 @@ class Recording:
     """
     One motion: n packets of the robot, m samples of the plan.
 
-    Poses are those of the TCP in the robot's base: x y z [m], unit quaternion x y z w. Twists are
+    Poses describe the TCP in the robot's base: x y z [m], unit quaternion x y z w. Twists are
     linear [m/s] and angular [rad/s] in base axes.
     """
 

@@ -4,8 +4,8 @@
 The RTDE registers between the driver and the robot program.
 
 The controller reserves the numbers from 24 for external clients and the lower ones for fieldbuses.
-The servo numbers are those of the manufacturer's guide to buffered ``servoj``, so a program after
-that guide works, too.
+The servo numbers follow the manufacturer's guide to buffered ``servoj``, so a program after that
+guide works, too.
 
 =================  ==========  =========  ====================================================
 direction          kind        number     meaning

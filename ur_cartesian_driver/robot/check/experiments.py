@@ -39,7 +39,7 @@ SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSamples:
     """
-    What was recorded, a row each cycle.
+    Samples of a recorded motion, a row for each cycle.
 
     :param time: clock of the controller (n,) [s].
     :param target_q: (n, 6) [rad].
@@ -87,7 +87,7 @@ class Experiment:
     :param check: its name in the report and in doc/robot_program.md.
     :param motion: what moves, how far and how fast; a sentence for the person who is asked.
     :param script: body of the program that moves.
-    :param analyse: what the samples show.
+    :param analyse: derives the finding from the samples.
     :param slider: the speed slider during the motion; None = as it is.
     :param stop_after: the program is stopped so long after the arm begins to move [s], on the
         clock of the controller.

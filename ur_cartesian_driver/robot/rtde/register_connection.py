@@ -166,7 +166,7 @@ def feedback_from_rtde(values: Sequence[Any], effective_speed: EffectiveSpeed) -
     """
     Return a packet with the values of :data:`SERVO_FIELDS`.
 
-    :param effective_speed: that of the packets before; it takes this one.
+    :param effective_speed: follows the packets one by one; this call updates it.
     """
     (timestamp, scaling, slider, state, *feedback) = values
     mode, sequence, lag, done, repeats, skipped, size, over = feedback

@@ -38,9 +38,9 @@ class RtdeConnection:
         """
         Prepare a connection.
 
-        :param client: says what is streamed and written.
-        :param on_values: a packet came in, with the names of its fields and what is in them; also
-            before :meth:`open` returns.
+        :param client: chooses the fields that are streamed and written.
+        :param on_values: a packet came in, with the names and values of its fields; also before
+            :meth:`open` returns.
         :param silence: the longest pause between two packets [s].
         """
         self._client = client

@@ -4,8 +4,8 @@
 The dashboard of a robot: one line out, one line in, then the connection is closed again.
 
 A new connection for each request costs a millisecond, and a late answer cannot be mistaken for
-that of the next request. Refusals are explained in our own words: the dashboard often says only
-that a command failed.
+the answer to the next request. Refusals are explained in our own words: the dashboard often says
+only that a command failed.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ async def write_and_compare(
     host: str, port: int, input_write: InputWrite
 ) -> tuple[bool, Mapping[str, Any]]:
     """
-    Write, and return whether the robot reported the effect, and what it reported before.
+    Write, and return whether the robot reported the effect, with its values before.
 
     :raises OSError: there is no connection, or another client has the inputs.
     """

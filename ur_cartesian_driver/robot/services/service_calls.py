@@ -43,7 +43,7 @@ UNIT_TOLERANCE = 1e-3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServiceAnswer:
     """
-    How a call ended.
+    The outcome of a call.
 
     :param ok: the robot has done it, and has reported the effect if it reports such effects.
     :param text: a sentence, or the requested value.

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What all goals of a node share."""
+"""The objects that all goals of a node share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalContext:
-    """What all goals of a node share."""
+    """Driver, arbiter, frames, clock and settings, which all goals of a node share."""
 
     driver: Driver
     arbiter: ArmArbiter
