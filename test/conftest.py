@@ -103,7 +103,7 @@ def pytest_make_collect_report(collector):
 
 
 def _without_skip(report, config):
-    """Turn a skip into a failure where none is expected; what is known to fail is no skip."""
+    """Turn a skip into a failure where none is expected; a known failure is no skip."""
     if report.skipped and not hasattr(report, 'wasxfail') and config.getoption('--no-skips'):
         _, _, reason = report.longrepr
         report.outcome = 'failed'

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What was installed works: all that building and packing can break, and nothing else.
+The installation works: all that building and packing can break is checked, nothing else.
 
 Together with the other tests marked ``installation`` this is what colcon and each wheel run.
 """

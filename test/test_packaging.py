@@ -255,7 +255,7 @@ def test_rosdep_knows_the_keys_of_package_xml():
 
 
 def requirements():
-    """Return what the builds, the installations, their extras and the developers require."""
+    """Return the requirements of builds, installations, their extras and developers."""
     declared = {
         ast.unparse(node.targets[0]): ast.literal_eval(node.value)
         for node in ast.parse((CHECKOUT / 'setup.py').read_text()).body

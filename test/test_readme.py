@@ -433,7 +433,7 @@ def test_readme_is_one_page():
     assert len(README.read_text(encoding='utf-8').splitlines()) <= 150
 
 
-# ---- what is said about the code ----------------------------------------------------------------
+# ---- statements about the code ------------------------------------------------------------------
 
 
 def test_every_error_code_is_described_with_its_number():

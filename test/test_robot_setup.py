@@ -4,7 +4,7 @@
 The pages about robots and recovery have every state, and every sentence that asks a person to act.
 
 Both directions: the pages have all sentences of the tables of connection and recovery, and the
-source contains what the pages quote, as a whole or with values in it.
+source contains every sentence that the pages quote, as a whole or with values in it.
 """
 
 import ast
@@ -111,7 +111,7 @@ def test_every_state_is_in_the_table_with_its_number():
     assert there == {(str(getattr(DriverStatus, name)), name) for _, name in there}
 
 
-# ---- what the driver says is on the page --------------------------------------------------------
+# ---- the pages have the driver's sentences ------------------------------------------------------
 
 
 def test_every_required_action_is_on_the_page():
@@ -161,7 +161,7 @@ def test_every_step_that_recovery_leaves_to_an_operator_is_on_the_page():
     assert [text for text in sorted(said) if not is_on_page(text)] == []
 
 
-# ---- what is on the page is what the driver says ------------------------------------------------
+# ---- the driver says the pages' sentences -------------------------------------------------------
 
 
 def texts(tree):

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sweeps: what is varied, that each variant gets its own verdict, and what is printed."""
+"""Sweeps: the variants, a verdict for each of them, and the printed output."""
 
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 import csv

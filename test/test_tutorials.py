@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The tutorials, followed: what a reader saves runs, and prints what the pages show."""
+"""The tutorials, followed: the programs that a reader saves run, and print what the pages show."""
 
 import re
 from runpy import run_path
@@ -44,7 +44,7 @@ def test_what_a_reader_saves_is_known_here():
 
 
 def run_python(*words, folder):
-    """Run Python in a folder, and return what it prints."""
+    """Run Python in a folder, and return its output."""
     ended = subprocess.run(
         [sys.executable, *words],
         stdout=subprocess.PIPE,

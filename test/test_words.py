@@ -35,7 +35,7 @@ SHARED_NAMES: dict[str, str] = {}
 
 
 def own_modules(folder: Path) -> list[Path]:
-    """Return the modules below a folder without what the build has made."""
+    """Return the modules below a folder, without those that the build generates."""
     return [
         path
         for path in tracked_files(folder, '**/*.py')

@@ -103,7 +103,7 @@ def record(ur_sim):
 
 @pytest.fixture
 def trajectory_bytes(ur_sim, make_driver):
-    """Collect what the robot program received on the trajectory socket."""
+    """Collect the bytes that the robot program received on the trajectory socket."""
     received = bytearray()
 
     def take(port, data):

@@ -30,7 +30,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-#: Those of an e-Series: the robot program follows splines from cycle to cycle [s].
+#: Of an e-Series: the robot program follows splines from cycle to cycle [s].
 CYCLE = 0.002
 PATHS = int(os.environ.get('ANNOUNCED_SPEEDS', '6'))
 SEED = int(os.environ.get('ANNOUNCED_SPEEDS_SEED', '1'))
@@ -38,7 +38,7 @@ ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(max_tool_speed=1.0, on_too_fast='slow', self_collision='off')
 TOOL = Kinematics(ARM.geometry, ARM.model.position_limits, IDENTITY)
 BENT, STRETCHED = (0.2, -1.4, 1.6, -1.7, -1.5, 0.3), (0.2, -1.1, 0.45, -0.9, -1.5, 0.3)
-#: What is slower by less is as fast as asked; the plan announces from 2 % on.
+#: A motion below this fraction of the requested speed is slow; plans announce it from 2 % on.
 SLOWER = 0.98
 #: Places are compared to so many cycles, and to this length [m].
 CYCLES, LENGTH = 2.0, 0.0005
@@ -114,7 +114,7 @@ def spline_goal(rng, poses, ways, times):
 
 
 class Readings:
-    """Where the tool was in each packet, how fast, and how fast it should have been."""
+    """Place and speed of the tool in each packet, and the speed that was planned."""
 
     def __init__(self, rows, goal, start):
         q, qd = np.array([row.target_q for row in rows]), np.array([row.target_qd for row in rows])

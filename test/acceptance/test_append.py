@@ -54,8 +54,8 @@ def spline(home, first, count, last):
     return points, ()
 
 
-#: How the points are joined; points with their segments; and how long before the end of what is
-#: known its ending begins: a line from blend to rest, or a piece to rest [s].
+#: How the points are joined; points with their segments; and how long before the end of the known
+#: points the ending begins: a line from blend to rest, or a piece to rest [s].
 KINDS = {
     'lines': (ExecutionMode.PRIMITIVES, lines, 0.4),
     'spline': (ExecutionMode.SPLINE, spline, 0.06),

@@ -3,7 +3,7 @@
 """
 The arm rests at points, as long as asked, and whatever happens meanwhile.
 
-Places and times are those of RTDE. Everything runs in virtual time.
+Places and times are read from RTDE. Everything runs in virtual time.
 """
 
 import pytest
@@ -100,7 +100,7 @@ def test_the_arm_rests_as_long_as_asked(execution, slider):
         motion = TIMES[-1] - DWELL
         arrives = motion / slider + dwell - slow * streamed
         assert journey.arrival() == pytest.approx(arrives, abs=0.1 / slider)
-        # What is reported is the time of the controller, in which a dwell of the program is real.
+        # Progress is in the controller's time, in which a dwell of the program is real.
         resting = [p.time for p in journey.motion.progress if 0.55 < p.time < 0.95]
         assert len(resting) > 5
 

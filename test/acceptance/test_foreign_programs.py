@@ -47,7 +47,7 @@ async def play(cell, text):
 
 
 def registers(cell):
-    """What the robot shows of the program: version, number, count."""
+    """Return version, number and count, which identify the program on the robot."""
     return tuple(cell.robot.controller.io.outputs.integers[32:35])
 
 

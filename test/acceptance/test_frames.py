@@ -189,7 +189,7 @@ def test_the_named_frame_keeps_to_line_and_arcs_while_it_turns(
         assert np.linalg.norm(points - place, axis=1).min() < 0.003
     turned = np.array([pose_from_matrix(T).angle_to(start) for T in where])
     assert turned.max() > QUARTER - 1e-3
-    # What is reported is the named frame, not the TCP.
+    # Feedback reports the named frame, not the TCP.
     reported = np.array([progress.actual_pose.position for progress in seen])
     assert max(np.linalg.norm(points - place, axis=1).min() for place in reported) < 0.003
 

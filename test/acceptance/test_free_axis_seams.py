@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Seams whose rotation is free: what the robot reports is judged by the axis alone."""
+"""Seams with a free rotation: only the axis of the reported poses is judged."""
 
 from dataclasses import replace
 from math import cos, pi, sin

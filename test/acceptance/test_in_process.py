@@ -150,7 +150,7 @@ def test_a_node_that_is_destroyed_during_a_goal_stops_the_arm(client, ur_sim):
 
 
 def resources():
-    """What a test could leave behind: threads by name, sockets, shared memory of ours."""
+    """Return resources that a test could leak: thread names, our shared memory, children."""
     threads = {t.name for t in threading.enumerate()}
     descriptors = []
     for fd in os.listdir('/proc/self/fd'):

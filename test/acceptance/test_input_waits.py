@@ -3,7 +3,7 @@
 """
 The arm waits at a point for an input, or ends there; payloads change where it stands.
 
-Places and times are those of RTDE, the payload is the controller's; all in virtual time.
+Places and times are read from RTDE, the payload from the controller; all in virtual time.
 """
 
 import pytest

@@ -33,7 +33,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 ARM = Arm(robot_model('ur5e'))
 OPTIONS = PlanningOptions(max_tool_speed=0.0)
 TRAJECTORIES = int(os.environ.get('JOINT_TRAJECTORIES', '3'))
-#: What the points of a goal have beside positions.
+#: The highest derivative that the points of a goal contain.
 KINDS = ('positions', 'velocities', 'accelerations')
 #: How far the controller's targets may be from the curve [rad], and how late it may begin [s].
 EXACT, LATEST = 1e-3, 0.03

@@ -65,7 +65,7 @@ class Session:
 
     @property
     def tool(self):
-        """Where the controller has the tool, beside the start."""
+        """The controller's place of the tool, relative to the start."""
         pose = ARM.forward(self.cell.q)
         return tuple(a - b for a, b in zip(pose.position, self.start.position, strict=True))
 

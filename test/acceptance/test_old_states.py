@@ -79,7 +79,7 @@ def check_goes_on(driver, ur_sim):
 
 
 def test_a_congested_link_makes_no_reaction_late(ur_sim, driver, motion):
-    """200 kB/s are about half of what the states take: each comes later than the one before."""
+    """States take about twice these 200 kB/s: each comes later than the one before."""
     ur_sim.inject('throttle rtde 200000')
     sleep(1.5)
     ur_sim.inject('offset pose x 0.004')
@@ -92,7 +92,7 @@ def test_a_congested_link_makes_no_reaction_late(ur_sim, driver, motion):
 
 @pytest.mark.ur_sim(frequency=125.0, when_late='skip')
 def test_a_loop_that_was_given_no_time_stops_the_arm(ur_sim, driver, motion):
-    """The robot program waits for longer; what the loop then reads is too old."""
+    """The robot program waits for longer; the states that the loop then reads are too old."""
     loop, begin = driver._loop.host.pid, monotonic()
     os.kill(loop, signal.SIGSTOP)
     sleep(PAUSE)

@@ -68,7 +68,7 @@ def example(name):
 
 
 class Cell:
-    """One robot, the node with its driver, a client, and a record of what the robot does."""
+    """One robot, the node with its driver, a client, and a record of the robot's motion."""
 
     def __init__(self, robot, node, client, rtde):
         self.robot, self.node, self.client, self.rtde = robot, node, client, rtde
@@ -82,7 +82,7 @@ class Cell:
         return self.driver.state
 
     def judged(self, path, execute, frames):
-        """Carry out a path, and return what is wrong with the motion."""
+        """Carry out a path; return its outcome and the faults of the motion."""
         state = self.go_home()
         goal = path.goal(frames, ArmSnapshot.of(state))
         made = self.driver.plan(goal)
@@ -211,7 +211,7 @@ def test_an_example_is_carried_out_as_it_says(cell, name, over_ros):
     path = getattr(module, name)(cell.go_home().actual_tcp_pose)
     frames = Frames(static_frames=getattr(module, 'FRAMES', ()))
     execute = cell.client.execute if over_ros else cell.driver.execute
-    cell.robot.call(established)  # that of a welding arc
+    cell.robot.call(established)  # a welding source has its arc
     outcome, wrong = cell.judged(path, execute, frames)
     outcome.raise_for_error()
     assert wrong == []

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The verdict of the pre-flight check on a goal is what the robot does.
+The robot confirms the verdict of the pre-flight check on a goal.
 
 Random goals at the limits of each arm: accepted ones have to arrive as planned; those refused for
 reach, range or branch are sent anyway and have to fail. Both sides share the kinematics, so the
@@ -108,7 +108,7 @@ def is_straight(segment):
 
 
 def distances(a, b):
-    """How far two poses are apart [m] + [rad]: |A - B| = 2 sqrt(2) sin(angle / 2)."""
+    """Return the distance of two poses [m] + [rad]: |A - B| = 2 sqrt(2) sin(angle / 2)."""
     chord = np.linalg.norm(a[:3, :3] - b[:3, :3]) / (2.0 * np.sqrt(2.0))
     return np.linalg.norm(a[:3, 3] - b[:3, 3]) + 2.0 * np.arcsin(min(1.0, chord))
 

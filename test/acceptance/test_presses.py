@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Force mode along a path: what it does to the tool, how it ends, and what contact means.
+Force mode along a path: its effect on the tool, its end, and the effect of contact.
 
-Forces and places are those that RTDE reports, of a contact by the simulator's own law: the tests
-prove the wiring, not the robot. All in virtual time.
+RTDE reports forces and places; contact follows the simulator's own law: the tests prove the
+wiring, not the robot. All in virtual time.
 """
 
 from dataclasses import replace
@@ -108,7 +108,7 @@ def test_the_tool_presses_with_its_force_and_follows_its_path_otherwise():
 
 
 def test_a_controller_that_reports_the_target_of_the_program_is_followed_too(monkeypatch):
-    """What a robot reports in force mode is not published."""
+    """Nobody publishes which target pose a robot reports in force mode."""
     table = dict(COMPUTED, target_TCP_pose=lambda c: c.motion.T_base_tcp.rotation_vector())
     monkeypatch.setattr(rtde_output_values, 'COMPUTED', table)
 
@@ -165,7 +165,7 @@ def test_the_goal_ends_where_the_tool_touches(axes):
     async def scenario(cell):
         put(cell, 'box', (0.0, 0.075, 0.0), (0.1, 0.05, 0.1))  # its face is at 50 mm
         press = replace(DOWN, contact=ContactEnd.REQUIRED, axes=axes, forces=(0.0,) * len(axes))
-        # What the tool runs into pushes it off its path.
+        # The box pushes the tool off its path.
         motion, _ = start(cell, press, path_tolerance=Tolerance(position=(0.002,) * 3))
         places, forces = await recorded(cell, motion)
         assert motion.outcome.succeeded, motion.outcome.text
@@ -291,7 +291,7 @@ def test_the_frame_of_the_tool_turns_with_it():
         places, forces = await recorded(cell, motion)
         assert motion.outcome.succeeded, motion.outcome.text
         leaning = (places[:, 1] > 0.06) & (places[:, 1] < 0.085)
-        # Along the others the arm is stiff, and takes what the table pushes there.
+        # Along the others the arm is stiff, and takes the table's push.
         assert forces[leaning, 2] == pytest.approx(20.0 / np.cos(lean), abs=1.0)
 
     run_cell(scenario)

@@ -169,7 +169,7 @@ class Cell:
             )
             if not ended.done():
                 return ended
-            # Result and status take different paths: READY may be that of the process before.
+            # Result and status take different paths: READY may come from the process before.
             _, outcome, now = ended.result()
             assert outcome.error_code == ErrorCode.ROBOT_NOT_READY, outcome.error_string
             assert now < deadline, outcome.error_string

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What is promised of speed, time and place holds for random goals of all kinds.
+Random goals of all kinds keep the promises about speed, time and place.
 
 The goals run in virtual time through the robot loop of the driver and its robot program. RTDE
-records the joints, and a judge with kinematics and geometry of its own says what is wrong.
+records the joints, and a judge with kinematics and geometry of its own finds the faults.
 
 ``RANDOM_GOALS`` is the number of goals, ``RANDOM_GOALS_SEED`` repeats a draw, and
 ``RANDOM_GOALS_ONLY=ROBOT.GOAL`` runs one of its goals. ``RANDOM_TCP_GOALS`` run through processes
@@ -44,9 +44,9 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 GOALS = int(os.environ.get('RANDOM_GOALS', '30'))
-#: Each time another of these is drawn. What they find is new: a change did it. Those left out find
-#: what is known (21: a time refused 10 % above the least; 26: a flip where the wrist may pass);
-#: other seeds find what nobody has seen yet.
+#: Each run draws another of these. Their findings are new: a change caused them. Seeds left out
+#: find known faults (21: a time refused 10 % above the least; 26: a flip where the wrist may
+#: pass); other seeds find faults that nobody has seen yet.
 SEEDS = [seed for seed in range(1, 41) if seed not in (21, 26)]
 SEED = int(os.environ.get('RANDOM_GOALS_SEED', str(SEEDS[int(time.time()) % len(SEEDS)])))
 ONLY = os.environ.get('RANDOM_GOALS_ONLY', '')
@@ -80,7 +80,7 @@ class Session:
         await self.cell.until(lambda: self.recorder.rows)
 
     async def place(self, q, T_flange_tcp):
-        """Let the arm stand somewhere; return what the driver sees."""
+        """Place the arm somewhere; return the state that the driver sees."""
         motion = self.cell.robot.controller.motion
         motion.T_flange_tcp = T_flange_tcp
         motion.teleport(q)
@@ -246,7 +246,7 @@ async def run_goals(cell, robot, number, left, counts, wrong):
 
 
 def count(run, name, counts, wrong):
-    """Judge a run, and count what is wrong with it."""
+    """Judge a run, and count its faults."""
     counts[f'run: {run.promise.execution.name}'] += 1
     for kind, text in judge(run):
         counts[f'wrong: {kind}'] += 1

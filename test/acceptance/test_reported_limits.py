@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Way
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 UR5E = robot_model('ur5e')
-#: The base joint turns within 0.1 rad at up to 0.2 rad/s; all others as those of the model.
+#: The base joint turns within 0.1 rad at up to 0.2 rad/s; all others keep the model's limits.
 TIGHT = JointLimits(
     position=((-0.1, 0.1), *UR5E.position_limits[1:]), speed=(0.2, *UR5E.max_joint_speed[1:])
 )

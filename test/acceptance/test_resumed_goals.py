@@ -5,7 +5,7 @@ A seam that is interrupted and resumed is, put together, the whole seam.
 
 The seam has lines, PROCESS with a blend, an arc and an output; as a spline it has twists. It is
 stopped at random places (cancelled, by a protective stop, by a lost arc) and resumed, in
-virtual time. RTDE says where the tool was and what the output was; its geometry is the tests' own.
+virtual time. RTDE reports tool and output; the seam's geometry is the tests' own.
 ``INTERRUPTIONS`` is the number of places of each kind.
 """
 
@@ -177,7 +177,7 @@ class Bench:
 
 
 def nearest(places, x):
-    """Return how far each place is from what the tool has passed [m]."""
+    """Return the distance of each place from the path that the tool has passed [m]."""
     if len(x) < 2:
         return np.full(len(places), np.inf)
     a, b = x[:-1], x[1:] - x[:-1]

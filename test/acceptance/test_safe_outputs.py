@@ -3,7 +3,7 @@
 """
 Outputs that have to be safe: pauses, whoever holds the inputs, and which goals need them.
 
-The fault matrix has an output of this kind in each of its cells; here is what it has not. The
+The fault matrix has an output of this kind in each of its cells; here are the other cases. The
 outputs are read from the controller. Everything runs in virtual time.
 """
 

@@ -3,7 +3,7 @@
 """
 The robot program calls functions of the script prelude at points; in virtual time.
 
-Places are those of RTDE, outputs those of the controller.
+Places are read from RTDE, outputs from the controller.
 """
 
 from functools import partial

@@ -3,7 +3,7 @@
 """
 The experiments of the manufacturer's servoj guide: without and with a buffer, loop closed or not.
 
-The robot side is the guide's own sample program and, without a buffer, what the guide did before;
+The robot side is the guide's sample program, or its first experiment, which has no buffer;
 the driver's side is ours, over RTDE only. ``doc/servo_experiments.png`` shows the same runs.
 """
 

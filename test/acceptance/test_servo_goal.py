@@ -148,7 +148,7 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         outcome = await refused.end()
         assert outcome.code is ErrorCode.ROBOT_NOT_READY
         assert 'in use by another client' in outcome.text
-        # What is left of the goal before dies out, with the guide's gain in 33 ms to a third.
+        # The rest of the goal before dies out, with the guide's gain in 33 ms to a third.
         assert cell.q == pytest.approx(q, abs=1e-6)
         # But for a moment it waits for somebody who is about to hang up.
         await cell.until(cell.is_ready)

@@ -258,7 +258,7 @@ def test_waypoints_are_buffered_while_the_arm_is_slowed_down_and_none_is_lost(se
 
 def test_client_that_heeds_the_lag_time_keeps_the_buffer_short(servo):
     servo.set_slider(0.4)
-    # The guide: slow the trajectory down by what the controller reports.
+    # The guide: slow the trajectory down by the controller's report.
     servo.stream(swing(servo.q), 1.0, lambda client: 0.2 if client.lag > 0.05 else 1.0)
     assert (servo.scaling, servo.slider) == pytest.approx((1.0, 0.4))
     assert max(packet[8] for packet in servo.packets) < 0.07

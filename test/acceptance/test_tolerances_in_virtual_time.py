@@ -47,7 +47,7 @@ PUSHES: dict[DeviationQuantity, Any] = {
     'twist': (('linear velocity', 'angular velocity'), (0.5, 0.5), (0.1, 0.1)),
     'acceleration': (('linear acceleration', 'angular acceleration'), (3.0, 3.0), (1.0, 1.0)),
 }
-#: The tool points down: what is an axis of base to a push is one of the tool to an orientation.
+#: A push about an axis of base turns the tool about this axis of its own: the tool points down.
 TOOL_AXES = {'x': 'y', 'y': 'x', 'z': 'z'}
 NAMES = (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)
 RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
@@ -84,7 +84,7 @@ class Tapped(asyncio.Protocol):
     """Sits between a connection and its reader, and records all data with their times."""
 
     def __init__(self, cell, port):
-        end = cell.loop.open_ends(port)[0]  # the first of RTDE's is that of the robot's state
+        end = cell.loop.open_ends(port)[0]  # the first RTDE connection receives the robot's state
         self._loop, self._reader = cell.loop, end.protocol
         self.notes = []
         end.set_protocol(self)

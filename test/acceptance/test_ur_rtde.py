@@ -5,7 +5,7 @@ The simulated controller with an independent client: the ``ur-rtde`` package of 
 
 It uploads its own control program, moves the arm through RTDE registers, and knows only the ports
 of a real robot; so each simulator has a loopback address of its own. The client runs as a process:
-this file, executed, plays one of the `scenes` against an address and prints what the client read.
+this file, executed, plays one of the `scenes` against an address and prints the client's readings.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Client:
         }
 
     def note_at_rest(self, name: str, **values: Any) -> None:
-        """Note what is read once the arm rests.
+        """Note the readings once the arm rests.
 
         The package's two connections read packets of their own, so the answer to a move may be
         ahead of the newest state.
@@ -281,7 +281,7 @@ SCENES = {scene.__name__: scene for scene in (moves, streams, signals, power)}
 
 
 def play(scene: str) -> dict[str, Any]:
-    """Let the client play a scene against a simulator of its own; return what it read."""
+    """Let the client play a scene against a simulator of its own; return its readings."""
     with simulator() as robot:
         done = subprocess.run(
             [sys.executable, str(Path(__file__)), scene, robot.config.host],

@@ -26,7 +26,7 @@ FOREIGN = 'def foreign():\n  while True:\n    sync()\n  end\nend\n'
 
 @pytest.fixture
 def check(ur_sim, tmp_path, capsys):
-    """Run the command; returns its status, what it printed, and the report's findings by name."""
+    """Run the command; return its status, its output, and the report's findings by name."""
 
     def run(**ports):
         path = tmp_path / 'report.json'
@@ -118,7 +118,7 @@ def test_a_closed_port_is_one_sentence(check, closed_port, interface, finding, s
     code, printed, findings = check(**{interface: closed_port})
     assert code == status
     assert words in findings[finding]['text']
-    assert findings[finding]['text'].count('.') <= 5  # those of the address
+    assert findings[finding]['text'].count('.') <= 5  # the address has dots, too
     assert 'Traceback' not in printed
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: what it prints, and its exit status."""
+"""The command line: its output and its exit status."""
 
 from contextlib import nullcontext
 from io import StringIO

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Options of the simulator: what is refused, and that what is accepted reaches the robot."""
+"""Options of the simulator: wrong ones are refused, the others reach the robot."""
 
 from __future__ import annotations
 

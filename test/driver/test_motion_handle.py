@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the owner of a motion holds."""
+"""The handle of a motion, which its owner holds."""
 
 from math import nan
 from threading import Event, Thread

@@ -55,7 +55,7 @@ def corner(cell):
 
 
 async def executed(cell, goal, act=None):
-    """Run a goal; return its plan, its outcome, and what the shared memory showed meanwhile."""
+    """Run a goal; return its plan, its outcome, and the states in shared memory meanwhile."""
     made = plan(goal, cell.memory.read(), Arm(robot_model('ur5e')), PlanningOptions())
     seen = {}
 
@@ -88,7 +88,7 @@ def eventful(tmp_path_factory):
     """
     Record a motion with a slider that moves, an output that somebody switches, and a force.
 
-    Return the directory, and what the motion itself was: plan, outcome, packets of RTDE.
+    Return the directory, and the motion itself: plan, outcome, packets of RTDE.
     """
     directory = tmp_path_factory.mktemp('eventful')
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is on the disk after a motion, after half of one, and where there is no room for it."""
+"""Recordings on disk: of a whole motion, of half a motion, and on a full disk."""
 
 import contextlib
 import json
@@ -49,7 +49,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
-# ---- what is in a file --------------------------------------------------------------------------
+# ---- contents of a file -------------------------------------------------------------------------
 
 
 def test_a_recording_holds_every_packet_as_it_came(tmp_path):

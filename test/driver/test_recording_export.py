@@ -195,7 +195,7 @@ def test_a_prefix_is_that_of_frames_and_joints(recording, tmp_path):
 
 
 def test_a_recording_without_wrench_is_read_and_exported(recording, tmp_path):
-    """As those of before the column was added."""
+    """Recordings made before the column was added have none."""
     pytest.importorskip('mcap_ros2')
     from mcap_topics import read_topics
 

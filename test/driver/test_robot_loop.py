@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot loop and an owner that does not read what it is told."""
+"""The robot loop and an owner that does not read its notifications."""
 
 import asyncio
 import os

@@ -67,7 +67,7 @@ class Cell:
         Run a plan, and hand every packet to a machine, in the cycle in which it was made.
 
         :param scale: speed scaling by time [s]; 0 = a pause.
-        :param disturb: makes of a packet what the machine gets, by time [s].
+        :param disturb: changes a packet before the machine gets it, by time [s].
         :param instead: a plan that the robot runs while the machine believes in the other.
         :returns: the machine, and the commands of each packet.
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals with an open end: what is sent when, what is kept back, and what is forgotten."""
+"""Goals with an open end: records sent in time, held back, and forgotten."""
 
 from dataclasses import replace
 

@@ -53,7 +53,7 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 START, END = (0.4, 0.0, 0.2), (0.6, 0.0, 0.2)
 MOVING = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 REST = (0.0,) * 6
-#: The TCP of the robot, and that of a goal about another frame.
+#: The TCP of the robot, and the TCP of a goal about another frame.
 OWN, NOZZLE = Pose((0.0, 0.0, 0.1)), Pose((0.02, 0.0, 0.15))
 
 
@@ -91,7 +91,7 @@ def started(**changes):
 
 
 def with_tcp(T_flange_tcp, part=0.0, qd=REST, **changes):
-    """Return a packet of a robot that has a TCP; its poses are those of the goal's TCP."""
+    """Return a packet of a robot that has a TCP, with poses of the goal's TCP."""
     return robot(part, qd=qd, T_flange_tcp=T_flange_tcp, **changes)
 
 

@@ -3,8 +3,8 @@
 """
 Whole motions under watch: disturbances trip in the cycle they come in, normal runs never do.
 
-The motion is that of the simulated controller, which shares nothing with the planner. In normal
-runs the arm lags behind its target by some cycles, as real ones do.
+The simulated controller makes the motion; it shares nothing with the planner. In normal runs the
+arm lags behind its target by some cycles, as real ones do.
 """
 
 from collections import deque

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A goal of the robot's own motions whose path may give way: what is taken, written, released."""
+"""A path of the robot's own motions that may give way: offsets, and the inputs that carry them."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ BAND = OffsetBand(
 
 
 class Cell:
-    """A line along y, run by a robot that reports what it is told to."""
+    """A line along y, run by a robot whose reports the test chooses."""
 
     def __init__(self):
         poses = np.array([[0.0, LENGTH * k, 0.2, 0.0, 0.0, 0.0, 1.0] for k in (0, 1)])
@@ -95,7 +95,7 @@ class Cell:
         return found
 
     def report(self, offset=0.0, shift=(0.0, 0.0, 0.0)):
-        """Let the program report; return what is written in answer."""
+        """Let the program report; return the values written in answer, if any."""
         feedback = OffsetFeedback(last_sequence=self.last, offset=(0.0, offset, 0.0), shift=shift)
         found = self.event(OffsetReceived(feedback=feedback))
         rows = [command.values for command in found if isinstance(command, WriteInputs)]

@@ -163,7 +163,7 @@ def test_the_tool_moves_by_the_offset_without_turning():
     drive.run(0.3)
     assert drive.place == [0.0, 3.0, -2.0]
     assert ARM.forward(drive.joints[-1]).angle_to(ARM.forward(HOME)) < 1e-8
-    drive.offset(0.5, 1.0, 0.001)  # what is beyond the limits is cut
+    drive.offset(0.5, 1.0, 0.001)  # cut at the limits
     drive.run(0.5)
     assert drive.place == [0.0, 5.0, 1.0]
     drive.run(3.0)

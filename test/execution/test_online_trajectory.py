@@ -54,7 +54,7 @@ class Flight:
         self.linear, self.angular = [(0.0,) * 3], [(0.0,) * 3]
 
     def beside(self, x=0.0, y=0.0, z=0.0, turn=(0.0, 0.0, 0.0)):
-        """Where the tool began, moved along the axes of base, and turned about its own."""
+        """Return the pose at the start, moved along the base axes and turned about its own."""
         px, py, pz = self.home.position
         return Pose((px + x, py + y, pz + z), self.home.quaternion) @ Pose(
             quaternion=quaternion_from_rotation_vector(turn)
@@ -182,7 +182,7 @@ def test_without_a_target_it_brakes_and_a_new_one_continues():
 
 
 def rooms(q):
-    """How far joints are from everything that stops them, computed the other way round."""
+    """Yield the room of joints up to everything that stops them, computed the other way round."""
     lows, highs = np.array(UR5E.position_limits).T
     bodies = CollisionBodies(NOMINAL, TCP, 0.05)
     moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
@@ -204,7 +204,7 @@ ANYWHERE = replace(LIMITS, singularity_margins=(0.0, 0.0, 0.0))
 
 
 def turned_about_joint(flight, joint, angle):
-    """Where the tool is when only one joint has turned."""
+    """Return the pose of the tool after a turn of only one joint."""
     q = list(flight.joints[0])
     q[joint] += angle
     return NOMINAL.forward(q) @ TCP

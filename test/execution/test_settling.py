@@ -56,7 +56,7 @@ POINT = MotionJob(
 LIMIT = 0.01
 ONE = (LIMIT, -1.0, -1.0)
 MOVED = (0.02, 0.0, 0.0)
-#: What is still wrong when the program has arrived, and the tolerance that sees it.
+#: Errors that are left when the program has arrived, and the tolerance that sees each.
 WRONG = [
     ('position x', {'actual_tcp_pose': Pose((0.62, 0.0, 0.2))}, {'position': ONE}),
     (

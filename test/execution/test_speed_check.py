@@ -132,7 +132,7 @@ def outcome(commands):
 def test_a_success_without_the_motion_is_none(tolerance):
     made = machine(goal_time_tolerance=tolerance)
     assert not outcome(made.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 0.1))
-    # What the robot reported before the end may come after it.
+    # A state reported before the end may come after it.
     assert not outcome(made.step(robot(0.11), 0.11))
     (end,) = outcome(made.step(robot(1.2), 1.2))
     assert end.code is ErrorCode.EXECUTION_FAILED

@@ -136,7 +136,7 @@ def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment)
 
 #: Longest time from a push to standstill: the bound of the age, and braking [s].
 REACTION = 0.3
-#: What the states of the robot take [bytes/s].
+#: Data rate of the robot's states [bytes/s].
 NEEDED = 692 / CYCLE
 
 

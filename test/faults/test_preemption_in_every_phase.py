@@ -19,7 +19,7 @@ STOP_DECELERATION = 4.0
 FASTEST, STRONGEST = 0.7, 6.0
 #: From the request to the outcome [s]: braking at 0.25 m/s, and some cycles for the messages.
 BOUND = 0.3
-#: Phase: what is on the wire until the next goal runs, and how the first one ends.
+#: Phase: the messages on the wire until the next goal runs, and how the first one ends.
 PHASES = {
     'arming': ([START, CANCEL, START], ErrorCode.PREEMPTED),
     'first point': ([START, CANCEL, START], ErrorCode.PREEMPTED),

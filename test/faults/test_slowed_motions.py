@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What slider and pause do to the path of the tool: they take time, and change nothing else.
+Slider and pause cost time, and change nothing else of the tool's path.
 
 Slowed, paused and resumed, the tool stays on its path, no joint jumps, and a cancel while it is
 slowed brakes as any other.
@@ -21,7 +21,7 @@ KINDS = {
     'PRIMITIVES': BlendGoal,
     **{mode.name: GOALS[mode.name] for mode in (SPLINE, SERVO, APPEND)},
 }
-#: What is done in the middle of a goal, and how long it lasts [s].
+#: Interventions in the middle of a goal, and how long they last [s].
 DONE = {
     'slower and faster': [('slider 0.3', 0.1), ('slider 1', 0.2)],
     'to zero and up again': [('slider 0', 0.3), ('slider 1', 0.2)],

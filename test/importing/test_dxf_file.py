@@ -115,7 +115,7 @@ def test_what_is_no_path_is_said_with_its_line(tmp_path):
 
 
 def test_layers_decide_what_is_seen_also_in_blocks(tmp_path):
-    """Off hides entities; frozen also hides blocks. Layer 0 in a block is that of its INSERT."""
+    """Off hides entities; frozen also hides blocks. In a block, layer 0 is the INSERT's."""
     layers = ['Off 62 -7', 'Frozen 70 1', 'Locked 70 4']
     seen = {
         'Off': [100, 300],

@@ -59,7 +59,7 @@ EFFECTS: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
     ';': ('X3 ;X4', [HERE, (3, 1, 1)]),
     '*': ('N3 X3*71', [HERE, (3, 1, 1)]),
 }
-#: Modes that are the default, or end what is refused anyway: they change nothing.
+#: Modes that are the default, or end a mode that is refused anyway: they change nothing.
 CANCELS = (
     *('G13.1', 'G15', 'G23', 'G40', 'G49', 'G50', 'G50.1', 'G67', 'G69', 'G94', 'G97'),
     *('G98', 'G99', 'G54'),

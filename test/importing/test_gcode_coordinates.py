@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where a program begins, and what offsets and places of the machine do to its positions.
+Positions of a program: its start, offsets, and places of the machine.
 
-The positions are worked out by hand from the documents of LinuxCNC, GRBL and Marlin.
+They are worked out by hand from the documents of LinuxCNC, GRBL and Marlin.
 """
 
 from gcode_programs import imported, positions, refusal, remarks
@@ -179,7 +179,7 @@ def test_units_may_change(tmp_path):
     text = 'G20 G1 X1 Y0 Z0 F10\nG21 X10\nG91 X1\nG20 X1\n'
     found = imported(tmp_path, text)
     assert positions(found)[:, 0] == pytest.approx([25.4, 10.0, 11.0, 36.4])
-    # The feed stays what it was.
+    # The feed stays the same.
     assert found.goal.segments.velocities == pytest.approx(np.full(4, 10 * 0.0254 / 60))
 
 

@@ -278,7 +278,7 @@ def test_a_recording_of_rtde_begins_at_time_0(tmp_path):
     times = found.goal.waypoints.times
     assert rows['timestamp'][0] == 62.56
     assert times[0] == 0.0
-    # The rest before the motion is left out; from there on the clock runs as that of the robot.
+    # The rest before the motion is left out; from there on times follow the robot's clock.
     clock = rows['timestamp'][found.lines - 2]
     assert np.diff(times[1:]) == pytest.approx(np.diff(clock[1:]), abs=1e-9)
 

@@ -106,7 +106,7 @@ def ezdxf_reads_all(text):
 @pytest.mark.random
 @pytest.mark.parametrize('batch', range(cases(100)))
 def test_broken_drawings_are_a_goal_or_a_sentence(tmp_path, batch):
-    """What ezdxf reads as well is followed where it is drawn."""
+    """A goal follows the curves that ezdxf draws, where ezdxf reads the whole file, too."""
     random = random_of('broken drawing', batch)
     options = ImportOptions(unit='mm', speed=0.1, travel_speed=1.0, tolerance=TOLERANCE)
     goals = compared = 0

@@ -596,7 +596,7 @@ def test_broken_messages_become_goals_or_sentences(tmp_path):
             sentences += 1
             continue
         goals += 1
-        # Each coordinate of a goal is a number that the text has; FK makes those of joints.
+        # Each coordinate of a goal is a number in the text, unless FK makes it from joints.
         if not found.goal.waypoints.postures:
             numbers = {float(n) for n in re.findall(r'[-+.\deE]+', text) if is_number(n)}
             assert set(poses(found)[:, :3].ravel().tolist()) <= numbers

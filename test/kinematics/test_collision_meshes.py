@@ -89,7 +89,7 @@ def test_bodies_contain_every_triangle_of_the_meshes(name, detail, pinocchio):
     """
     Triangles are divided until each part has its corners in one body, which is convex.
 
-    Of the drawn bases of the e-Series only what is above the mounting surface counts: the cable.
+    Of the drawn bases of the e-Series only the part above the mounting surface counts: the cable.
     One triangle of 5 mm² is 6 cm beside all others of the UR10's drawn upper arm, by an oversight.
     """
     bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(1)
@@ -140,7 +140,7 @@ def halves(parts):
 @pytest.mark.random
 @pytest.mark.parametrize('name', GOLDEN)
 def test_meshes_are_never_nearer_than_the_bodies(name, all_meshes):
-    """Where the bodies of random configurations are nearer than 3 cm, and of some where not."""
+    """Compare random configurations with bodies nearer than 3 cm, and a few of the others."""
     bodies, meshes = CollisionBodies(Arm(MODELS[name])), all_meshes[name]
     rng = np.random.default_rng(random_of('meshes of', name).getrandbits(32))
     q, compared = rng.uniform(-pi, pi, (cases(100_000), 6)), 0
@@ -323,8 +323,9 @@ def brute_force_distance(one, other):
     """
     Return the distance of two meshes (n, 3, 3).
 
-    0 where an edge passes through a triangle, else that of a corner from a triangle or of an edge
-    from an edge. Pairs whose spheres are farther apart than the best pair do not count.
+    0 where an edge passes through a triangle, else the smallest distance from a corner to a
+    triangle or from an edge to an edge. Pairs whose spheres are farther apart than the best pair
+    do not count.
     """
     centres, radii = zip(*(spheres(mesh) for mesh in (one, other)), strict=True)
     between = np.linalg.norm(centres[0][:, None] - centres[1], axis=2)

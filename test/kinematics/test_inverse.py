@@ -59,7 +59,7 @@ def above_the_shoulder(arm):
 
 
 def miss(a, b):
-    """How far two joint vectors are apart when full turns do not count."""
+    """Return the largest difference of two joint vectors, modulo full turns."""
     return max(abs(remainder(x - y, tau)) for x, y in zip(a, b, strict=True))
 
 

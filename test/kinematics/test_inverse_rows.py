@@ -41,7 +41,7 @@ def above_the_shoulder(arm):
 
 
 def miss(a, b):
-    """How far joint rows are apart when full turns do not count."""
+    """Return the largest difference of joints in each row, modulo full turns."""
     difference = np.asarray(a) - np.asarray(b)
     return np.abs(difference - tau * np.rint(difference / tau)).max(axis=-1)
 

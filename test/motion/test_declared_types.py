@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Values of users become those of the declared types, or are refused by field and value."""
+"""Values of users are converted to the declared types, or refused by field and value."""
 
 from dataclasses import replace
 from typing import Any

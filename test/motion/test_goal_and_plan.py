@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals and plans are plain immutable values whose numbers are those of the interfaces."""
+"""Goals and plans are plain immutable values, with the numbers of the interfaces."""
 
 from dataclasses import FrozenInstanceError, replace
 import pickle

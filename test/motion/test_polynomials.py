@@ -26,7 +26,7 @@ def test_both_ends_are_what_was_asked(between, kept):
     coefficients = between(DURATIONS, start, end)
     for asked, times in ((start, np.zeros(20)), (end, DURATIONS)):
         for got, wanted in list(zip(evaluate(coefficients, times), asked, strict=True))[:kept]:
-            # Divided by T^2: what is rounded counts more in shorter pieces.
+            # Divided by T^2: rounding counts more in shorter pieces.
             assert (np.abs(got - wanted) * DURATIONS[:, None] ** 2).max() < 1e-10
 
 

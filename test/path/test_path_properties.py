@@ -193,7 +193,7 @@ def test_offsets_add_up_and_go_back(path, first, second):
         assert pose.position == pytest.approx(old.apply(first), abs=1e-12)
         assert pose.quaternion == pytest.approx(old.quaternion, abs=1e-12)
     given = path._table().waypoints
-    if not np.isnan((given.twists, given.accelerations)).any():  # what is free stays free
+    if not np.isnan((given.twists, given.accelerations)).any():  # free values stay free
         assert_same(beside.offset(*[-x for x in first], of_tool=True), path, 1e-8)
 
 

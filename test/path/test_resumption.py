@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The goal that is left of another one: its points, outputs and times, and what is refused.
+The resumed goal: its points, outputs and times, and goals that cannot be resumed.
 
-That put together they are the whole: ``test/acceptance/test_resumed_goals.py``.
+``test/acceptance/test_resumed_goals.py`` shows that both parts together are the whole goal.
 """
 
 from dataclasses import replace

@@ -146,7 +146,7 @@ def in_parts(goal, sizes):
 
 
 def joined(rows, part):
-    """What the driver makes of a path and its continuation."""
+    """Join the reference paths of a plan and its continuation, as the driver does."""
     kept, new = (
         rows.time <= part.start_time + 5e-7,
         part.plan.reference.time > part.start_time + 5e-7,

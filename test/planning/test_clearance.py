@@ -61,7 +61,7 @@ CHOICES = ('warn', 'auto', 'refuse', 'off')
 @pytest.mark.parametrize('model', ['ur10e', 'ur5', 'ur5e'])
 @pytest.mark.parametrize('installed', [True, False])
 def test_parameter_and_model_decide_whether_to_refuse(model, choice, installed, request):
-    """Never what is installed, which only decides between which shapes is measured."""
+    """Installed meshes never do; they only decide which shapes are measured."""
     if not installed:
         request.getfixturevalue('no_meshes')
     elif model != 'ur10e':
@@ -314,7 +314,7 @@ def test_links_have_names_that_read_well():
     assert f'{Link.UPPER_ARM} and {Link.WRIST_2}' == 'upper arm and wrist 2'
 
 
-# -- what is said ---------------------------------------------------------------------------------
+# -- sentences ------------------------------------------------------------------------------------
 
 SEGMENT = np.repeat([2, 3], 30).astype(np.int32)
 FRACTION = np.tile(np.arange(1, 31) / 30, 2)

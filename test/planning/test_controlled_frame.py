@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals about another frame than the active TCP: what is planned, and what is refused."""
+"""Goals about another frame than the active TCP: plans and refusals."""
 
 from dataclasses import replace
 from math import radians

@@ -119,7 +119,7 @@ def test_blends_that_touch_leave_numbers_that_can_be_sent(cell, turn):
             segments=(Segment(blend_radius=0.01), Segment(blend_radius=0.01), Segment()),
         ),
     )
-    # A time on the wire ends where the arm would rest; in sum they are those of the goal.
+    # A time on the wire ends where the arm would rest; their sum is the time of the goal.
     times = [segment.primitive.duration for segment in made.segments]
     assert sum(times) == pytest.approx(3.0)
     assert min(times) > 0.4

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Joint goals: what is refused and why, the velocities that the driver chooses, and limits."""
+"""Joint goals: refusals and their reasons, the velocities that the driver chooses, and limits."""
 
 from dataclasses import replace
 from math import inf, nan, pi

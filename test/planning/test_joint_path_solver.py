@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What lies between the points: singularities, ranges, places out of reach, and corners."""
+"""Obstacles between the points: singularities, ranges, places out of reach, and corners."""
 
 from __future__ import annotations
 

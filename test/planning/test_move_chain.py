@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The planner's timing of a chain of moves is that of the simulated controller.
+The planner times a chain of moves as the simulated controller does.
 
 Random chains of moves run through both: rows of the planner, and the path motion of the simulator,
 which share no code. No arm is needed: the joint lines of these tests have a tool of their own.

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a path may give way, in which frame, and what refuses it."""
+"""The band in which a path may give way, its frame, and the reasons to refuse it."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs on the way: behind which motion they stand, where their places are, what is refused."""
+"""Outputs on the way: the motion before each, its place on the path, and refusals."""
 
 from dataclasses import replace
 from math import hypot, inf, nan

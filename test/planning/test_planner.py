@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From goals to primitives: which, in which configuration, and what is refused with the robot."""
+"""From goals to primitives: their kinds, their configurations, and refusals due to the robot."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ SAFE = settings(max_examples=30, deadline=None)
 
 
 def posture(q, *joints):
-    """Return the posture that names all joints, or those of the given numbers."""
+    """Return the posture that names all joints, or the joints of the given numbers."""
     chosen = joints or range(6)
     return Posture(names=tuple(JOINT_NAMES[k] for k in chosen), values=tuple(q[k] for k in chosen))
 
@@ -477,7 +477,7 @@ def test_the_first_blend_must_fit_into_the_way_from_where_the_robot_stands(cell)
     assert 'the blend takes 30 mm, but the arm is 20.000 mm from points[0]' in text
 
 
-# -- what is said ---------------------------------------------------------------------------------
+# -- sentences ------------------------------------------------------------------------------------
 
 
 def test_everything_that_is_ignored_is_said(cell):

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What plans promise of blends, arcs and waits is what the simulated controller does.
+The simulated controller blends, follows arcs and waits as plans promise.
 
 The goals run through the bytes of the wire: whether a blend fits may depend on their rounding to
 micrometres.
@@ -276,7 +276,7 @@ def test_a_time_that_a_refusal_asks_for_is_enough(robot):
                 made = plan(goal, state, arm, PlanningOptions())
             except TooFast as refusal:
                 index = int(re.search(r'points\[(\d+)\]', str(refusal))[1])
-                # With that time it is not refused again, nor with what the others need.
+                # With that time it is not refused again, nor with the times that the others need.
                 assert index not in remedied
                 remedied.append(index)
                 times = np.diff([0.0, *(point.time for point in goal.waypoints)])

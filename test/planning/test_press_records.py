@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a press becomes in the robot program, and what a robot cannot do of it."""
+"""The records of a press for the robot program, and presses that a robot cannot do."""
 
 from dataclasses import replace
 

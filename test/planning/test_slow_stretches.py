@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where a plan is slower than asked, why, and which goals are refused for it.
+Stretches on which a plan is slower than asked, the reasons, and goals refused for them.
 
-Whether it is true on the robot: ``test/acceptance/test_announced_speeds.py``.
+``test/acceptance/test_announced_speeds.py`` compares them with the robot's motion.
 """
 
 from dataclasses import replace

@@ -49,7 +49,7 @@ from ur_cartesian_driver.planning.spline.spline_points import tool_points
 OPTIONS = PlanningOptions(self_collision='off')
 CHOOSE = (nan,) * 6
 SPLINE = ExecutionMode.SPLINE
-#: A tenth of a micrometre, a microradian: what is lost by adding and rounding.
+#: A tenth of a micrometre, a microradian: lost by adding and rounding.
 EXACT = 1e-7
 
 
@@ -121,7 +121,7 @@ def standing(cell, arm):
     )
 
 
-# -- what is asked for is done ------------------------------------------------------------------
+# -- requests are met ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('accelerations', [False, True])

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a moving arm comes to rest, against the brakes of the simulated controller."""
+"""The predicted place of rest of a moving arm, against the brakes of the simulated controller."""
 
 import pytest
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a motion shows the arm where it is, and says what the plan says."""
+"""The page of a motion shows the arm in its place, with the words of the plan."""
 
 from base64 import b64decode
 from dataclasses import replace

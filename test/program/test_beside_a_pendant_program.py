@@ -33,7 +33,7 @@ def first_level_names(text):
 
 
 def pendant_program(text, use, names):
-    """Return a program whose own names are those of our source, around ours."""
+    """Return a program around ours that uses the names of our source for its own."""
     header, control = split(text)
     first, before, after = ('\n'.join(part.replace('{}', n) for n in names) for part in use)
     lines = (

@@ -3,8 +3,8 @@
 """
 Outputs on the robot: where the tool is in the cycle in which they change, and in which order.
 
-What is measured are the outputs and the tool of the simulated controller, cycle by cycle; the
-places come from the test.
+The outputs and the tool of the simulated controller are measured, cycle by cycle; the places come
+from the test.
 """
 
 from math import hypot
@@ -35,7 +35,7 @@ def robot():
 
 
 class Watched:
-    """What the outputs did, and where the tool was then."""
+    """Records each change of the outputs, and the place of the tool."""
 
     def __init__(self, robot):
         signals = robot.controller.io
@@ -99,7 +99,7 @@ def test_outputs_without_trigger_pose_switch_at_once_and_in_order(robot):
     assert not run.failure
     # Two of them changed the same output in one cycle.
     assert [change[:2] for change in watched.changes] == [(3, True), (7, True)]
-    # In the cycle of the next line, which begins with what the one before has left of its last.
+    # In the next line's first cycle, the rest of the cycle in which the line before ended.
     begun = 0.5 * 2.0 * (2.0 * robot.controller.cycle) ** 2
     for change in watched.changes:
         assert apart(change[2], watched.at(x=0.02).position) < begun

@@ -3,8 +3,7 @@
 """
 Path offsets in our robot program: the tool beside its line, cycle by cycle, whatever is written.
 
-What is measured is the target of the simulated controller; what the program reports is compared
-with it.
+The target of the simulated controller is measured, and the program's reports are compared with it.
 """
 
 from math import inf
@@ -47,7 +46,7 @@ def robot():
 
 
 class Line:
-    """A line along y that gives way, what is written meanwhile, and where the target is."""
+    """A line along y that gives way, the written offsets, and the places of the target."""
 
     def __init__(self, robot, length=0.06, velocity=0.1):
         self.robot = robot
@@ -88,7 +87,7 @@ class Line:
 
     @property
     def beside(self):
-        """Where the tool was beside the line, across and normal [m]."""
+        """Distances of the tool from the line, across and normal [m]."""
         return np.array(self.places) @ AXES[1:].T
 
 

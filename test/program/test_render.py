@@ -133,7 +133,7 @@ def test_freedrive_functions_are_called_only_if_freedrive_is_allowed(allowed):
 
 
 def test_no_local_has_the_name_of_a_global():
-    """Which of the two a controller means is written for assignments only."""
+    """Only for assignments does the manual say which of the two a controller means."""
     everywhere, function, inside = set(), '', []
     for line in text(allow_freedrive=True).splitlines():
         if header := re.match(r'(?:def|thread) (\w+)\((.*)\):', line):
@@ -162,7 +162,7 @@ def test_a_fraction_after_an_int_is_found(widened):
 
 
 def test_handles_of_threads_are_killed_and_not_compared():
-    """What a controller makes of a handle beside a number is written nowhere."""
+    """No manual says how a controller compares a handle with a number."""
     handles = re.findall(r'(\w+) = run ', text())
     assert len(handles) == 7
     for handle in handles:

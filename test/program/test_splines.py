@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Splines on the robot, cycle by cycle: where the arm is when, and what is refused.
+Splines on the robot, cycle by cycle: the arm follows them in time, or the program refuses them.
 
-The program is the one that is uploaded, the controller the simulated one without sockets and
-clocks; what the arm should do comes from a polynomial that is computed here.
+The uploaded program runs on the simulated controller without sockets and clocks; the wanted motion
+is a polynomial that is computed here.
 """
 
 from itertools import cycle
@@ -166,7 +166,7 @@ def test_the_acceleration_is_that_of_the_polynomial_at_any_slider(robot, slider)
 @pytest.mark.slow
 @pytest.mark.parametrize(('steps', 'bound'), [(1, 1.4e-4), (3, 3.5e-4)])
 def test_a_call_that_comes_late_keeps_the_arm_near_its_path(steps, bound):
-    """The bounds are those of a program that always allows 40 rad/s^2."""
+    """Bounds as tight as for a program that always allows 40 rad/s^2."""
 
     def edit(text):
         late = '  calls = calls + 1\n  if calls % 100 == 0:\n' + '    sync()\n' * steps + '  end\n'
@@ -186,7 +186,7 @@ def test_a_call_that_comes_late_keeps_the_arm_near_its_path(steps, bound):
 @pytest.mark.exhaustive
 @pytest.mark.parametrize('moment', [0.8, 1.5, 1.7])
 def test_a_pause_keeps_the_arm_near_its_path(robot, moment):
-    """The bound is that of a program that always allows 40 rad/s^2."""
+    """Bound as tight as for a program that always allows 40 rad/s^2."""
     robot.place(HOME, IDENTITY)
     splines = pieces([ODD] * 50)
     cycles = []
@@ -284,7 +284,7 @@ def test_a_later_point_without_time_is_canceled(robot):
     ('duration', 'result'), [(0.049, TrajectoryResult.CANCELED), (0.051, TrajectoryResult.SUCCESS)]
 )
 def test_more_than_20_rad_per_second_is_canceled(robot, duration, result):
-    """What is slower is gone in the time that the joints need."""
+    """A slower piece runs, in the time that the joints need."""
     robot.place(HOME, IDENTITY)
     run = robot.run([spline(1.0 * np.eye(6)[5], duration)])
     assert run.result is result

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Primary frames, against recorded ones and what the manufacturer's library reads from them."""
+"""Primary frames, against recorded ones as the manufacturer's library reads them."""
 
 from contextlib import suppress
 import json
@@ -135,7 +135,7 @@ PAIRS = {
 
 
 def expected(entry):
-    """Return what the library read, under our names."""
+    """Return the library's values under our names."""
     values = {}
     for name, value in entry.items():
         stem, _, digit = name.rpartition('_')

@@ -68,7 +68,7 @@ def requested(case):
 
 
 def message_of(case):
-    """Call the builder that does what the library's call did."""
+    """Return our message for a call of the library."""
     timeout, step = requested(case), case['step_time_ms']
     if case['call'] == 'trajectory_control':
         return trajectory(

@@ -113,7 +113,7 @@ def test_every_package_of_the_librarys_writer_is_read():
 
 
 def run_recording(name, in_pieces, **options):
-    """Play the controller of a recording to our client; return the events and what it sent."""
+    """Play the controller of a recording to our client; return the client's events and bytes."""
     connection = GOLDEN[name]
     client = RtdeClientCodec(
         connection['output_recipe'],

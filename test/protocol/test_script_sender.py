@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How the robot fetches the program."""
+"""The robot fetches the program from the script sender."""
 
 from contextlib import suppress
 

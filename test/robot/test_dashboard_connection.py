@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The dashboard client with dashboards of all kinds, and what it makes of refusals."""
+"""The dashboard client with dashboards of all kinds, and its sentences for refusals."""
 
 import asyncio
 import contextlib

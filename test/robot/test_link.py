@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The link to a robot, with the simulated one: what it tells, and in which order."""
+"""The link to a robot, here a simulated one: its events and their order."""
 
 import asyncio
 import contextlib

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every mistake in a script prelude is a sentence with its line; what is right is callable."""
+"""Mistakes in a script prelude are sentences with a line; correct functions can be called."""
 
 import errno
 import os

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The primary interface: what the robot says goes to who listens, nonsense ends the connection."""
+"""The primary interface: messages go to their listeners, nonsense ends the connection."""
 
 import asyncio
 import contextlib
@@ -17,7 +17,7 @@ SIX = (0.0,) * 6
 
 
 def told_by(*frames):
-    """Let a server say something; return what the client tells, until it has hung up or 0.5 s."""
+    """Let a server send frames; return the client's reports until it hangs up, at most 0.5 s."""
     news = []
 
     async def scene():

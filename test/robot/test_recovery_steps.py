@@ -52,7 +52,7 @@ def situation(
 
 @pytest.fixture(scope='module')
 def everything():
-    """Every situation of a robot that there can be, with what is done then."""
+    """Every possible situation of a robot, with its recovery step."""
     robots = [
         situation(safety=safety, power=power, runtime=runtime).robot
         for safety, power, runtime in product(SafetyMode, RobotMode, RuntimeState)
@@ -189,7 +189,7 @@ def test_a_robot_that_is_away_is_waited_for(connection):
     ids=['protective stop', 'fault', 'power off'],
 )
 def test_a_robot_that_obeys_gets_there(start):
-    """What each step leads to; the way is no longer than the list of all steps."""
+    """Each step has its effect; no way is longer than the list of all steps."""
     effects: dict[RecoveryStep, dict[str, object]] = {
         RecoveryStep.UNLOCK: {'safety': SafetyMode.NORMAL},
         RecoveryStep.RESTART_SAFETY: {'safety': SafetyMode.NORMAL},

@@ -26,7 +26,7 @@ NEWEST = ControllerVersion(major=10, minor=14, bugfix=0)
 
 
 class DocumentedRobot(http.server.ThreadingHTTPServer):
-    """Answers each request with what it was given for it, and keeps the requests."""
+    """Answers each request as it was told to, and keeps the requests."""
 
     daemon_threads = True
 

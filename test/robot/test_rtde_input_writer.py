@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is written to RTDE inputs, and how its effect is told."""
+"""The values written to RTDE inputs, and the reports of their effects."""
 
 from itertools import product
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The page of topics and services says what the node has, and nothing else."""
+"""The page of topics and services lists all interfaces of the node, and nothing else."""
 
 from pathlib import Path
 import re

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals in flat arrays mean the same as those of points and segments."""
+"""Goals in flat arrays mean the same as goals with points and segments."""
 
 from array import array
 from dataclasses import replace

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Offsets on ``~/path_offset``: those of a client move the tool, others say why they do not."""
+"""Offsets of a client on ``~/path_offset`` move the tool; wrong ones are refused with a reason."""
 
 from math import nan
 

@@ -36,7 +36,7 @@ def sim():
 
 
 class Place:
-    """Where the tool stood at first: goals are about it, wherever the tool is meanwhile."""
+    """The first place of the tool, from which goals count wherever the tool is meanwhile."""
 
     def __init__(self, cell):
         self.cell, self.T_base_tcp = cell, cell.T_base_tcp
@@ -280,7 +280,7 @@ def test_a_node_that_is_destroyed_meanwhile_ends_both(gentle_cell):
     old, new = preempting(gentle_cell, Place(gentle_cell))
     assert old.accepted
     assert new.accepted
-    gentle_cell.close()  # no_thread_left looks for what is left
+    gentle_cell.close()  # no_thread_left looks for leaks
 
 
 @pytest.mark.parametrize('executor', ['multi'])

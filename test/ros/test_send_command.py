@@ -70,7 +70,7 @@ def senders(no_thread_left, sim, make_cell, tmp_path):
     cell = make_cell(sim)
     cell.wait_ready()
     made = Senders(cell, tmp_path)
-    hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # senders inherit that of nohup
+    hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # senders inherit SIG_IGN from nohup
     with cell.spun():
         yield made
         made.close()

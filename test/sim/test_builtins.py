@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The functions of a program, by example: each file in `programs` says itself what it does.
+The functions of a program, by example: each file in `programs` states its own results.
 
 `# expect: text` for each text that it writes, in order; `# expect error: text` for the runtime
 exception that ends it, raised on that line. The world around it is always the same: see `World`.
@@ -28,7 +28,7 @@ CASES = tracked_files(HERE.parent / 'urscript' / 'cases', '**/*.script')
 EXPECT = re.compile(r'# expect(?P<error> error)?: (?P<text>.*)')
 GOLDEN = json.loads((HERE / 'golden' / 'pose_math.json').read_text())
 
-#: What the manufacturer's external_control.urscript and the guide to buffered servoj call.
+#: Called by the manufacturer's external_control.urscript and the guide to buffered servoj.
 USED_BY_OTHERS = """
     get_steptime textmsg str_cat to_str norm pow get_list_length popup sleep sync
     get_joint_positions get_target_joint_positions get_target_joint_speeds get_actual_tcp_speed
@@ -45,7 +45,7 @@ USED_BY_OTHERS = """
 
 class World:
     """
-    What surrounds the robot of a program.
+    The surroundings of the robot of a program.
 
     Inputs and input registers have the values below; a peer on port 1 answers everything with
     itself; ten times a second a person closes the windows, unlocks a protective stop if that is

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calibrated arms: the file's own chain of poses, worked out here, and what the robot reports."""
+"""Calibrated arms: the file's own chain of poses, worked out here, and the robot's reports."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def test_nothing_follows_from_what_is_compiled_when_the_robot_closes():
         thread.join(10.0)
         assert thread.daemon
         assert not thread.is_alive()
-        await asyncio.sleep(0)  # what the thread has asked the loop to call
+        await asyncio.sleep(0)  # runs the calls that the thread has queued in the loop
 
     asyncio.run(close_meanwhile())
     assert done == ['the program under way']

@@ -150,7 +150,7 @@ def test_the_name_of_a_program_may_stand_in_quotation_marks():
 
 @pytest.mark.parametrize('command', ['load a.urp', 'play', 'stop', 'power off', 'brake release'])
 def test_in_local_control_commands_are_refused_until_the_client_reconnects(command):
-    # The words are those of robots in several issues of the drivers for ROS.
+    # Several issues of the drivers for ROS quote these words of robots.
     refusal = (
         'Command is not allowed due to safety reasons, please switch robot to Remote Control '
         'mode and reconnect to port 29999'

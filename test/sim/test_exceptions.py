@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What clients of the primary interface learn of a program that is wrong: place and text."""
+"""Clients of the primary interface learn the place and text of a program's error."""
 
 import pytest
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Faults in words: what each text means, and what is said of one that means nothing."""
+"""Faults in words: the meaning of each text, and the sentence for one that has none."""
 
 from __future__ import annotations
 

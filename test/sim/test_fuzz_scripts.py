@@ -182,7 +182,7 @@ def mutated(random: Random, text: str) -> str:
 
 
 def answers(bench, text):
-    """Run a program for a while; return what the controller said about it."""
+    """Run a program for a while; return the controller's messages about it."""
     bench.controller.messages.take()
     said = len(bench.log)
     begin = time.process_time()

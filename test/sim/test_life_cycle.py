@@ -9,7 +9,7 @@ import pytest
 from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
-#: What the slow start of a program costs its first motion [s].
+#: Delay of a program's first motion by its slow start [s].
 START = 0.08
 LONG_MOVE = 'movej([1.5, -1.57, 1.57, -1.57, -1.57, 0], a=2, v=1)'
 LONG_LINE = 'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=0.5, v=0.1)'

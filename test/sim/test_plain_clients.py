@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What clients of robots rely on, seen by clients that know nothing of this package."""
+"""Properties on which robot clients rely, seen by clients that know nothing of this package."""
 
 from __future__ import annotations
 

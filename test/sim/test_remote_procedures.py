@@ -19,7 +19,7 @@ from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
 
 
 class Camera:
-    """What a program calls; keeps what it was given."""
+    """A remote object for a program to call; keeps the arguments."""
 
     def __init__(self) -> None:
         self.seen: list[Any] = []
@@ -58,7 +58,7 @@ def camera(request) -> Iterator[tuple[Camera, int]]:
 
 
 def run(port: int, body: str) -> list[str]:
-    """Run a program with a handle `camera` to its end; return what it wrote."""
+    """Run a program with a handle `camera` to its end; return its text messages."""
     controller, _ = assemble(SimulatorConfig(**FREE), sockets=TcpScriptSockets())
     address = f'"http://127.0.0.1:{port}/RPC2"'
     controller.programs.submit(

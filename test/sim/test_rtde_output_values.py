@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What RTDE outputs mean: laws between them, and the state behind them."""
+"""The meaning of RTDE outputs: laws between them, and the state behind them."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the collision shapes of an arm are, for comparison with its kinematics and its meshes."""
+"""Places of an arm's collision shapes, for comparison with its kinematics and its meshes."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def body_surfaces(bodies: CollisionBodies, q: Floats, n: int = 24) -> list[Float
 
 def beyond_bodies(bodies: CollisionBodies, q: Floats, link: Link, points: Floats) -> Floats:
     """
-    How far points (n, 3) [m] in base are outside of each body of a link, at joints (6,) [rad].
+    Return how far points (n, 3) [m] in base lie outside each body of a link at joints (6,) [rad].
 
     Exact where they are inside, an upper bound where they are not.
     """
@@ -52,7 +52,7 @@ def beyond_bodies(bodies: CollisionBodies, q: Floats, link: Link, points: Floats
 
 
 def T_base_meshes(meshes: CollisionMeshes, q: Floats) -> Floats:
-    """Where the meshes of all links are at joints (6,) [rad]: matrices (7, 4, 4)."""
+    """Return the poses of all links' meshes at joints (6,) [rad]: matrices (7, 4, 4)."""
     meshes._update_placement(q)
     first = [meshes._shapes[link][0] for link in Link if link is not Link.TOOL]
     return np.array([meshes._placement.oMg[number].homogeneous for number in first])

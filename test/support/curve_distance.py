@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How far curves are from each other, and the curves that a path follows."""
+"""Distances between curves, and the curves that a path follows."""
 
 from collections.abc import Iterable, Sequence
 

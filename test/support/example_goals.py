@@ -14,7 +14,7 @@ from ur_cartesian_driver.robot.prelude_file import read_prelude
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 
-#: What the driver of an example needs that calls functions.
+#: Parameters of the driver for an example that calls functions.
 PRELUDE = share_path() / 'config' / 'examples' / 'gripper.script'
 PRELUDE_ARGUMENTS = ('-p', 'allow_scripts:=true', '-p', f'script_prelude:={PRELUDE}')
 OPTIONS = PlanningOptions(prelude=read_prelude(str(PRELUDE)))

@@ -105,7 +105,7 @@ def _restart_safety(controller: Controller):
     controller.power_off()
 
 
-#: What the pendant has instead of the commands of the dashboard, which local control refuses.
+#: Actions on the pendant, in place of dashboard commands that local control refuses.
 PENDANT = {
     'unlock protective stop': lambda controller: controller.safety_event(SafetyEvent.UNLOCK),
     'restart safety': _restart_safety,

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How goals end when a fault hits them: the table of the fault matrix.
+Outcomes of goals that a fault hits: the table of the fault matrix.
 
 One row for each fault. The tests run each row in each phase of a goal, and ``doc/faults.md`` is
 made from it by ``scripts/make_faults.py``. Times are [s].
@@ -63,7 +63,7 @@ class Row:
     differs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def at(self, phase: str) -> 'Row':
-        """Return what is expected in a phase."""
+        """Return the expected outcome in a phase."""
         return replace(self, differs={}, **self.differs.get(phase, {}))
 
 

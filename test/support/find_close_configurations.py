@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 Floats = Floats
 #: Joints [rad] and distance [m].
 Row = list[float]
-#: Random configurations to measure, those of a pair to keep, and those to approach from.
+#: Numbers of random configurations: measured, kept for each pair, and approached from.
 TRIED, KEPT, STARTS = 250, 6, 8
 #: Steps of an approach, and how far the joints turn in one [rad].
 STEPS, STEP = 80, 0.15

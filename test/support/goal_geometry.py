@@ -105,7 +105,7 @@ class Arc:
         normal = np.cross(b - a, c - a)
         size = np.linalg.norm(normal)
         axis = normal / size
-        # The centre is where both bisecting planes and that of the circle meet.
+        # The centre is where both bisecting planes and the plane of the circle meet.
         center = np.linalg.solve(
             np.array([b - a, c - a, axis]),
             np.array([0.5 * (b @ b - a @ a), 0.5 * (c @ c - a @ a), axis @ a]),

@@ -31,8 +31,8 @@ OVER = 0.02
 REACH = 5e-6
 #: So near is a line or an arc followed [m], [rad].
 PATH, PATH_TURN = 2e-5, 3e-4
-#: A move that stops at a point and goes on may do so between two packets: with what it brakes and
-#: speeds up at most, also if it is optimized [m/s^2], and how near it counts as there [m].
+#: A move may stop at a point and go on between two packets: bounds on its acceleration, plain and
+#: optimized [m/s^2], and on its distance from the point [m].
 TURNING, OPTIMIZED_TURNING = 5.0, 12.0
 NEARBY = 0.002
 #: No joint turns farther [rad].
@@ -67,7 +67,7 @@ _JOINT = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, kw_only=True)
 class Promise:
-    """What the driver said of an accepted goal, in numbers."""
+    """The driver's promises for an accepted goal, in numbers."""
 
     #: How it is executed.
     execution: ExecutionMode
@@ -151,7 +151,7 @@ class _Passage:
 
 @dataclass
 class Judge:
-    """The rows of a run as arrays, and what is wrong with them."""
+    """The rows of a run as arrays, and their faults."""
 
     run: Run
     wrong: list[tuple[str, str]] = field(default_factory=list)
@@ -200,7 +200,7 @@ class Judge:
         self.wrong.append((kind, text))
 
     def judge(self) -> list[tuple[str, str]]:
-        """Return what is wrong: its kind and a sentence."""
+        """Return the faults: a kind and a sentence for each."""
         run = self.run
         self._speeds()
         if not run.succeeded:
@@ -517,7 +517,7 @@ class Judge:
         return knots[first:], places[first:], twists[first:]
 
     def _servo(self) -> None:
-        """The path is that of the spline; each point is passed within the lag of its time."""
+        """The tool follows the spline, and passes each point within the lag of its time."""
         goal = self.run.goal
         for i, (point, target) in enumerate(zip(goal.waypoints, self.targets, strict=True)):
             at = self.t - self.zero - point.time
@@ -588,5 +588,5 @@ def _hermite(at, knots, places, twists):
 
 
 def judge(run: Run) -> Iterator[tuple[str, str]]:
-    """Yield what is wrong with a run: its kind, and a sentence."""
+    """Yield the faults of a run: a kind and a sentence for each."""
     yield from Judge(run).judge()

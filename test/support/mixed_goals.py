@@ -50,7 +50,7 @@ class RandomRobot:
     calibration_seed: int | None
     #: Seed of its imperfections; empty = it is ideal.
     imperfect: str
-    #: Cycles per second; those of an e-Series cost four times as much as those of a CB3.
+    #: Cycles per second; an e-Series costs four times as much computing time as a CB3.
     frequency: float
     options: dict[str, Any]
 
@@ -79,7 +79,7 @@ def random_robot(seed: int, number: int) -> RandomRobot:
             'max_tool_speed': float(rng.choice((0.25, 0.25, 0.25, 0.08, 0.6, 1.5))),
             'on_too_fast': str(rng.choice(('refuse', 'slow'))),
             'max_approach_distance': float(rng.choice((0.0, 0.5))),
-            # What cylinders and meshes say is not what is asked here.
+            # Clearance has tests of its own.
             'self_collision': 'off',
         },
     )
@@ -200,7 +200,7 @@ class MixedDraw(GoalDraw):
                 self.segments[i] = replace(self.segments[i], blend_radius=radius)
 
     def _time(self) -> None:
-        """Give each point a time around what the limits allow."""
+        """Give each point a time around the shortest that the limits allow."""
         time, before = 0.0, self.at(self.q)
         haste = self.between(0.8, 4.0)
         speed = min(self.max_speed, 0.5)
@@ -265,7 +265,7 @@ class MixedDraw(GoalDraw):
         )
 
     def _in_frame(self, goal: Goal) -> Goal:
-        """Express a goal in another frame: that of the tool, or of a part somewhere."""
+        """Express a goal in another frame: the tool's, or the frame of a part somewhere."""
         frame = (
             self.at(self.q)
             if self.chance(0.5)

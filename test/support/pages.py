@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the documents show: commands with their output, and files that a reader saves."""
+"""The examples in the documents: commands with their output, and files that a reader saves."""
 
 from itertools import takewhile
 from pathlib import Path

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compare the planner's verdict on a goal with what the robot does when it gets the goal anyway.
+Compare the planner's verdict on a goal with the robot's motion when it gets the goal anyway.
 
 A refused goal has no primitives. So the points before the refused one are planned, and the refused
 one is sent as a driver without a pre-flight check would send it: type, pose, speeds.

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How many cases a random test draws, and from which seed.
+The number of cases of a random test, and their seed.
 
 `make test` draws a tenth of them from a fixed seed, so that a red run is red again. `make random`
 draws all; RANDOM_SEED=N draws others.

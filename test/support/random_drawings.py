@@ -40,7 +40,7 @@ class Entity:
 
 @dataclass
 class Content:
-    """What a drawing has, whoever writes it."""
+    """The contents of a drawing, whoever writes it."""
 
     entities: list[Entity] = field(default_factory=list)
     blocks: dict[str, tuple[list[Tag], list[Entity]]] = field(default_factory=dict)
@@ -234,7 +234,7 @@ class Draftsman:
         if not is_nested and self.random.random() < 0.3:  # ezdxf does not scale the steps
             tags += [(70, 2), (71, 2), (44, 0.3 * self.size), (45, -0.2 * self.size)]
         tags += self.extrusion()
-        # An INSERT on a frozen layer shows nothing in AutoCAD; ezdxf draws what is on others.
+        # An INSERT on a frozen layer shows nothing in AutoCAD; ezdxf draws its entities on others.
         layers = tuple(name for name in LAYERS if name != 'Frozen')
         return Entity('INSERT', [('AcDbBlockReference', tags)], common=self.common(layers))
 

@@ -43,7 +43,7 @@ class RecordedGoal:
 
     @property
     def target(self):
-        """Where the controller's target is from the start (n, 3) [m]."""
+        """The controller's target relative to the start (n, 3) [m]."""
         return np.array([state.target_tcp_pose.position for state in self.states]) - self.start
 
     @property

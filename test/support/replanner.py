@@ -21,8 +21,8 @@ from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 
 #: Time between two points of a chunk, and how far it looks ahead [s].
 STEP, AHEAD = 0.05, 0.8
-#: How long after what the planner has seen of the arm a new tail begins, and how long after that
-#: its first point is, at least [s].
+#: Time from the planner's latest state of the arm to the beginning of a new tail, and from there
+#: to its first point, at least [s].
 LEAD, GAP = 0.2, 0.15
 #: Radius of the circle [m], and its period [s].
 RADIUS, PERIOD = 0.06, 4.0
@@ -64,7 +64,7 @@ class Replanner:
 
 
 class Readings:
-    """What another RTDE client reads of the joints: time, targets and their rates, in rows."""
+    """Joints as another RTDE client reads them: time, targets and their rates, in rows."""
 
     def __init__(self, cell: RobotCell, seconds: float) -> None:
         self._cell, self._recorder = cell, RtdeRecorder()

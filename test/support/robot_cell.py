@@ -3,9 +3,9 @@
 """
 A cell in virtual time: simulated controller, robot loop, and its owner, in one event loop.
 
-The robot loop is the one of the driver with all its sockets, the controller the one behind
-``ur-cartesian sim``; only time and network are those of :mod:`virtual_network`. Cycles take 8 ms,
-as those of a CB3 robot, because each costs computing time, unless a test chooses its robot.
+The driver's robot loop with all its sockets runs against the controller of ``ur-cartesian sim``;
+only time and network come from :mod:`virtual_network`. Cycles take 8 ms, as on a CB3 robot,
+because each costs computing time, unless a test chooses its robot.
 
 With the environment variable ``THREADS='delay N'`` new threads of the robot program begin N cycles
 later, and with ``THREADS='seed N'`` its threads take turns at random. With ``IMPERFECT=N`` the arm
@@ -250,7 +250,7 @@ class RobotCell:
         await self.crash_robot()
         self.memory.close()
 
-    # ---- what is to be seen -------------------------------------------------------------------
+    # ---- observations -------------------------------------------------------------------------
 
     @property
     def status(self):
@@ -354,7 +354,7 @@ def run_cell(
     Run ``scenario(cell)`` in a cell that is ready for goals; return its result.
 
     :param threads: how the controller schedules threads, see :func:`thread_schedule`.
-    :param imperfect: seed of the imperfections of the arm, empty = it has none; by default that of
+    :param imperfect: seed of the imperfections of the arm, empty = it has none; by default from
         the environment.
     :param robot: fields of the simulator's configuration: model, frequency, geometry, ...
     :param cell: its class.

@@ -37,7 +37,7 @@ MAX_MOTION_TIME = 5000.0
 
 @dataclass(frozen=True, kw_only=True)
 class ProgramRun:
-    """How a trajectory ended."""
+    """The end of a trajectory."""
 
     #: Messages of the controller when it stopped; empty = it ran to the end.
     failure: str

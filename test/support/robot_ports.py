@@ -22,7 +22,7 @@ HOST = '127.0.0.1'
 
 
 class Wire:
-    """A client's socket that reads exactly what is asked for."""
+    """A client's socket that reads exactly as many bytes as asked."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection((HOST, port), timeout=5.0)

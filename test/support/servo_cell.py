@@ -38,7 +38,7 @@ class OpenLoopClock(ServoClock):
 
 
 class OpenLoopStream(ServoStream):
-    """Set-points as fast as the packets of the robot, to see what the feedback is good for."""
+    """Set-points as fast as the packets of the robot, to show the effect of the feedback."""
 
     def __init__(self, source, settings):
         super().__init__(source, settings)

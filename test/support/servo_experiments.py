@@ -73,7 +73,7 @@ class Result:
     wanted: np.ndarray
     actual: np.ndarray
     lag: np.ndarray
-    #: Set-points that were written, and those of them that servoj never got.
+    #: Numbers of set-points written, and of set-points that servoj never got.
     written: int
     skipped: int
 

@@ -109,7 +109,7 @@ def record(
     between=lambda recorder, i: None,
     where=lambda i: (0, 0.0),
 ):
-    """Record packets, and what is done between them; return the warnings."""
+    """Record packets, and the actions between them; return the warnings."""
     warnings = Warnings()
     recorder = Recorder(str(directory), max_size, warnings)
     for i, state in enumerate(packets):

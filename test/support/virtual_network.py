@@ -141,7 +141,7 @@ class _Socket:
 
 
 class _End(asyncio.Transport):
-    """One end of a connection: what is written arrives at the peer in the loop's next turn."""
+    """One end of a connection: data arrive at the peer in the loop's next turn."""
 
     def __init__(self, loop, protocol, name, address):
         super().__init__({'socket': _Socket(name), 'sockname': name, 'peername': address})
@@ -189,7 +189,7 @@ class _End(asyncio.Transport):
     abort = close
 
     def _receive(self, data):
-        """Queue what the peer has written; no bytes mean that it has closed."""
+        """Queue data from the peer; no bytes mean that it has closed."""
         if self.frozen or self._closing:
             return
         self._inbox.append(data)

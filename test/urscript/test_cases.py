@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The language by example: every program in `cases` says itself what it does.
+The language by example: every program in `cases` states its own results.
 
 In a comment, usually on the line that does it: `# expect: text` for each `textmsg`, in order;
 `# expect error: text` for the runtime exception that ends the program, raised on this very line;
@@ -37,7 +37,7 @@ MAX_FRAMES = 1000
 
 @dataclass
 class Outcome:
-    """What a program did."""
+    """Output and errors of a program."""
 
     output: list[str] = field(default_factory=list)
     error: tuple[int, str] | None = None
@@ -45,7 +45,7 @@ class Outcome:
 
 
 class Remote(RemoteObject):
-    """Answers with what it was asked."""
+    """Answers each call with the call as text."""
 
     def __init__(self, name: str) -> None:
         self._name = name

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the parser promises beyond the programs in `cases`: positions, bounds, and no surprises."""
+"""The parser beyond the programs in `cases`: positions, bounds, and no surprises."""
 
 from __future__ import annotations
 

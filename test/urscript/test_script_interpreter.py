@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What programs cannot say of themselves: frames, threads, budgets, stopping, positions."""
+"""Properties that programs cannot test: frames, threads, budgets, stopping, positions."""
 
 from __future__ import annotations
 

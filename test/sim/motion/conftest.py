@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A generator on a UR5e, and a recording of what it does cycle by cycle."""
+"""A generator on a UR5e, and a recording of its motion cycle by cycle."""
 
 from __future__ import annotations
 

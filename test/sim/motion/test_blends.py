@@ -237,7 +237,7 @@ def test_stop_waypoint_inside_the_blend_before_it_makes_the_arm_stop_there(recor
     r.run(r.generator.movel(first, r=0.03))
     r.run(r.generator.movel(second))
     assert [w.code for w in r.generator.warnings] == [197]
-    # A cycle does not end there: what is left of it belongs to the next move.
+    # A cycle does not end there: the rest of it belongs to the next move.
     assert min(first.distance_to(pose) for pose in r.poses) < 0.5 * 1.2 * r.generator.cycle**2
     assert r.generator.T_base_tcp == second
 

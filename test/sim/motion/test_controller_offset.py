@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The controller's path offset: frames, filter, limits, and what it does at both ends."""
+"""The controller's path offset: frames, filter, limits, its start and its end."""
 
 from math import pi, sin
 
@@ -35,7 +35,7 @@ def smooth(k):
 
 
 def expected(frame, pose, velocity, offset):
-    """Return the displaced pose: what the script manual says of each frame, once more."""
+    """Return the displaced pose, worked out anew from the script manual for each frame."""
     given = Pose.from_rotation_vector(tuple(offset))
     if frame == TCP:
         return pose @ given

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the arm cannot go on it slows down, stops on its path and says why."""
+"""An arm that cannot go on slows down, stops on its path and says why."""
 
 from math import pi
 

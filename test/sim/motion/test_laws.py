@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for every kind of move, wherever it goes and however fast it is asked to be."""
+"""Laws of every kind of move, in all directions and at all speeds."""
 
 from dataclasses import dataclass
 from math import pi, sqrt
@@ -29,7 +29,7 @@ sliders = st.floats(0.2, 1.0)
 
 @dataclass(frozen=True)
 class Way:
-    """Where a move goes, seen from HOME, and how."""
+    """A move from HOME: its direction, turn and joints, its speed and acceleration."""
 
     direction: tuple
     turn: tuple

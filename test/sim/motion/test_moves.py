@@ -70,7 +70,7 @@ def test_movel_is_straight_in_time_and_ends_exactly(recorder, shifted, way, turn
     reached = r.generator.arm.forward(r.generator.q)
     assert reached.distance_to(target) < 1e-12
     assert reached.angle_to(target) < 1e-9
-    # What it says of the tool is what the joints do.
+    # Its tool poses agree with its joints.
     for q, pose in zip(r.joints[::50], r.poses[::50], strict=True):
         assert r.generator.arm.forward(q).distance_to(pose) < 1e-9
     assert np.linalg.norm(r.tool_speeds(), axis=1).max() <= v * (1.0 + 1e-6)

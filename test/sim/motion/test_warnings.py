@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller says of moves that it cannot drive as asked, and what it does instead."""
+"""Moves that a controller cannot drive as asked: its warnings, and its motions instead."""
 
 from math import pi
 
