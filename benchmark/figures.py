@@ -23,7 +23,7 @@ class Figure:
     value: float
     unit: str
     baseline: float | None = None
-    #: What the baseline is.
+    #: Name of the baseline.
     than: str = ''
     #: How it was measured, in a few words.
     note: str = ''

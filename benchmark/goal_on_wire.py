@@ -139,7 +139,7 @@ def _whole_way(
 
 
 def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
-    """Time the steps of the same goal here; what is left is threads, pipe and network."""
+    """Time the steps of the same goal here; the rest is threads, pipe and network."""
     name, total = 'its parts, timed one by one', median(totals)
     message, frames = goal_message(POINTS), Frames()
     arm = Arm(robot_model(paths.MODEL))

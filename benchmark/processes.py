@@ -44,7 +44,7 @@ class Child:
 
     def call(self, name: str, *arguments: Any) -> Any:
         """
-        Call a function of the child and wait for what it returns.
+        Call a function of the child and wait for its result.
 
         :raises TimeoutError: no answer.
         """
@@ -141,7 +141,7 @@ def note_cycles(robot: SimulatedRobot) -> list[float]:
         beginnings.append(time.monotonic())
         step()
 
-    robot.controller.step = noted  # type: ignore[method-assign]  # what is measured
+    robot.controller.step = noted  # type: ignore[method-assign]  # measured
     return beginnings
 
 

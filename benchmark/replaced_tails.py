@@ -4,7 +4,7 @@
 A tail that is replaced while the arm moves: from the call to the changed motion, and how smooth.
 
 The arm goes round and round; again and again a new tail leads it 2 mm up or down. Measured by the
-cycles of the simulated controller, a process of its own whose clock is that of this process.
+cycles of the simulated controller, a process of its own that shares its clock with this process.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ RADIUS, PERIOD, HEIGHT, BEGUN = 0.05, 4.0, 0.002, 0.00005
 #: Time between points; from the cut to the first of them, at least; how far they reach [s].
 STEP, GAP, AHEAD = 0.05, 0.08, 0.8
 HORIZON = 0.15
-#: From what the client has seen of the motion to the cut: at first, and by how much more where
+#: Time from the client's latest state of the motion to the cut: at first, and the addition where
 #: that was too late [s].
 FIRST_LEAD, MORE = 0.1, 0.01
 #: Between two steps [s].

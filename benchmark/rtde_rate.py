@@ -4,7 +4,7 @@
 Packages of an RTDE client in real time: completeness, rate and lateness.
 
 The arm moves all the time. An empty loop at 500 Hz runs in parallel, which separates delays of the
-machine from those of the simulator.
+machine from delays of the simulator.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def _rate(received: Received) -> Iterator[Figure]:
 
 
 def _drift(received: Received) -> float:
-    """Return the drift [s]: earliest lateness of the last tenth, minus that of the first."""
+    """Return the drift [s]: growth of the earliest lateness from the first tenth to the last."""
     behind = [b - a for a, b in zip(received.stamps, received.arrivals, strict=True)]
     tenth = max(1, len(behind) // 10)
     return min(behind[-tenth:]) - min(behind[:tenth])

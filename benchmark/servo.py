@@ -128,7 +128,7 @@ def count_servoj(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
         return taken
 
     patched: Any = motion
-    patched.servoj = servoj  # what is measured
+    patched.servoj = servoj  # measured
     return {'servoj_calls': take}
 
 

@@ -200,7 +200,7 @@ def _note_packets(robot: SimulatedRobot) -> Mapping[str, Callable[[], object]]:
     controller: Any = robot.controller
     controller.step = noted_step
     session: Any = RtdeSession
-    session.packages = noted_packages  # what is measured
+    session.packages = noted_packages  # measured
     return {'making': lambda: making}
 
 

@@ -27,7 +27,7 @@ def locked() -> set[tuple[str, str]]:
 
 
 def main() -> None:
-    """Compare, and end with what is not in the lock."""
+    """Compare, and exit with the packages that are not in the lock."""
     installed = {
         (normalized(found.name), found.version)
         for found in distributions()

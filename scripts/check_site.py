@@ -55,7 +55,7 @@ def broken_links(site: Path) -> list[str]:
 
 
 def main() -> int:
-    """Print what is broken; return 1 if anything is."""
+    """Print broken links; return 1 if there are any, or no pages."""
     site = Path(sys.argv[1]).resolve()
     found = broken_links(site)
     pages = sum(1 for _ in site.rglob('*.html'))

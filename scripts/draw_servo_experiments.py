@@ -3,7 +3,7 @@
 """
 Draw the experiments of the servoj guide as our simulated controller and servo side do them.
 
-They are those of ``test/acceptance/test_servo_experiments.py``. Needs matplotlib::
+``test/acceptance/test_servo_experiments.py`` runs the same ones. Needs matplotlib::
 
     python scripts/draw_servo_experiments.py [doc/servo_experiments.png]
 """

@@ -45,7 +45,7 @@ def a_goal(
     Return the execution of an example.
 
     :param faults: as on the command line of ``ur-cartesian sim``.
-    :param execution: in the place of that of the file.
+    :param execution: in place of the file's.
     :param input_after: how long after the start digital inputs come [s].
     :param arm: for a path that may give way.
     """
