@@ -57,7 +57,7 @@ T = TypeVar('T')
 CYCLE = 0.008
 UR5E = robot_model('ur5e')
 #: How long the owner may be silent [s]; the real one is 5 s.
-NODE_TIMEOUT = 0.5
+NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
 #: A slower arm is at rest [rad/s]; the bound of the robot program.
 REST_SPEED = 1e-4

@@ -52,7 +52,7 @@ class DriverConfig(LinkSettings):
     feedback_rate: Annotated[float, Range(0.5, 500.0)] = 25.0
     #: Time without a heartbeat of this node after which its arm is stopped [s]. Longer than the
     #: largest goal takes to arrive.
-    node_timeout: Annotated[float, Range(0.5, 60.0)] = 5.0
+    node_timeout: Annotated[float, Range(0.2, 60.0)] = 5.0
     #: Each motion is recorded as a file in this directory, which `ur-cartesian plot FILE` draws:
     #: planned and executed path, joints, speeds, lag, outputs, events. Empty: no recordings.
     record_directory: str = ''
