@@ -288,8 +288,12 @@ def test_the_jacobian_loses_rank_where_a_measure_vanishes(singular_postures):
         assert np.linalg.svd(UR5E.jacobian(q))[1][-1] < 1e-12
 
 
+#: Rounded, because the determinant divides by its pivots: 1 / 1e-313 is infinite.
+ANGLES = st.floats(-pi, pi).map(lambda angle: round(angle, 9))
+
+
 @settings(max_examples=60)
-@given(q=st.tuples(*[st.floats(-pi, pi)] * 6))
+@given(q=st.tuples(*[ANGLES] * 6))
 def test_the_product_of_the_measures_is_the_determinant_of_the_jacobian(q):
     measures = branch_measures(UR5E, np.array([q]))
     _, a2, a3, *_ = UR5E.geometry.a
