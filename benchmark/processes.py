@@ -141,7 +141,7 @@ def note_cycles(robot: SimulatedRobot) -> list[float]:
         beginnings.append(time.monotonic())
         step()
 
-    robot.controller.step = noted  # type: ignore[method-assign]  # measured
+    robot.controller.step = noted  # type: ignore[method-assign]  # to note each cycle
     return beginnings
 
 

@@ -203,7 +203,7 @@ def test_something_else_than_a_primitive_is_refused():
     (case,) = [case for case in GOLDEN['cases'] if case['type'] is None]
     assert case['refused']
     with pytest.raises(LocalProtocolError, match='not a motion primitive'):
-        encode_point(object())  # type: ignore[arg-type]  # refused
+        encode_point(object())  # type: ignore[arg-type]  # the wrong type is the case
 
 
 @pytest.mark.parametrize('case', GOLDEN['legacy_calls'], ids=case_id)

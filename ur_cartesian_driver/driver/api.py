@@ -269,7 +269,7 @@ class Driver(RobotServices, InteractiveMotions):
             plan was made for another program.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
-        if plan.older_program != self.options.for_program(self.config).older_program:
+        if plan.older_program != self.config.dialect.older_program:
             raise RobotNotReady(
                 'The plan was made for another robot program than the one that runs; make it with '
                 'Driver.plan().'

@@ -226,4 +226,4 @@ class PlanningOptions:
     @property
     def older_program(self) -> str:
         """The version of a robot program that is not the driver's own; '' = it is."""
-        return '' if self.dialect.is_own else self.dialect.name
+        return self.dialect.older_program

@@ -85,8 +85,8 @@ class LinkSettings:
     #: follows more closely; where the arm hums or shakes, lower it, or raise
     #: servoj_lookahead_time.
     servoj_gain: Annotated[float, Range(100.0, 2000.0)] = 1000.0
-    #: SERVO: time that servoj looks ahead, and by which the arm lags behind [s]. 0.06 is that of
-    #: the guide. Lower it, step by step and with the tool that is mounted, where corners have to
+    #: SERVO: time that servoj looks ahead, and by which the arm lags behind [s]. 0.06 is the
+    #: guide's. Lower it, step by step and with the tool that is mounted, where corners have to
     #: be sharper.
     servoj_lookahead_time: Annotated[float, Range(0.03, 0.2)] = 0.06
     #: SERVO: set-points in the robot program's buffer; servo_target_lag has to fit in at 500 Hz.

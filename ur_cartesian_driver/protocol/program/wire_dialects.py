@@ -31,8 +31,9 @@ know. On the reverse socket only the stream actions differ. It is not recorded w
 version introduced which script command, and a program skips unknown commands, too. So only the
 newest dialect sets a temporary TCP for a goal.
 
-Two modules ask a :class:`Dialect` for more than whether the program is our own:
-:mod:`~.trajectory_points` for the points, and
+Three modules ask a :class:`Dialect` for more than whether the program is our own:
+:mod:`~.trajectory_points` for the points,
+:mod:`~ur_cartesian_driver.robot.program.program_sockets` for the actions, and
 :mod:`~ur_cartesian_driver.planning.request.program_features` for the demands of goals.
 """
 
@@ -85,6 +86,11 @@ class Dialect:
     #: The program is this driver's own: it has outputs and stops, the buffered servo, freedrive,
     #: offsets and a temporary TCP, and reports the number of points begun.
     is_own: bool = False
+
+    @property
+    def older_program(self) -> str:
+        """The version of a program that is not the driver's own; '' = it is."""
+        return '' if self.is_own else self.name
 
     @property
     def max_duration(self) -> float:
