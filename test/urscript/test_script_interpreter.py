@@ -545,3 +545,22 @@ def test_an_endless_loop_ends_at_its_budget_however_threads_take_turns() -> None
     running.step()
     assert running.error is not None
     assert running.error.text == BUDGET_EXCEEDED
+
+
+# A scope that is used again
+
+
+def test_programs_with_one_scope_share_neither_variables_nor_lines() -> None:
+    program, builtins = (
+        parse('def f():\ncount = 0\ncount = count + 1\nsync()\nend\n'),
+        {'sync': sync},
+    )
+    first = ScriptInterpreter(program, builtins)
+    first.step()
+    first.lines.compile('added = 2')
+    second = ScriptInterpreter(program, builtins, scope=first.scope)
+    assert second.variables == {}
+    second.step()
+    assert first.variables == second.variables == {'count': 1}
+    with pytest.raises(CompileError):
+        second.lines.compile('count = added')

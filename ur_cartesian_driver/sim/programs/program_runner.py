@@ -33,6 +33,7 @@ from ur_cartesian_driver.urscript import (
     ScriptInterpreter,
     ScriptProgram,
 )
+from ur_cartesian_driver.urscript.compiling.scopes import Scope
 
 _log = logging.getLogger(__name__)
 
@@ -124,6 +125,8 @@ class ProgramRunner:
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
         self._loaded: ScriptProgram | None = None
+        #: Of the program that was compiled last: the same one often follows.
+        self._newest_scope: Scope | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
         self.state = RuntimeState.STOPPED
@@ -211,14 +214,18 @@ class ProgramRunner:
         return ''
 
     def _compile(self, program: ScriptProgram) -> ScriptInterpreter:
-        return ScriptInterpreter(
+        known = self._newest_scope
+        interpreter = ScriptInterpreter(
             program,
             self._builtins,
             thread_delay=self._thread_delay,
             interleaving=self._interleaving,
             # In a thread of its own all of it can be done at once, and no cycle waits later.
             lazily=self.compile_aside is _compile_at_once,
+            scope=known if known is not None and known.owner is program else None,
         )
+        self._newest_scope = interpreter.scope
+        return interpreter
 
     def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:
         if self.running:

@@ -34,7 +34,7 @@ from ur_cartesian_driver.urscript.compiling.closures import (
     UNSET,
 )
 from ur_cartesian_driver.urscript.compiling.compiler import compile_program
-from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve, Scope
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.running.line_compiler import LineCompiler
 from ur_cartesian_driver.urscript.script_errors import CompileError, RuntimeException
@@ -93,6 +93,7 @@ class ScriptInterpreter:
     :param interleaving: draws where threads are switched; None = only where one takes time.
     :param lazily: compile each function when it is called for the first time: much sooner ready,
         but a cycle with such a call takes longer.
+    :param scope: what an earlier interpreter of the same program and builtins has resolved.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -106,6 +107,7 @@ class ScriptInterpreter:
         thread_delay: int = 0,
         interleaving: Random | None = None,
         lazily: bool = False,
+        scope: Scope | None = None,
     ) -> None:
         #: Called with the id of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
@@ -124,11 +126,11 @@ class ScriptInterpreter:
         self._current: _Thread | None = None
         self._halted = False
         try:
-            scope = resolve(program, builtins)
-            self._global_names = scope.globals
-            self.globals: list[Any] = [UNSET] * len(scope.globals)
+            #: The resolved names of the program, which nothing changes.
+            self.scope = resolve(program, builtins) if scope is None else scope
+            self.globals: list[Any] = [UNSET] * len(self.scope.globals)
             procedures: dict[int, CompiledFunction] = {}
-            main = compile_program(scope, builtins, self, procedures, lazily=lazily)
+            main = compile_program(self.scope, builtins, self, procedures, lazily=lazily)
         except RecursionError:
             text = f'syntax_error_on_line:{program.line}:{program.name}:'
             reason = 'the program is nested too deeply'
@@ -138,7 +140,7 @@ class ScriptInterpreter:
         #: Number of threads started so far; the next one gets this number.
         self.threads_started = 1
         #: Compiles lines for the running program.
-        self.lines = LineCompiler(scope, procedures, builtins, self)
+        self.lines = LineCompiler(self.scope, procedures, builtins, self)
 
     @property
     def running(self) -> bool:
@@ -174,7 +176,7 @@ class ScriptInterpreter:
     @property
     def variables(self) -> dict[str, Value]:
         """The global variables that have a value."""
-        named = ((name, self.globals[slot]) for name, slot in self._global_names.items())
+        named = ((name, self.globals[slot]) for name, slot in self.scope.globals.items())
         return {name: value for name, value in named if value is not UNSET}
 
     def step(self) -> None:
