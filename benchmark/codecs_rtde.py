@@ -11,7 +11,7 @@ from figures import Figure, seconds_each
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
-from ur_cartesian_driver.robot.rtde.state_recipe import robot_state_from_rtde, STATE_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import robot_state_from_rtde, STATE_FIELDS
 
 NAME = 'RTDE, per package of the driver'
 

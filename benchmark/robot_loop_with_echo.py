@@ -27,7 +27,7 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
-from ur_cartesian_driver.robot.rtde.state_recipe import robot_state_from_rtde, STATE_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import robot_state_from_rtde, STATE_FIELDS
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: Environment variable with the port to connect to.

@@ -47,7 +47,7 @@ from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
-from ur_cartesian_driver.robot.rtde.state_recipe import STATE_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import STATE_FIELDS
 from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 

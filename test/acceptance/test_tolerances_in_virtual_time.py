@@ -26,7 +26,7 @@ from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, Traject
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
-from ur_cartesian_driver.robot.rtde.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import OPTIONAL_FIELDS, REQUIRED_FIELDS
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The state that the robot reports, and the names of its modes."""
+"""The table of what the robot reports by RTDE, and the names of its modes."""
 
 from __future__ import annotations
 

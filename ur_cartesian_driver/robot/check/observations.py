@@ -28,7 +28,7 @@ from ur_cartesian_driver.robot.check.rtde_observations import (
     observe_rtde,
 )
 from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
-from ur_cartesian_driver.robot.rtde.state_recipe import STATE_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import STATE_FIELDS
 from ur_cartesian_driver.robot.services.dashboard_connection import (
     DashboardConnection,
     POLYSCOPE_X,

@@ -25,7 +25,7 @@ from ur_cartesian_driver.robot.check.finding import (
 )
 from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
-from ur_cartesian_driver.robot.rtde.state_recipe import REQUIRED_FIELDS
+from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 
 #: Software that the robot program needs: sums of lists came with it.
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}

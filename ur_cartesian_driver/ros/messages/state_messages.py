@@ -1,6 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of the state topics."""
+"""
+Messages of the state topics.
+
+Fields of ``DriverStatus`` that are named as in
+:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` are filled without a line here.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.state.robot_state import (
     STATE_TABLE,
 )
 from ur_cartesian_driver.protocol.program import registers
-from ur_cartesian_driver.robot.rtde.state_recipe import (
+from ur_cartesian_driver.robot.rtde.state_decoding import (
     in_recipe_order,
     REQUIRED_FIELDS,
     robot_state_from_rtde,

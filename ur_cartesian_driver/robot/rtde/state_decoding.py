@@ -1,10 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The RTDE recipe of a robot state, and its packets.
+Decodes the RTDE packets of the robot state.
 
-Both follow from the table of the state. What does not change from packet to packet is worked out
-once: 500 come in a second, and a CANCEL may wait behind each.
+Which outputs there are, and the fields that they become, stands in
+:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState`; nothing of it is repeated here.
+All that is the same in every packet is prepared once: 500 come in a second, and a CANCEL may wait
+behind each.
 """
 
 from __future__ import annotations
