@@ -11,10 +11,12 @@ encoders) are zero or have the plausible values of :data:`FIXED`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from math import hypot
 from types import MappingProxyType
 from typing import Any
 
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale, Vector3, Vector6, ZERO6
 from ur_cartesian_driver.motion.state.robot_state import RobotMode
@@ -55,11 +57,19 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
     motion = controller.motion
     if not any(motion.qd) and not any(motion.qdd):
         return ZERO6  # most arms stand most of the time
-    frames = controller.arm.frames(motion.q)
-    tcp = point_motion(
-        frames, motion.qd, motion.qdd, flange_point(frames, motion.T_flange_tcp.position)
+    return _point_acceleration(
+        controller.arm, motion.q, motion.qd, motion.qdd, motion.T_flange_tcp.position
     )
-    return (*tcp.acceleration, *tcp.angular_acceleration)
+
+
+@lru_cache(maxsize=1)  # target and actual acceleration, to each client: the same in a cycle
+def _point_acceleration(
+    arm: Arm, q: Vector6, qd: Vector6, qdd: Vector6, offset: Vector3
+) -> Vector6:
+    """Return the acceleration of a point given in flange coordinates [m/s^2, rad/s^2]."""
+    frames = arm.frames(q)
+    point = point_motion(frames, qd, qdd, flange_point(frames, offset))
+    return (*point.acceleration, *point.angular_acceleration)
 
 
 def _payload_moments(controller: Controller) -> Vector6:
