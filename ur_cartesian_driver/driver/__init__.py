@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ['ConnectionState', 'ConnectionStatus', 'Driver', 'DriverConfig', 'MotionHandle']
 
-# The robot process imports packages in here, too, and needs no planner.
+# The robot process imports packages from here, too, and needs no planner.
 __getattr__ = lazy_names(
     __name__,
     {

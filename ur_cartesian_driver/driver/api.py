@@ -3,7 +3,7 @@
 """
 The Python API: plan, execute and stop motions of one robot, with no ROS running.
 
-A :class:`Driver` plans in the process of its owner. A robot loop, a process or thread of its own,
+A :class:`Driver` plans in the process of its owner. A robot loop, in its own process or thread,
 holds all sockets to the robot; the driver sends it requests and gets notifications back
 (:mod:`~.ipc.channel`).
 """
@@ -83,7 +83,7 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, Serv
 NO_STATE = 'The robot does not report its state.'
 LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
 
-#: How long a cancelled motion may need to its outcome [s], whatever the robot does.
+#: How long a cancelled motion may take to get its outcome [s], whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
 
 
@@ -132,7 +132,7 @@ class Driver(RobotServices, InteractiveMotions):
         )
         self._send = self._loop.send
         self._running = RunningMotions(self._loop)
-        #: Whether a loop that replaces another one may upload the robot program.
+        #: Whether a loop that replaces a lost one may upload the robot program.
         self._may_upload = True
 
     def __enter__(self) -> Driver:
@@ -233,7 +233,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Wait until a goal can run; the driver connects, and reconnects, by itself.
 
-        :raises RobotNotReady: not within ``timeout`` [s]; the text names the next step.
+        :raises RobotNotReady: no goal can run in time (``timeout`` [s]); the text names the next
+            step.
         """
         if not self._robot.ready.wait(timeout):
             raise RobotNotReady(self.status.not_ready())
@@ -246,8 +247,8 @@ class Driver(RobotServices, InteractiveMotions):
 
         ``plan(goal).show()`` opens a page with the arm on its path.
 
-        :param goal: or a path: its frames are resolved now, and the arm has to stand at its start
-            unless its first motion is a joint motion; or a goal in joint space.
+        :param goal: a goal, in Cartesian or joint space, or a path. The frames of a path are
+            resolved now; the arm has to be at its start unless it begins with a joint motion.
         :raises GoalRefused: the text says why; :exc:`RobotNotReady` without a robot state.
         """
         state = self._require(self.rest_state)
@@ -265,8 +266,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Execute a plan and return at once.
 
-        :raises RobotNotReady: the robot program is not connected, or a motion is running; or the
-            plan was made for another program.
+        :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
+            was made for another program.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.older_program != self.config.dialect.older_program:
@@ -306,7 +307,7 @@ class Driver(RobotServices, InteractiveMotions):
             return Outcome(code=refusal.code, text=str(refusal))
         try:
             return motion.result(timeout)
-        except BaseException:  # also Ctrl-C: nobody waits for this motion any more
+        except BaseException:  # also Ctrl-C: the caller no longer waits for this motion
             motion.cancel()
             with contextlib.suppress(TimeoutError):
                 motion.result(CANCEL_TIMEOUT)  # so that the next goal finds the arm free
@@ -317,8 +318,8 @@ class Driver(RobotServices, InteractiveMotions):
         Stop the running motion for another one, and wait until it ends as PREEMPTED.
 
         :param by: the other motion, as part of the sentence of the outcome.
-        :returns: whether a motion ran; then plans made before its end have to be made again.
-        :raises RobotNotReady: it cannot be preempted now and goes on, or it did not end.
+        :returns: whether a motion ran; if so, plans made before its end have to be made again.
+        :raises RobotNotReady: the motion cannot be preempted now and goes on, or it did not end.
         """
         motions = self._running.handles
         if motions:
@@ -362,7 +363,7 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Start a call and return at once; the future always gets an answer, never an error.
 
-        :raises LocalProtocolError: it is no call.
+        :raises LocalProtocolError: the argument is not a :class:`ServiceCall`.
         """
         if not isinstance(call, ServiceCall):
             raise LocalProtocolError(f'{call!r:.60} is no service call.')
@@ -379,7 +380,7 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Return the goal of a path for the robot in a state.
 
-        :raises InvalidGoal: a frame is not known, or the arm does not stand at the start.
+        :raises InvalidGoal: a frame is not known, or the arm is not at the start of the path.
         """
         snapshot = ArmSnapshot.of(state)
         goal = path.goal(self.frames, snapshot)
@@ -426,7 +427,7 @@ class Driver(RobotServices, InteractiveMotions):
         Have the robot loop start a motion.
 
         :raises RobotNotReady: the robot is not ready, or another motion runs.
-        :raises LocalProtocolError: something of the motion cannot be sent to another process.
+        :raises LocalProtocolError: a part of the motion cannot be sent to another process.
         """
         number = next(self._running.numbers)
         request = StartMotion(
@@ -448,7 +449,7 @@ class Driver(RobotServices, InteractiveMotions):
         return active.motion
 
     def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
-        """Return what plans and offers the points that are appended to a goal."""
+        """Return the appender, which plans and offers the points appended to a goal."""
 
         def planning_inputs() -> tuple[Arm, PlanningOptions]:
             return self.arm, self._options_for(self._require(self.state))
@@ -483,7 +484,7 @@ class Driver(RobotServices, InteractiveMotions):
     # ---- from the robot loop ------------------------------------------------------------------
 
     def _on_loop_lost(self) -> None:
-        # A program that somebody stopped stays stopped.
+        # If somebody has stopped the program, it stays stopped.
         self._may_upload = self.status.program_running
         self._robot.set_status(
             ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST))

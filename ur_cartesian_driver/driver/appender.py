@@ -3,9 +3,9 @@
 """
 Append points to an open goal while it runs (keep_open).
 
-Points are planned here, in the thread that appends them, and offered to the robot loop. It takes
-all of them or none, because it alone knows whether the ending was sent meanwhile. If it was, they
-are planned again, from rest.
+Points are planned here, in the thread that appends them, and offered to the robot loop. The loop
+accepts all of them or none, because it alone knows whether the ending was sent meanwhile. If the
+ending was sent, the points are planned again, from rest.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ur_cartesian_driver.planning.append.replaced_tail import (
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_plan
 
-#: How long the robot loop may take to answer [s]; the arm is stopped when it hangs for so long.
+#: How long the robot loop may take to answer [s]; the arm is stopped if the loop hangs this long.
 ANSWER_TIMEOUT = 5.0
 #: How many points may be ahead of the arm, as a multiple of ``max_points``.
 MESSAGES_AHEAD = 2
@@ -46,7 +46,7 @@ MESSAGES_AHEAD = 2
 class AppendResult:
     """The result of an append."""
 
-    #: How many points the goal has now, and the number of the first of the new ones.
+    #: How many points the goal has now, and the number of the first new point.
     points: int
     first: int
     #: A sentence for people.
@@ -86,8 +86,8 @@ class Appender:
         """
         Prepare.
 
-        :param planning_inputs: returns arm and options as they are now.
-        :param progress: the newest report of the motion.
+        :param planning_inputs: returns the present arm and options.
+        :param progress: returns the newest report of the motion.
         :param timeout: how long to wait for an answer [s].
         """
         self._timeout = timeout
@@ -95,12 +95,12 @@ class Appender:
         self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
         self._goal: AppendableGoal = opened.next_goal
         self._is_open = True
-        # One request after the other: each begins where the one before ends.
+        # One request after the other: each begins where the previous one ends.
         self._append_lock = threading.Lock()
-        # Guards what follows.
+        # Guards the attributes below.
         self._lock = threading.Lock()
         self._pending_answers: dict[int, Future[AnswerAppend]] = {}
-        #: Why nothing can be appended any more; empty = points can be appended.
+        #: Why nothing can be appended any more; empty = more points are possible.
         self._ended = ''
         self._numbers = itertools.count(1)
 
@@ -111,9 +111,9 @@ class Appender:
 
     def append(self, new_points: AppendedPoints) -> AppendResult:
         """
-        Plan points and have all or none of them taken; takes as long as planning does.
+        Plan points and have all or none of them accepted; takes as long as planning does.
 
-        :raises GoalRefused: they are not taken, and the goal is as it was.
+        :raises GoalRefused: the points are not accepted, and the goal stays as it was.
         """
         with self._append_lock:
             offers = self.offers(new_points)
@@ -129,9 +129,9 @@ class Appender:
         """
         Yield the offers to the robot loop, one by one.
 
-        Send each offer, and send its answer into the generator.
+        The caller sends each offer to the loop, and sends the answer into the generator.
 
-        :raises GoalRefused: as of :meth:`append`.
+        :raises GoalRefused: as in :meth:`append`.
         """
         try:
             new_points = with_declared_types(new_points, AppendedPoints, 'append').in_rows()
@@ -183,19 +183,19 @@ class Appender:
         """
         Return the goal without the points that the arm has passed.
 
-        :raises GoalRefused: that is what is to be replaced, or there is no such point or time.
+        :raises GoalRefused: the points to replace were passed, or do not exist.
         """
         progress = self._progress()
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # Records under way to the arm are final too.
+                # Motion that was already sent towards the arm is final too.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal
 
     def _is_at_rest(self) -> bool:
-        """Tell whether the arm surely rests behind all points of the goal."""
+        """Return whether the arm surely rests after all points of the goal."""
         progress = self._progress()
         return (
             progress is not None
@@ -243,7 +243,7 @@ class Appender:
             self._send(offer)
             return future.result(self._timeout)
         except TimeoutError:
-            # It may have taken them all the same, so it is unknown where more would begin.
+            # The loop may have accepted the points, so it is unknown where more would begin.
             self._ended = 'The robot loop did not answer: nothing can be appended any more.'
             return AnswerAppend(number=number, refusal=self._ended)
         finally:
@@ -253,14 +253,14 @@ class Appender:
     # ---- called by the driver -----------------------------------------------------------------
 
     def answer(self, answer: AnswerAppend) -> None:
-        """Take the answer of the robot loop."""
+        """Pass the answer of the robot loop to the append that waits for it."""
         with self._lock:
             future = self._pending_answers.get(answer.number)
         if future is not None:
             future.set_result(answer)
 
     def end(self) -> None:
-        """End with the motion; pending appends are refused."""
+        """End, because the motion has ended; pending appends are refused."""
         with self._lock:
             self._ended = 'The goal has ended.'
             pending, self._pending_answers = self._pending_answers, {}
@@ -273,7 +273,7 @@ def _from_rest(timed: bool) -> str:
     """
     Return the sentence about points that continue from rest.
 
-    It does not say how much later: the arm may have waited, and may still wait.
+    The sentence does not say how much later: the arm may have waited, and may still wait.
     """
     clause = ', later than their times say' if timed else ''
     return f' The motion had come to rest before them, and goes on from there{clause}.'

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls user code from a thread of the driver."""
+"""Call user code from a thread of the driver."""
 
 from __future__ import annotations
 

@@ -3,8 +3,8 @@
 """
 Live sessions and freedrive, as methods of a driver.
 
-Both are motions as a goal's: there is one at a time, it is cancelled in the same way, and
-it has one outcome. Only where it goes is decided while it runs.
+Both are motions like those of goals: only one runs at a time, it is cancelled in the same way, and
+it has one outcome. Only its path is decided while it runs.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ UNIT_TOLERANCE = 1e-3
 
 
 class LiveSession:
-    """A live session that runs."""
+    """A running live session."""
 
     def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
         """Wrap a motion; :meth:`~.api.Driver.start_live_session` returns sessions."""
-        #: To wait for its end, or to cancel it.
+        #: The session's motion, to wait for its end or to cancel it.
         self.motion = motion
         self._send = send
 
@@ -52,15 +52,15 @@ class LiveSession:
         """
         Go to another target from now on; ignored by a session that has ended.
 
-        :param T_base_tcp: where the active TCP is to be, in the robot's base.
-        :param age: how long ago that was true [s].
-        :raises InvalidGoal: the target is malformed, or too far away; the one before stays.
+        :param T_base_tcp: the pose that the active TCP should reach, in the robot's base.
+        :param age: how old the target is [s].
+        :raises InvalidGoal: the target is malformed, or too far away; the previous target stays.
         """
         self._send(self.motion.number, T_base_tcp, age)
 
 
 class InteractiveMotions(ABC):
-    """Motions that are led while they run."""
+    """Motions that are steered while they run."""
 
     config: DriverConfig
     options: PlanningOptions
@@ -90,19 +90,19 @@ class InteractiveMotions(ABC):
 
     @abstractmethod
     def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
-        """Check a target, and send it to a session."""
+        """Check a target, and send it to the session with this number."""
 
     def start_live_session(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
         """
-        Go to a target, and to others that are sent while the arm moves; return at once.
+        Go to a target, and to further targets sent while the arm moves; return at once.
 
         The tool goes straight, with bounded speed and acceleration (``live_target_*`` of the
         options), to the newest target that is not too old.
 
-        :param T_base_tcp: where the active TCP is to be, in the robot's base.
-        :param age: how long ago that was true [s].
+        :param T_base_tcp: the pose that the active TCP should reach, in the robot's base.
+        :param age: how old the target is [s].
         :raises InvalidGoal: the target is malformed, or too far away.
-        :raises RobotNotReady: the robot cannot take a motion now, or one is running.
+        :raises RobotNotReady: the robot cannot accept a motion now, or one is running.
         """
         state = self._state_for('follow live targets')
         T_base_tcp, age = plain_target(T_base_tcp, age)
@@ -118,10 +118,10 @@ class InteractiveMotions(ABC):
 
     def send_live_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> MotionHandle:
         """
-        Go to a target: the next one of the session that runs, or the first of a new one.
+        Go to a target: the next one of the running session, or the first one of a new session.
 
         :returns: the session, as a motion; it ends ``live_target_timeout`` after the last target.
-        :raises GoalRefused: as of :meth:`start_live_session`.
+        :raises GoalRefused: as in :meth:`start_live_session`.
         """
         if self._live is None or self._live.motion.done():
             return self.start_live_session(T_base_tcp, age=age).motion
@@ -130,12 +130,12 @@ class InteractiveMotions(ABC):
 
     def start_freedrive(self, on_active: Callable[[], None] = lambda: None) -> MotionHandle:
         """
-        Let a person guide the arm by hand, until the returned motion is cancelled.
+        Start freedrive: a person can guide the arm by hand until the returned motion is cancelled.
 
         Needs ``allow_freedrive`` in the configuration with which the robot program was started.
 
-        :param on_active: called from when the arm can be guided, again and again.
-        :raises RobotNotReady: it is not allowed, or another motion runs.
+        :param on_active: called repeatedly, as soon as the arm can be guided.
+        :raises RobotNotReady: freedrive is not allowed, or another motion runs.
         """
         state = self._state_for('enter freedrive')
         if not self.config.allow_freedrive:
@@ -150,14 +150,14 @@ class InteractiveMotions(ABC):
 
     @property
     def is_freedrive_active(self) -> bool:
-        """Tell whether freedrive is active."""
+        """Return whether freedrive is active."""
         return self._freedrive is not None and not self._freedrive.done()
 
     def _state_for(self, what: str) -> RobotState:
         """
         Return the newest state.
 
-        :raises RobotNotReady: there is none, or the robot program lacks the function.
+        :raises RobotNotReady: there is no state, or the robot program lacks the function.
         """
         if not self.config.runs_own_program:
             raise RobotNotReady(
@@ -173,7 +173,7 @@ def check_pose(pose: Pose) -> None:
     """
     Refuse a malformed pose.
 
-    :raises InvalidGoal: a number is not finite, or the quaternion is not of length 1.
+    :raises InvalidGoal: a number is not finite, or the quaternion's length is not 1.
     """
     for name, values in (('position', pose.position), ('orientation', pose.quaternion)):
         if not all(map(isfinite, values)):
@@ -189,9 +189,9 @@ def check_pose(pose: Pose) -> None:
 
 def plain_target(T_base_tcp: Pose, age: float) -> tuple[Pose, float]:
     """
-    Return a target and its age [s] in plain numbers.
+    Return a target and its age [s] as plain numbers.
 
-    :raises InvalidGoal: they are none, or the age is negative or not finite.
+    :raises InvalidGoal: a value is no number, or the age is negative or not finite.
     """
     try:
         T_base_tcp = with_declared_types(T_base_tcp, Pose, 'T_base_tcp')
@@ -205,9 +205,10 @@ def plain_target(T_base_tcp: Pose, age: float) -> tuple[Pose, float]:
 
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
     """
-    Refuse a target that cannot be intended.
+    Refuse a target that must be a mistake.
 
-    :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
+    :raises InvalidGoal: the target is malformed, or farther than ``max_approach_distance`` from
+        the tool.
     """
     check_pose(T_base_tcp)
     distance = T_base_tcp.distance_to(state.actual_tcp_pose)
@@ -244,7 +245,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         ),
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
-            # Cylinders are thicker than the arm: they stop it only if they also refuse goals.
+            # The cylinders are thicker than the arm: they stop it only if they also refuse goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
         ),
@@ -279,7 +280,7 @@ def stationary_plan(state: RobotState, safe_outputs: tuple[SafeOutput, ...] = ()
 
 
 def stationary_job(plan: Plan) -> MotionJob:
-    """Return the job of such a plan: it has no records."""
+    """Return the job of a motion without a path of its own; the job has no wire records."""
     return MotionJob(
         points=1,
         reference=plan.reference,

@@ -26,7 +26,7 @@ RESTART_PAUSE = 0.5
 
 
 class LoopConnection:
-    """Thread-safe; callbacks run on a reader thread of its own."""
+    """The connection to a robot loop; thread-safe. Callbacks run on its own reader thread."""
 
     def __init__(
         self,
@@ -40,14 +40,14 @@ class LoopConnection:
         """
         Prepare; :meth:`open` starts the loop.
 
-        :param on_lost: the loop died or hangs.
-        :param reconfigure: called before another loop starts; returns its configuration.
+        :param on_lost: called when the loop has died or hangs.
+        :param reconfigure: called before another loop starts; returns that loop's configuration.
         """
         self._config, self._auto_heartbeat = config, auto_heartbeat
         self._on_notification, self._on_lost = on_notification, on_lost
         self._reconfigure = reconfigure
-        #: Guards the pipe (several threads send), opening and closing, and what callers guard
-        #: together with these.
+        #: Guards the pipe (several threads send), opening and closing, and the data that callers
+        #: have to change together with these.
         self.lock = threading.RLock()
         self.host: host.LoopHost | None = None
         self._closed = threading.Event()
@@ -55,7 +55,7 @@ class LoopConnection:
 
     @property
     def is_open(self) -> bool:
-        """Tell whether the loop runs, or is being replaced."""
+        """Return whether the loop runs, or is being replaced."""
         return self.host is not None and not self._closed.is_set()
 
     @property
@@ -70,7 +70,7 @@ class LoopConnection:
             return None
 
     def open(self) -> None:
-        """Start the loop, if it does not run."""
+        """Start the loop, if it is not running."""
         with self.lock:
             if self.host is not None:
                 return
@@ -82,7 +82,7 @@ class LoopConnection:
                 self._start_thread('driver heartbeat', self._send_heartbeats)
 
     def close(self) -> bool:
-        """End the loop and all threads; False if it did not run."""
+        """End the loop and all threads; return False if the loop was not running."""
         with self.lock:
             if self.host is None or self._closed.is_set():
                 return False
@@ -98,14 +98,14 @@ class LoopConnection:
 
     def send(self, request: Request) -> None:
         """
-        Send a request; a loop that is gone is noticed by the reader thread.
+        Send a request; if the loop is gone, the reader thread notices.
 
-        :raises LocalProtocolError: it cannot be sent to another process.
+        :raises LocalProtocolError: the request cannot be sent to another process.
         """
         self.send_packed(channel.pack(request))
 
     def send_packed(self, data: bytes) -> None:
-        """Send a request that was packed before."""
+        """Send a packed request."""
         with self.lock, contextlib.suppress(OSError):
             if self.host is not None:
                 self.host.pipe.sendall(data)
@@ -121,7 +121,7 @@ class LoopConnection:
 
     def _read(self) -> None:
         heard: host.LoopHost | None = None
-        while (running := self.host) is not None:  # None: closed by a callback of ours
+        while (running := self.host) is not None:  # None: a callback of ours has closed it
             notification = channel.receive(running.pipe)
             if notification is not None:
                 if heard is not running:
@@ -135,7 +135,7 @@ class LoopConnection:
                 self._restart()
 
     def _handle(self, notification: Notification | Request) -> None:
-        """Pass a message on; a callback that fails must not make the driver deaf."""
+        """Pass a message on; a callback that fails must not end the reader thread."""
         try:
             self._on_notification(notification)
         except Exception:
@@ -145,7 +145,7 @@ class LoopConnection:
         """
         Replace a robot loop that died or hangs.
 
-        The robot program stops the arm: its sockets are closed, or silent for too long.
+        The robot program stops the arm, because its sockets are closed or silent for too long.
         """
         LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
         self._on_lost()

@@ -74,20 +74,21 @@ class MotionHandle:
         """
         Append points to a running goal with ``keep_open``, or replace its tail.
 
-        Checks and plans them here, which takes a while: do not call it from callbacks.
+        The points are checked and planned in this call, which takes a while: do not call it from
+        callbacks.
 
-        :param waypoints: with times from the start of the goal, in its frame.
+        :param waypoints: the points, with times from the start of the goal, in the goal's frame.
         :param segments: none, or one for each point.
         :param io_commands: their waypoints are numbered from the start of the goal.
-        :param last: nothing follows, the arm comes to rest at the last point; without points: at
-            the ending that was planned, a spline behind its last point.
-        :param replace_from_point: the first point that the new ones replace, together with all
-            points behind it (SPLINE and SERVO).
-        :param replace_from_time: or the time from which on they replace the old ones [s], from
-            the start of the goal; the motion goes on from there to the first new point.
-        :raises AlreadySent: the tail to replace is final; the error says from where on points can
-            still be replaced.
-        :raises GoalRefused: none of the points was taken, and the goal goes on; the text says why.
+        :param last: no more points follow: the arm comes to rest at the last point. Without points
+            the arm comes to rest at the planned ending: for a spline, after its last point.
+        :param replace_from_point: the first point that the new points replace, together with all
+            points after it (SPLINE and SERVO).
+        :param replace_from_time: or the time from which the new points replace the old ones [s],
+            from the start of the goal; the motion goes on from there to the first new point.
+        :raises AlreadySent: the tail to replace is final; the error gives the first point and time
+            that can still be replaced.
+        :raises GoalRefused: no point was accepted, and the goal goes on; the text says why.
         """
         if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
@@ -108,12 +109,12 @@ class MotionHandle:
         """
         Displace the tool from its path from now on; ignored by a motion that has ended.
 
-        :param along: [m], in the frame of the path
-            (:mod:`~ur_cartesian_driver.motion.plan.offset_band`), as ``across`` and ``normal``;
-            bounded by ``path_offset.limits`` of the goal.
-        :param age: how long ago that was measured [s].
-        :raises InvalidGoal: the goal permits no offset, a number is none, or the age is more than
-            ``path_offset.timeout``; the offset before stays.
+        :param along: offset along the path [m]. Like ``across`` and ``normal`` it is in the frame
+            of the path (:mod:`~ur_cartesian_driver.motion.plan.offset_band`), and bounded by
+            ``path_offset.limits`` of the goal.
+        :param age: how long ago the offset was measured [s].
+        :raises InvalidGoal: the goal permits no offset, a value is not a finite number, or the age
+            is more than ``path_offset.timeout``; the previous offset stays.
         """
         if self.offset_timeout is None:
             raise InvalidGoal(
@@ -136,14 +137,14 @@ class MotionHandle:
         self._send(SetPathOffset(motion=self.number, offset=vector3(offset), age=age))
 
     def done(self) -> bool:
-        """Tell whether the outcome is there."""
+        """Return whether the outcome has arrived."""
         return self._outcome.done()
 
     def result(self, timeout: float | None = None) -> Outcome:
         """
         Wait for the outcome.
 
-        :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
+        :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
             self._make_report()  # while the arm moves
@@ -171,9 +172,9 @@ class ActiveMotion:
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress = on_progress
-        #: Guards what follows.
+        #: Guards the attributes below.
         self._lock = threading.Lock()
-        #: The plan, which a motion lets go of when its report is made; the report; the outcome.
+        #: The plan, dropped when its report is being made; the report; the outcome.
         self._plan: Plan | None = plan
         self._plan_report: tuple[str, ...] | None = None
         self._ended: Outcome | None = None
@@ -181,7 +182,7 @@ class ActiveMotion:
         self.motion = MotionHandle(number, self._outcome, send, self.make_report)
         if plan.offset_band is not None:
             self.motion.offset_timeout = plan.offset_band.timeout
-        #: The TCP that the robot has as long as this motion runs.
+        #: The TCP that the robot has while this motion runs; None = its own.
         self.temporary_tcp = (
             None
             if plan.T_flange_tcp is None
@@ -192,9 +193,10 @@ class ActiveMotion:
 
     def make_report(self) -> None:
         """
-        Make the report of the plan, unless another thread makes it: longer work than to send it.
+        Make the report of the plan, unless another thread makes it.
 
-        Who makes it gives the outcome of a motion that has ended meanwhile.
+        This takes longer than sending the plan. If the motion has ended meanwhile, the thread that
+        made the report delivers the outcome.
         """
         with self._lock:
             plan, self._plan = self._plan, None
@@ -207,13 +209,13 @@ class ActiveMotion:
             self._give(ended, report)
 
     def report(self, progress: Progress) -> None:
-        """Take a report of the robot loop."""
+        """Keep a progress report of the robot loop, and pass it on."""
         self.motion.progress = progress
         if self._on_progress is not None:
             run_callback(self._on_progress, progress)
 
     def end(self, outcome: Outcome) -> None:
-        """Give the outcome; only the first one counts."""
+        """Deliver the outcome; all but the first one are ignored."""
         if self.motion.appender is not None:
             self.motion.appender.end()
         with self._lock:

@@ -46,21 +46,21 @@ class ReportedRobot:
     def __init__(self, config: DriverConfig, options: PlanningOptions) -> None:
         """Begin disconnected, with the nominal arm."""
         self._config, self._options = config, options
-        #: Nominal until the robot has reported its calibration.
+        #: The arm's kinematics, nominal until the robot has reported its calibration.
         self.arm = Arm(robot_model(config.ur_type))
         self.status = ConnectionStatus()
         self.ready = threading.Event()
-        #: None before the first report and when the robot is lost.
+        #: Inputs and outputs; None before the first report and when the robot is lost.
         self.signals: Signals | None = None
         self.gaps = LinkGaps()
         self.status_listeners: list[Callable[[ConnectionStatus], None]] = []
         self.servo_listeners: list[Callable[[ServoReport], None]] = []
-        #: The TCP that a goal has set, until the one before is restored.
+        #: The TCP that a goal has set, until the original TCP is restored.
         self.temporary_tcp: TemporaryTcpSet | None = None
         self._has_warned_of_cell = False
 
     def take(self, notification: Notification | Request) -> None:
-        """Take a report; notifications about motions and calls are ignored."""
+        """Process a report; notifications about motions and calls are ignored."""
         match notification:
             case ServoProgress(report=report):
                 for listener in list(self.servo_listeners):
@@ -96,7 +96,7 @@ class ReportedRobot:
             run_callback(listener, status)
 
     def _update_limits(self, limits: JointLimits) -> None:
-        """Plan within the reported limits, where they are tighter, from now on."""
+        """Plan within the reported limits, if they are tighter, from now on."""
         model = robot_model(self._config.ur_type).limited_to(limits)
         self.arm = Arm(model, self.arm.geometry)
         for k in sorted(model.reported_ranges):
@@ -106,7 +106,7 @@ class ReportedRobot:
             LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
 
     def _update_geometry(self, geometry: DhTable) -> None:
-        """Plan with the calibrated kinematics from now on; warn if it is far off."""
+        """Plan with the calibrated kinematics from now on; warn if they are far off nominal."""
         model = self.arm.model
         self.arm = Arm(model, geometry)
         deviation = self.arm.max_flange_distance(Arm(model))
@@ -122,7 +122,7 @@ class ReportedRobot:
             )
 
     def _warn_of_unchecked_cell(self) -> None:
-        """Warn once of those parts of the cell that no check knows."""
+        """Warn once about the parts of the cell that no check covers."""
         unknown = [
             text
             for text, is_unknown in (

@@ -32,8 +32,8 @@ class RobotServices(ABC):
     """
     Each method waits for its answer: at most 40 s, for a recovery 120 s.
 
-    A refusal is an answer too. A value that cannot be sent raises
-    :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
+    A script may take its own timeout in addition. A refusal is an answer too. A value that cannot
+    be sent raises :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
     @abstractmethod
@@ -53,15 +53,15 @@ class RobotServices(ABC):
         return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
 
     def set_payload(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> ServiceAnswer:
-        """Set mass [kg] and centre of gravity [m] (in the flange) of the load on the flange."""
+        """Set mass [kg] and centre of gravity [m] (in the flange frame) of the load."""
         return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
-        """Take the force and torque that are measured now as zero."""
+        """Make the force and torque that are measured now the new zero."""
         return self.call(ZeroFtSensorCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
-        """Let the program of the pendant go on behind its External Control node."""
+        """Make the program of the pendant go on after its External Control node."""
         return self.call(HandBackCall()).result()
 
     def run_script(self, script: str, timeout: float = SCRIPT_TIMEOUT) -> ServiceAnswer:
@@ -85,12 +85,12 @@ class RobotServices(ABC):
         ).result()
 
     def set_speed_slider(self, fraction: float) -> ServiceAnswer:
-        """Move the speed slider, 0 (the arm stands) to 1."""
+        """Move the speed slider, 0 (the arm stands still) to 1."""
         return self.call(SetSpeedSliderCall(fraction=fraction)).result()
 
     def recover(self, *, unlock_protective_stop: bool = False) -> ServiceAnswer:
         """
-        Bring a stopped robot back to READY, as far as software may.
+        Bring a stopped robot back to READY, as far as software is allowed to.
 
         :param unlock_protective_stop: a person has looked at the cause of a protective stop and
             removed it; otherwise the stop is left to a person.

@@ -30,11 +30,11 @@ class RunningMotions:
     Motions and calls by their numbers; thread-safe.
 
     There is one motion at a time. Each motion ends with one outcome and each call with one
-    answer, whatever becomes of the loop.
+    answer, whatever happens to the loop.
     """
 
     def __init__(self, loop: LoopConnection) -> None:
-        """Begin with none."""
+        """Begin with no motions and no calls."""
         self._loop = loop
         self.numbers = itertools.count(1)
         self._motions: dict[int, ActiveMotion] = {}
@@ -44,9 +44,9 @@ class RunningMotions:
         """
         Send the request that starts a motion.
 
-        :param request: packed.
-        :param not_ready: why the robot takes no motion; '' = it does.
-        :raises RobotNotReady: for that reason, or because another motion runs.
+        :param request: the packed request.
+        :param not_ready: why the robot accepts no motion; '' = it accepts one.
+        :raises RobotNotReady: the robot accepts no motion, or another motion runs.
         """
         with self._loop.lock:
             if self._motions:
@@ -74,26 +74,26 @@ class RunningMotions:
 
     @property
     def handles(self) -> list[MotionHandle]:
-        """The motion that runs, or none."""
+        """The running motion, or an empty list."""
         with self._loop.lock:
             return [active.motion for active in self._motions.values()]
 
     def runs(self, number: int) -> bool:
-        """Tell whether a motion runs."""
+        """Return whether the motion with a number runs."""
         return number in self._motions
 
     def temporary_tcp(self, unrestored: TemporaryTcpSet | None) -> TemporaryTcpSet | None:
         """
         Return the TCP of the running motion.
 
-        :param unrestored: returned where no motion runs.
+        :param unrestored: returned if no motion runs.
         """
         with self._loop.lock:
             active = next(iter(self._motions.values()), None)
             return unrestored if active is None else active.temporary_tcp
 
     def take(self, notification: Notification | Request) -> None:
-        """Take a notification about a motion or a call; all others are ignored."""
+        """Process a notification about a motion or a call; all others are ignored."""
         match notification:
             case MotionProgress(motion=number, progress=progress):
                 if number in self._motions:

@@ -3,21 +3,21 @@
 """
 Places and sizes of the collision bodies, for each model.
 
-Sources. UR3, UR5 and UR10: the meshes in the package example-robot-data. UR3e and UR5e, also a
-UR7e: those in airo-models, whose collision meshes are convex hulls and thicker than the arm. UR10e
-to UR16e, UR20 and UR30: the shapes in the packages ir-support and ir-support-extra-robots, which
-are made for teaching; of their UR16e neither the base, which is larger than the data sheet says,
-nor the place of wrist 3 counts. Nobody packages shapes of UR15, UR18 and UR8 Long: their bodies
-are assumed. They are a UR20's, scaled by the footprints of the data sheets (204 and 245 mm), with
-10 mm more on each side, where the links meet as in the ROS 2 description package of Universal
+Sources. UR3, UR5 and UR10: the meshes in the package example-robot-data. UR3e and UR5e (also for
+the UR7e): those in airo-models, whose collision meshes are convex hulls and thicker than the arm.
+UR10e to UR16e, UR20 and UR30: the shapes in the packages ir-support and ir-support-extra-robots,
+which are made for teaching; the base of their UR16e, which is larger than in the data sheet, and
+the place of its wrist 3 are not used. No package has shapes of UR15, UR18 and UR8 Long, so their
+bodies are assumed: those of a UR20, scaled by the footprints in the data sheets (204 and 245 mm),
+with 10 mm more on each side; the links meet as in the ROS 2 description package of Universal
 Robots. Tests check that the bodies contain the meshes of the first two packages.
 
-Connectors are at +y of ``base`` in all of these shapes. UR3 and UR5 have theirs in the meshes
+In all of these shapes the connector is at +y of ``base``. The meshes of UR3 and UR5 contain it
 (ir-support draws the UR5's longer); the UR10's ends inside its base. On UR3e and UR5e the
 connector is assumed to fill a cylinder as wide as the ball that represents it in airo-models; the
-cylinder holds the cable of the drawn base as far as it is above the mounting surface. UR10e: the
-socket and the cable of the two shapes, and 15 mm for a plug. The larger models' connectors are
-assumed from it. The cable itself, which goes where it is laid, is not part of the arm.
+cylinder contains the cable of the drawn base above the mounting surface. On the UR10e it consists
+of the socket and the cable of the two shapes, and 15 mm for a plug. The connectors of the larger
+models are derived from it. The cable beyond, which can be laid anywhere, is not part of the arm.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
-#: From and to [mm] along the joint's axis, counted from the origin of its nominal DH frame, and
-#: radius [mm]. A tube whose from and to differ is a cylinder about the joint's axis, moved along
-#: the tube: the hull of two housings.
+#: Begin and end along the joint's axis, from the origin of its nominal DH frame, and radius [mm].
+#: A tube whose begin and end differ is a cylinder about the joint's axis that is swept along the
+#: tube: the hull of two housings.
 BodyRow: TypeAlias = tuple[float, float, float]
 
 

@@ -23,10 +23,8 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, N, Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-#: A float for one pose, or an array with one value per pose of a batch.
-
 # Controllers report pi/2 as 1.570796327. A table that differs from the nominal one only by such
-# rounding (less than a nanometre at the flange) counts as nominal.
+# rounding (less than a nanometre at the flange) is taken for nominal.
 _ROUNDING = 1e-9
 # Number of configurations in which two arms are compared.
 _COMPARED_SAMPLES = 500
@@ -210,9 +208,10 @@ def pose_error(
     frames: ChainFramesOf[N], position: tuple[N, N, N], rotation: tuple[N, ...]
 ) -> tuple[list[N], N]:
     """
-    Return the error of the flange: translation [m] and sine of the turn in base axes; 1 + 2 cos.
+    Return the error of the flange: translation [m] and sine of the turn, in base axes; 1 + 2 cos.
 
-    The last value is positive up to a third of a turn; beyond that the sine is misleading.
+    The cosine is that of the turn, too. The last value is positive up to a third of a turn; beyond
+    that the sine is misleading.
 
     :param rotation: of the pose, nine numbers by rows.
     """

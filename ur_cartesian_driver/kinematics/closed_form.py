@@ -8,9 +8,9 @@ plane triangle; seen from above, the wrist centre is at distance d4 from the pla
 that is parallel to the arm. This leaves two choices each for shoulder, wrist and elbow: up to
 eight solutions.
 
-All roots are of differences of squares and all angles come from atan2. This keeps full precision
-where two solutions meet (stretched arm, upright arm, wrist centre above the shoulder), where an
-arc cosine would lose half of the digits.
+All square roots are taken of differences of squares, and all angles come from atan2. This keeps
+full precision where two solutions meet (stretched arm, upright arm, wrist centre above the
+shoulder); an arc cosine would lose half of the digits there.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
 from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
 
-# A square this little below zero counts as zero [m^2]: the flange is a nanometre out of reach, as
-# happens when a robot rounds the pose of its own stretched arm.
+# A square this little below zero [m^2] is taken for zero: the flange is a nanometre out of reach,
+# as happens when a robot rounds the pose of its own stretched arm.
 FLANGE_ROUNDING = 1e-9
-# Squares below this count as a double root [m^2]: the joints differ by about a microradian.
+# A square below this [m^2] has a double root: the joints differ by about a microradian.
 MERGED_ROOTS = 1e-13
-# Sine of wrist 2 below which axes 4 and 6 are parallel and only the sum of their angles counts.
+# Sine of wrist 2 below which axes 4 and 6 are parallel: only the sum of their angles matters.
 WRIST_SINGULAR = 2e-10
-# Wrist 3 gets its angle from the pose only where s5 * d5 exceeds this many times the misfit.
+# The pose determines wrist 3 only if s5 * d5 exceeds the misfit by this factor.
 _MAX_WRIST_MISFIT = 10.0
 
 
@@ -54,8 +54,8 @@ def closed_form(
     Return every joint solution [rad], each angle within (-pi, pi].
 
     :param wrist_3: position of wrist 3 where axes 4 and 6 are parallel [rad].
-    :param misfit_factor: how many times its misfit the ideal arm may be wrong. The real arm may
-        reach poses that the ideal one does not; for these, both roots are returned as guesses.
+    :param misfit_factor: multiple of its misfit by which the ideal arm may be wrong. The real arm
+        may reach poses that the ideal one does not; for these, both roots are returned as guesses.
     """
     o1, o2, o3, o4, o5, o6 = ideal.offsets
     slack = root_slack(ideal, misfit_factor)
@@ -94,7 +94,7 @@ def wrist_centre(ideal: IdealArm, T_base_flange: Pose) -> Vector3:
 def wrist_solutions(
     ideal: IdealArm, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
 ) -> Iterator[WristSolution]:
-    """Solve for two shoulders, each with two wrists; the elbow stays open."""
+    """Yield the solutions for two shoulders, each with two wrists; the elbow is left open."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
     px, py, pz = wrist_centre(ideal, T_base_flange)
     d4, d5 = ideal.d4, ideal.d5
@@ -152,7 +152,7 @@ def _elbow_angles(
 
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:
-    """Return both roots, positive first; slack turns a slightly negative square positive."""
+    """Return both roots, positive first; slack makes a slightly negative square positive."""
     if square < -max(slack, FLANGE_ROUNDING):
         return ()
     square = max(square, 0.25 * slack)

@@ -79,7 +79,7 @@ class BranchSolution:
 
     #: (6, n) joint positions [rad], not wrapped; undefined where ``exists`` is false.
     q: Floats
-    #: (n,) whether the pose has a solution in this branch; where two branches meet, in both.
+    #: (n,) whether the pose has a solution in this branch; where two branches meet, both have one.
     exists: Flags
     #: (n,) lower bound of the distance to the other branches, modulo full turns [rad].
     separation: Floats

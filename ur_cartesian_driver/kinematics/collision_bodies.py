@@ -3,7 +3,8 @@
 """
 Collision bodies of the arm: a few cylinders per link, for many configurations at once.
 
-A preflight checks tens of thousands of configurations for collisions with itself and planes.
+A preflight checks tens of thousands of configurations for collisions of the arm with itself and
+with planes.
 Cylinders allow this in numpy for every model. They contain the true shape: if they do not collide,
 the arm does not. If they do, the arm may still be free; :mod:`~.collision_meshes` decides exactly
 for the models that have meshes.
@@ -12,9 +13,10 @@ All joint housings are cylinders about their own joint's axis, and all tubes run
 So each end of a body is a point on an axis, and calibrated arms use the same table. The connector
 of the robot cable lies along y of ``base``, towards +y.
 
-The distance of two cylinders is at least their separation along any direction. The one between
-the nearest points of their axes, each shortened by :data:`_CUT` radii at both ends, gives a bound
-in closed form: the distance of these points less what each cylinder reaches beyond its own.
+The distance of two cylinders is at least their separation along any direction. Shorten both axes
+by :data:`_CUT` radii at both ends, to skeletons. The direction between the nearest points of the
+skeletons gives a bound in closed form: the distance of these points, less the length by which each
+cylinder reaches beyond its skeleton in this direction.
 """
 
 from __future__ import annotations
@@ -52,8 +54,8 @@ class Link(IntEnum):
         return self.name.lower().replace('_', ' ')
 
 
-#: What a body is: a housing about a joint's axis, a tube from a joint's axis to the next one, or
-#: the connector, along y of ``base``.
+#: The kinds of bodies: a housing about a joint's axis, a tube from a joint's axis to the next one,
+#: or the connector, along y of ``base``.
 _Kind: TypeAlias = Literal['housing', 'tube', 'connector']
 
 #: The bodies of every arm, and the joint that each of them belongs to, from 0.
@@ -76,15 +78,17 @@ _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
     (Link.WRIST_3, 'housing', 5),
 )
 
-# Of a cylinder's radius: with it, the bound is tightest on average.
+# Fraction of the radius by which the axis of a cylinder is shortened: with this one, the bound is
+# tightest on average.
 _CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 2048
-# Of so many rows that lie close together the middle one says how near the others may be.
+# The middle one of this many rows that lie close together bounds the distances of the others.
 # Calibration makes no arm longer than its model by more than the slack [m].
 _STRIDE = 16
 _REACH_SLACK = 0.02
-# Segments count as parallel below this squared sine of their angle: error 1e-6 of a length.
+# Below this squared sine of their angle, segments are taken for parallel: an error of 1e-6 of a
+# length.
 _PARALLEL = 1e-12
 _TINY = 1e-300
 
@@ -92,7 +96,7 @@ _TINY = 1e-300
 #: are pairs that cannot collide, which the tests show with the meshes: forearm and wrist 2 (wrist
 #: 3 collides first), wrist 1 and wrist 3 (d5 apart), wrist 2 and tool (the tool turns about the
 #: axis of wrist 3, and would have to pass through it). The upper arm turns past the round part of
-#: the base, so for it only the connector of the base counts.
+#: the base, so it is checked only against the connector of the base.
 PAIRS: tuple[tuple[Link, Link], ...] = tuple(
     (a, b)
     for a in Link
@@ -105,9 +109,9 @@ PAIRS: tuple[tuple[Link, Link], ...] = tuple(
         (Link.WRIST_2, Link.TOOL),
     )
 )
-#: The pair in which only the connector of the base counts.
+#: The pair in which only the connector of the base is checked.
 CONNECTOR_PAIR = (Link.BASE, Link.UPPER_ARM)
-#: The place of the connector among the bodies.
+#: The index of the connector among the bodies.
 CONNECTOR = 1
 
 
@@ -119,8 +123,8 @@ class _LinkBody:
     Axes 0..5 are the joint axes, 6 is the middle line of the connector, 7 the line from flange to
     TCP.
 
-    :param across: half the length [m] of a cylinder about the axis of its start, along which it
-        moves to its end; 0 = the cylinder is about the line from start to end.
+    :param across: half the length [m] of a cylinder about the axis of its start that is swept from
+        start to end; 0 = the cylinder is about the line from start to end.
     """
 
     link: Link
@@ -155,12 +159,12 @@ class CollisionBodies:
         self.links = tuple(body.link for body in bodies)
         self.radii = np.array([body.radius for body in bodies])
         start, end = self.cylinder_ends(np.zeros((1, 6)))[0].transpose(1, 0, 2)
-        # Columns, a row for each cylinder: half the length of those that move across their axis,
+        # In columns, with a row for each cylinder: half the length of the swept cylinders [m],
         across = np.array([[body.across] for body in bodies])
         self._moves = across > 0.0
         self._radii = self.radii[:, None]
         self._lengths = np.linalg.norm(end - start, axis=1, keepdims=True)
-        # and by how much the skeleton of the others is shorter at either end [m].
+        # and the lengths that are cut from either end of the skeletons of the others [m].
         insets = np.minimum(_CUT * self._radii, 0.5 * self._lengths)
         self._insets = np.where(self._moves, across, insets)
         self._cuts = np.where(self._moves, 0.0, insets)
@@ -179,8 +183,8 @@ class CollisionBodies:
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
         :param q: (n, 6) [rad]; faster with ``enough`` if rows that follow each other are close.
-        :param enough: where a distance is neither less than this [m] nor the smallest of all,
-            another lower bound may stand for it, which is no less than both.
+        :param enough: a distance that is neither less than this [m] nor the smallest of all may be
+            replaced by a coarser lower bound, which is no less than either.
         :returns: (n, pairs) separation of their cylinders [m]; negative where these may overlap.
         """
         every = np.ones(len(self.pairs), dtype=np.bool_)
@@ -213,7 +217,7 @@ class CollisionBodies:
         return result
 
     def _nearest(self, skeletons: _Skeletons, first: slice, second: slice) -> Floats:
-        """Return the smallest distance (n,) of some bodies from some others."""
+        """Return the smallest distance (n,) between two groups of bodies."""
         one, other = (first, None), (None, second)
         start, vector, axis = skeletons
         gap = segment_gap(start[:, *one], vector[:, *one], start[:, *other], vector[:, *other])
@@ -226,13 +230,13 @@ class CollisionBodies:
 
     def _reaches(self, bodies: Sequence[_LinkBody]) -> Floats:
         """
-        Return how far a turn of each joint moves one link of each pair towards the other.
+        Return how far a turn of each joint can move one link of each pair towards the other.
 
         :returns: (6, pairs) [m/rad]: the largest distance of the second link from the joint, for
             the joints between the two.
         """
         g = self.arm.model.geometry
-        # Of the origins of the joints' frames, and of the flange, along the arm.
+        # Distances along the arm to the origins of the joint frames, and to the flange.
         along = np.append(0.0, np.cumsum(np.hypot(g.a, g.d)))
         ends = [
             (body.link, axis, abs(s) + hypot(body.radius, body.across))
@@ -282,7 +286,7 @@ class CollisionBodies:
         """
         Yield link, start and end [m] and radius [m] of cylinders to draw, all joints at 0.
 
-        One that moves across its axis is drawn at both ends, and as a tube between them.
+        A swept cylinder is drawn at both ends, and as a tube between them.
         """
         halves = self._insets * self._skeletons(self._lines(np.zeros((1, 6))))[2][:, :, 0].T
         for k, (start, end) in enumerate(self.cylinder_ends(np.zeros((1, 6)))[0]):
@@ -344,7 +348,7 @@ def segment_gap(start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Fl
     r = start_1 - start_2
     a, e = _dot(vector_1, vector_1), _dot(vector_2, vector_2)
     b, c, f = _dot(vector_1, vector_2), _dot(vector_1, r), _dot(vector_2, r)
-    # Of parallel segments any s will do to begin with.
+    # For parallel segments any s will do to begin with.
     s = (b * f - c * e) / np.maximum(a * e - b * b, _PARALLEL * a * e + _TINY)
     np.clip(s, 0.0, 1.0, out=s)
     t = np.clip((b * s + f) / np.maximum(e, _TINY), 0.0, 1.0)
@@ -379,7 +383,7 @@ def _ends_on_axes(arm: Arm, bodies: list[_LinkBody]) -> tuple[Indices, Floats]:
 
     The origin of a calibrated DH frame can lie anywhere on its axis, hundreds of metres away
     where axes are nearly parallel. With all joints at 0 the true axis is close to the nominal
-    one, so distances count from the projection of the nominal origin onto the true axis.
+    one, so distances are from the projection of the nominal origin onto the true axis.
     """
     ends = [[body.start for body in bodies], [body.end for body in bodies]]
     index = np.array([[axis for axis, _ in row] for row in ends], dtype=np.intp)

@@ -58,12 +58,12 @@ class CollisionMeshes:
         """
         Load the meshes and attach them to the joints.
 
-        :raises ValueError: the model has none.
+        :raises ValueError: the model has no meshes.
         :raises ImportError: pinocchio is not installed.
         :raises FileNotFoundError: the package with the meshes is not installed.
         """
         shapes = link_meshes(arm.model.name, 'collision')
-        # The meshes are simplified [m].
+        # By how much the simplified meshes may be too small [m].
         self._tolerance = mesh_tolerance(arm.model.name)
         self._model = pinocchio_model(arm)
         import pinocchio
@@ -137,9 +137,9 @@ class CollisionMeshes:
         self, bound: float, pair: tuple[Link, Link], q: Floats
     ) -> tuple[Flags, Floats]:
         """
-        Return where two links are nearer than a bound [m]; several times faster than distances.
+        Return whether two links are nearer than a bound [m]; far faster than :meth:`distances`.
 
-        :returns: (n,) whether they are, and (n,) a lower bound of the distance if not [m].
+        :returns: (n,) whether they are, and (n,) a lower bound of the distance [m] if not.
         """
         indices = self._pairs[pair]
         for index in indices:
@@ -152,7 +152,7 @@ class CollisionMeshes:
                 self._pinocchio.computeCollision(self._geometry, self._placement, index)
                 for index in indices
             )
-            # Pinocchio counts it from the security margin.
+            # Pinocchio measures this lower bound from the security margin.
             found = (self._placement.collisionResults[index] for index in indices)
             lower_bounds[row] = bound + max(0.0, min(each.distance_lower_bound for each in found))
         return near, lower_bounds
@@ -164,7 +164,7 @@ class CollisionMeshes:
 
 
 def _solid(shape: LinkShape) -> Any:
-    """Return a shape as one that pinocchio measures with."""
+    """Return a shape as an object with which pinocchio measures."""
     if shape.mesh is None:
         return _coal().Cylinder(shape.radius, shape.length)
     return _mesh(str(shape.mesh))
@@ -172,12 +172,12 @@ def _solid(shape: LinkShape) -> Any:
 
 @lru_cache
 def _mesh(file: str) -> Any:
-    """Return the tree of a mesh's triangles."""
+    """Return the tree of the triangles of a mesh."""
     return _coal().MeshLoader().load(file, np.ones(3))
 
 
 def _coal() -> Any:
-    """Return the module of the shapes, which has an older name where pinocchio is older."""
+    """Return the module of pinocchio's shapes, which has another name in older versions."""
     try:
         import coal
     except ImportError:

@@ -31,11 +31,11 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 # Rounding by which a position may exceed its limit [rad].
 _LIMIT_ROUNDING = 1e-9
 
-# How many times its misfit (an RMS value) the ideal arm may be wrong. The second factor is tried
-# if the first finds no solution, which happens where two singularities meet.
+# Multiples of its misfit (an RMS value) by which the ideal arm may be wrong. The second factor is
+# tried if the first finds no solution, which happens where two singularities meet.
 MISFIT_FACTORS = (3.0, 30.0)
 
-# Newton: squared error (metres and radians) that counts as exact, maximum number of steps, number
+# Newton: squared error (metres and radians) that is exact enough, maximum number of steps, number
 # of steps that may fail to halve the squared error, and largest joint step [rad].
 _EXACT = 1e-24
 _MAX_STEPS = 40
@@ -50,18 +50,18 @@ _NEARLY_SINGULAR = 0.05
 _NEARLY_STRAIGHT = 0.1
 _MAX_TWIN_DISTANCE = 0.6
 _DIFFERENCE = 1e-4
-# Two refined solutions closer than this are the same [rad].
+# Two refined solutions closer than this [rad] are the same.
 _SAME = 1e-5
-# A seed whose pose is this near to the goal pose is one more start [m, rad].
+# A seed whose pose is this near [m, rad] to the goal pose is one more start.
 _NEAR_POSE = 0.1
 # If a solution is this near to the seed [rad], the search ends.
 _CLOSE_TO_SEED = 0.02
-# A start farther from the seed than the best refined solution plus this is skipped [rad]:
-# refinement moves a start by a few hundredths, unless the arm is singular there.
+# A start is skipped if it is farther from the seed than the best refined solution, by more than
+# this [rad]: refinement moves a start by a few hundredths, unless the arm is singular there.
 _PRUNING_MARGIN = 0.5
 
-# Solutions this close in the named joints count as equally near [rad]: branches that agree in a
-# joint of the ideal arm differ by a few milliradians in that joint of a calibrated one.
+# Solutions this close in the named joints [rad] are equally near: branches that agree in a joint
+# of the ideal arm differ by a few milliradians in that joint of a calibrated one.
 _EQUALLY_NEAR = 0.01
 
 
@@ -92,7 +92,7 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     """
     Return the solution nearest to ``q_near`` [rad] within the limits, or None.
 
-    It searches all branches and full turns; the distance is Euclidean in joint space.
+    All branches and full turns are searched; the distance is Euclidean in joint space.
     """
     best = None
     for misfit_factor in MISFIT_FACTORS if arm.calibrated else (0.0,):
@@ -102,7 +102,7 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
             break
     is_close = best is not None and dist(best, q_near) < _CLOSE_TO_SEED
     if arm.calibrated and not is_close:
-        # Near a singularity the starts may have missed the one that is next to q_near.
+        # Near a singularity the starts may have missed the solution that is next to q_near.
         more = [] if best is None else _twins(arm, best)
         if _is_near(arm.forward(q_near), T_base_flange):
             more.append(q_near)
@@ -118,8 +118,8 @@ def nearest_to_posture(
     """
     Return the solution nearest to a partial posture, or None.
 
-    Of the solutions within the limits it takes those nearest in the named joints (within 0.01
-    rad), and of these the one nearest to ``q_before``. Full turns count in both distances.
+    Of the solutions within the limits, those nearest in the named joints (within 0.01 rad) are
+    chosen, and of these the one nearest to ``q_before``. Both distances include full turns.
 
     :param named: preferred positions [rad] by joint index.
     :param q_before: the previous configuration [rad].
@@ -141,7 +141,7 @@ def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     Return a clause that says why no solution lies within the limits; empty if one does.
 
-    For a calibrated arm, lengths are its ideal arm's.
+    For a calibrated arm, the lengths in the clause are those of its ideal arm.
     """
     found = solutions(arm, T_base_flange)
     if found:
@@ -295,7 +295,7 @@ def _nearest_turns(
     """
     Return q with each joint turned as near to ``wanted`` as its limits allow, or None.
 
-    :param q_before: decides where two turns are equally near.
+    :param q_before: decides if two turns are equally near.
     """
     turned = []
     for joint, (angle, target, (low, high)) in enumerate(zip(q, wanted, limits, strict=True)):

@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.geometry.vectors import add6, Joints, Vector3, v
 #: unless the arm is nearly singular.
 _ONE_STEP_LEFT = 1e-12
 _MAX_STEPS = 8
-#: If a joint moves farther than this, Newton converges to another branch [rad].
+#: If a joint moves farther than this [rad], Newton's method converges to another branch.
 _MAX_JOINT_CHANGE = 0.5
 #: Keeps the normal equations of an exactly singular arm solvable.
 _DAMPING = 1e-14

@@ -39,12 +39,13 @@ _BLOCK = 1024
 # Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
-# Newton: squared error (metres and radians) that counts as exact.
+# Newton: squared error (metres and radians) that is exact enough.
 _EXACT = 1e-21
 _MAX_JOINT_STEP = 0.5
 # Newton steps from a solution of the ideal arm: two suffice except near singularities.
 _STEPS = 3
-# Every so many rows of a path begin there; those in between begin as far beside it as they ended.
+# On a path, one in this many rows starts from the ideal solution. The rows in between start from
+# there plus the shifts that the iterations of their neighbours have found.
 _STRIDE = 8
 # Farther than this from the ideal solution [rad], Newton may have found another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
@@ -61,8 +62,8 @@ class PathSolution:
     q: Floats
     #: (n,) whether there is a solution.
     found: Flags
-    #: (n,) largest joint change from the last solved row (or from the start) [rad]. Where branch
-    #: or turn jump, it is large however finely the path is sampled.
+    #: (n,) largest joint change from the last solved row (or from the start) [rad]. If the branch
+    #: or the turn jumps, it is large however finely the path is sampled.
     step: Floats
 
 
@@ -80,8 +81,8 @@ def solve_path(
     """
     Return joint positions along a path, each row the nearest to the previous one.
 
-    Equals :func:`~.inverse.nearest` from row to row: the nearest of all branches and full turns
-    within the limits. Rows without solution are skipped.
+    The result is that of :func:`~.inverse.nearest` from row to row: the nearest of all branches
+    and full turns within the limits. Rows without solution are skipped.
 
     :param poses: (n, 7).
     :param q_start: the configuration before the first row [rad].
@@ -137,7 +138,7 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     """
     Return for each pose the solution nearest to its row of ``q_near``.
 
-    Equals :func:`~.inverse.nearest` for each row.
+    The result is that of :func:`~.inverse.nearest` for each row.
 
     :param poses: (n, 7).
     :param q_near: (n, 6) [rad].
@@ -172,9 +173,9 @@ def _on_branch(
 
 
 def _within_limits(arm: Arm, q: Floats, q_near: Floats, max_step: Floats) -> tuple[Floats, Flags]:
-    """Return the rows put within the limits, and which are certain to be the nearest ones."""
-    # Triangle inequality: of two branches that are `apart` now, the one within half of that from
-    # where the arm was is the nearer one.
+    """Return the rows clipped to the limits, and whether each is certain to be the nearest."""
+    # Triangle inequality: if two branches are a distance apart, and one of them is within half
+    # this distance of the previous configuration, it is the nearer one.
     change = q - q_near
     certain = np.einsum('ij,ij->i', change, change) < np.copysign(max_step * max_step, max_step)
     low, high = np.array(arm.model.position_limits).T
@@ -199,14 +200,14 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     """
     Return the joint positions that Newton's method finds from ``q``, and which are exact.
 
-    Exact is an error below 3e-11 [m, rad].
+    A row is exact if its error is below 3e-11 [m, rad].
 
     :param q: (n, 6) [rad], within some hundredths of the solution; rows should follow a path.
     """
     every = np.arange(0, len(q), _STRIDE)
     if len(every) < 2:
         return _refine(arm, targets, q)
-    # Along a path the shifts change slowly: with those in between, one step is enough.
+    # Along a path the shifts change slowly: with interpolated ones, one step is enough.
     refined, exact = _refine(arm, targets.rows(every), q[every])
     shift = np.where(exact[:, None], refined - q[every], 0.0)
     place = np.minimum(np.arange(len(q)) / _STRIDE, len(every) - 1.0)

@@ -4,8 +4,8 @@
 The links of an arm as shapes: the frame of each link, and its mesh or cylinders.
 
 Link frames are placed as in the robot descriptions for ROS: z is the axis of the joint that moves
-the link, and wrist 3 has the flange's origin and axes. On a calibrated arm each frame stands on
-the joint's real axis, as near as possible to its place on the nominal arm with all joints at 0.
+the link, and wrist 3 has the flange's origin and axes. On a calibrated arm each frame lies on the
+joint's real axis, as near as possible to its place on the nominal arm with all joints at 0.
 
 The meshes are the manufacturer's. UR3, UR5 and UR10 are in the package example-robot-data (BSD),
 UR3e and UR5e (also for a UR7e) in the package airo-models (MIT). Both packages are optional; links
@@ -46,12 +46,12 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3
 #: a cylinder fills the gaps between the parts of its forearm.
 Detail: TypeAlias = Literal['visual', 'collision']
 
-#: The links in the order of the joints that move them; the tool is not one of the arm's.
+#: The links of the arm, without the tool, in the order of the joints that move them.
 ARM_LINKS: tuple[Link, ...] = tuple(link for link in Link if link is not Link.TOOL)
 
 _ZERO = (0.0,) * 6
 _HALF = 0.5**0.5
-# How the meshes are turned in the frames of their links; the same in both packages.
+# The orientations of the meshes in the frames of their links; the same in both packages.
 _TURNS = (
     (0.0, 0.0, 1.0, 0.0),
     (0.0, 0.0, 1.0, 0.0),
@@ -65,17 +65,17 @@ _FILES = ('base', 'shoulder', 'upperarm', 'forearm', 'wrist1', 'wrist2', 'wrist3
 
 
 def _airo_models() -> Iterator[Path]:
-    """Return where airo-models keeps its files; the package itself is not imported."""
+    """Yield the folder with the files of airo-models; the package itself is not imported."""
     spec = find_spec('airo_models')
     if spec is not None and spec.origin is not None:
         yield Path(spec.origin).parent
 
 
 def _example_robot_data() -> Iterator[Path]:
-    """Return where wheels and ROS installations may keep example-robot-data."""
+    """Yield the folders in which wheels and ROS installations may keep example-robot-data."""
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     parents = [Path(prefix) for prefix in prefixes if prefix]
-    spec = find_spec('pinocchio')  # its wheel has the same prefix
+    spec = find_spec('pinocchio')  # the wheels of both are installed under the same prefix
     if spec is not None and spec.origin is not None:
         parents.extend(Path(spec.origin).parents)
     for parent in parents:
@@ -95,7 +95,7 @@ class _MeshSource:
     #: File name extensions of visual and collision meshes.
     visual: str
     collision: str
-    #: The files of collision meshes that are in parts.
+    #: The files of collision meshes that consist of parts.
     parts: Mapping[Link, tuple[str, ...]]
     #: Cylinders about z of the mesh that fill gaps between parts: from, to, radius [m].
     fillings: Mapping[Link, tuple[float, float, float]]
@@ -173,7 +173,8 @@ _UR5E = _e_series(
     },
     fillings={Link.FOREARM: (0.087, 0.3775, 0.04)},
 )
-#: The meshes of each model that has any. Offsets: the robot descriptions in these packages.
+#: The meshes of each model that has any. The offsets are from the robot descriptions in the
+#: packages.
 _SOURCES: Mapping[str, _MeshSource] = MappingProxyType(
     {
         'ur3': _cb3('ur3', 0.0005, 0.1198, 0.0273, -0.08505, -0.08535, -0.0819),
@@ -189,7 +190,7 @@ MODELS_WITH_MESHES: tuple[str, ...] = tuple(_SOURCES)
 
 
 def mesh_model(name: str) -> str:
-    """Return the model whose meshes a model has."""
+    """Return the name of the model whose meshes are used for a model."""
     return Path(_SOURCES[name].folder).name
 
 
@@ -198,8 +199,8 @@ class LinkShape:
     """
     A mesh, or a cylinder, that moves with a link.
 
-    :param T_link_shape: the frame of the mesh's vertices [m], or the middle of the cylinder, whose
-        axis is z, in the frame of the link.
+    :param T_link_shape: in the frame of the link, the frame of the mesh's vertices [m], or the
+        middle of the cylinder, whose axis is z.
     :param mesh: the file; None: a cylinder of this radius and length [m].
     """
 
@@ -222,8 +223,8 @@ def link_meshes(name: str, detail: Detail) -> tuple[LinkShape, ...]:
     """
     Return the meshes of a model, one or more for each of :data:`ARM_LINKS`, in their order.
 
-    :raises ValueError: the model has none.
-    :raises FileNotFoundError: their package is not installed.
+    :raises ValueError: the model has no meshes.
+    :raises FileNotFoundError: the package with its meshes is not installed.
     """
     if name not in _SOURCES:
         raise ValueError(f'there are no meshes of the {name}')
@@ -289,7 +290,8 @@ class LinkFrames:
                 for frame, origin, axis in zip(nominal[1:], true.origins, true.axes, strict=True)
             ),
         )
-        #: Each joint's frame in the frame of the link before, at 0; it turns about its z.
+        #: The frame of each joint in that of the link before, while the joint is at 0; the joint
+        #: turns about its z.
         self.joints: tuple[Pose, ...] = tuple(
             before.inverse() @ after
             for before, after in zip(self.at_zero[:-1], self.at_zero[1:], strict=True)
@@ -316,7 +318,7 @@ class LinkFrames:
 
 
 def _nominal_frames(arm: Arm) -> list[Pose]:
-    """Return ``T_base_link`` of the nominal arm, all joints at 0: in each DH row, behind d."""
+    """Return ``T_base_link`` of the nominal arm, all joints at 0: after d in each DH row."""
     g, T, frames = arm.model.geometry, IDENTITY, [IDENTITY]
     for theta, d, a, alpha in zip(g.theta, g.d, g.a, g.alpha, strict=True):
         T = T @ Pose((0.0, 0.0, d), (0.0, 0.0, sin(0.5 * theta), cos(0.5 * theta)))

@@ -4,9 +4,9 @@
 The robot description (URDF) of an arm, from its calibrated geometry.
 
 Links, joints and fixed frames have the names of Universal Robots' own description, so programs
-that know that one know this one: ``base_link``, ``base`` turned by pi about z, the six links,
-``tool0`` and ``flange``. The links are drawn as meshes where their package is installed, else as
-cylinders.
+made for that description can use this one: ``base_link``, ``base`` turned by pi about z, the six
+links, ``tool0`` and ``flange``. The links are drawn as meshes if the package of the meshes is
+installed, else as cylinders.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LINK_NAMES: tuple[str, ...] = (BASE, *(f'{link.name.lower()}_link' for link in A
 
 # Colour of the links that have none of their own.
 _COLOUR = '0.69 0.72 0.76 1'
-# Below this cosine of the pitch roll and yaw turn about the same axis.
+# Below this cosine of the pitch, roll and yaw turn about the same axis.
 _GIMBAL_LOCK = 1e-9
 
 
@@ -50,7 +50,7 @@ def robot_description(arm: Arm, tf_prefix: str = '') -> str:
     Return the URDF of an arm.
 
     :param arm: nominal or calibrated.
-    :param tf_prefix: in front of the names of joints and links.
+    :param tf_prefix: put in front of the names of joints and links.
     """
     robot = Element('robot', name=arm.model.name)
     frames = LinkFrames(arm)

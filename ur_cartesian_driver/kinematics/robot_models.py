@@ -3,7 +3,7 @@
 """
 The robots: geometry and limits of every model, in one table.
 
-All arms have the same shape; six lengths tell the models apart::
+All arms have the same shape; the models differ in six lengths::
 
     i   theta   d    a    alpha
     1   0       d1   0    pi/2     shoulder pan
@@ -54,7 +54,7 @@ class DhTable:
     """
     A Denavit-Hartenberg table: a, d [m], alpha, theta [rad], one number for each joint.
 
-    :raises ValueError: a column has not six finite numbers.
+    :raises ValueError: a column does not have six finite numbers.
     """
 
     a: Vector6
@@ -96,7 +96,7 @@ class JointLimits:
 
 #: Names the source of a limit that is tighter than the model's.
 REPORTED = ', which the controller reports in its configuration'
-#: A limit is tighter than another one by more than this [rad], [rad/s].
+#: A limit is tighter than another one only if they differ by more than this [rad], [rad/s].
 _ROUNDING = 1e-4
 
 
@@ -122,7 +122,7 @@ class RobotModel:
     max_reach: float
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
-    #: Joints whose range, and whose speed, the controller reports otherwise than the model.
+    #: The joints for which the controller reports a tighter range, or speed, than the model's.
     reported_ranges: frozenset[int] = frozenset()
     reported_speeds: frozenset[int] = frozenset()
 
@@ -162,7 +162,7 @@ class RobotModel:
 
     @property
     def control_cycle(self) -> float:
-        """The cycle of its controller [s]."""
+        """The cycle time of its controller [s]."""
         return 0.008 if self.series == 'CB3' else 0.002
 
 
@@ -180,7 +180,7 @@ def _torques(j1: float, j2: float, j3: float, wrist: float) -> Vector6:
 
 
 _TURN = (-2 * pi, 2 * pi)
-#: Larger joint values of users are mistakes, such as degrees [rad].
+#: Joint values of users that are larger than this [rad] must be mistakes, such as degrees.
 MAX_JOINT_VALUE = 8.0 * pi
 _LIMITS: PositionLimits = (_TURN,) * 6
 _ENDLESS_WRIST: PositionLimits = (_TURN,) * 5 + ((-inf, inf),)
@@ -248,7 +248,7 @@ def robot_model(name: str) -> RobotModel:
     """
     Return the model of a name such as ``ur5e``.
 
-    :raises ValueError: there is no such model; the text lists those that there are.
+    :raises ValueError: there is no such model; the text lists all models.
     """
     try:
         return MODELS[name]

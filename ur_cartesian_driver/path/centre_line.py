@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arcs through three points, and a line of lines and arcs along which a path weaves."""
+"""Arcs through three points, and the centre line, of lines and arcs, along which a path weaves."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     Vector3,
 )
 
-#: A larger change of direction is a corner [rad].
+#: A change of direction larger than this [rad] is a corner.
 MAX_CORNER = 0.02
-#: Three points that are nearer than this to one line make no arc [m].
+#: Three points that are closer than this [m] to one line make no arc.
 _FLAT = 1e-6
 
 
@@ -64,7 +64,7 @@ class Stroke:
         return slerp(self.start.quaternion, self.end.quaternion, s / self.length)
 
     def is_smooth_into(self, after: Stroke) -> bool:
-        """Tell whether the direction goes on."""
+        """Return whether the next stroke continues in the same direction."""
         return dot(self.tangent(self.length), after.tangent(0.0)) > cos(MAX_CORNER)
 
     def _turn(self, s: float) -> tuple[float, float, float, float]:
@@ -97,13 +97,13 @@ def arc(start: Pose, via: Vector3, end: Pose) -> Stroke | None:
 
 
 def turned(stroke: Stroke) -> Pose:
-    """Return the end of an arc along which the tool turns with the tangent."""
+    """Return the end pose of an arc along which the tool turns with the tangent."""
     turn = Pose((0.0, 0.0, 0.0), stroke._turn(stroke.length))
     return Pose(stroke.end.position, (turn @ Pose(quaternion=stroke.start.quaternion)).quaternion)
 
 
 class CentreLine:
-    """Strokes one after the other, with a side: the direction across line and tool axis."""
+    """Consecutive strokes, with a sideways direction: across both the line and the tool axis."""
 
     def __init__(self, strokes: Sequence[Stroke]) -> None:
         """
@@ -117,9 +117,10 @@ class CentreLine:
 
     def swing(self, s: float, amplitude: float, waves: int) -> Pose:
         """
-        Return the pose at a distance along the line, on a sine to both sides [m].
+        Return the pose after a distance s [m] along the line, on a sine wave to both sides.
 
-        :param waves: on the whole line.
+        :param amplitude: to either side [m].
+        :param waves: number of waves on the whole line.
 
         :raises ZeroDivisionError: the tool points along the line.
         """
@@ -133,7 +134,7 @@ class CentreLine:
 
 @dataclass(frozen=True, slots=True)
 class RestToRest:
-    """A distance [m] from rest to rest, at a speed [m/s] and an acceleration [m/s^2] at most."""
+    """A motion from rest to rest: its length [m], largest speed [m/s] and acceleration [m/s^2]."""
 
     length: float
     speed: float
@@ -149,7 +150,7 @@ class RestToRest:
         return self.time(self.length)
 
     def time(self, s: float) -> float:
-        """Return when a distance is reached [s]."""
+        """Return the time at which a distance is reached [s]."""
         a, ramp = self.acceleration, self._ramp
         if s <= ramp:
             return sqrt(2.0 * s / a)

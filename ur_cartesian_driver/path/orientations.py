@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Orientations of the tool, in the words of people who mount parts: unit quaternions (x, y, z, w).
+Orientations of the tool from directions and angles: unit quaternions (x, y, z, w).
 
 All are orientations of the controlled frame in the frame of the path.
 """
@@ -30,15 +30,15 @@ X: Vector3 = (1.0, 0.0, 0.0)
 Y: Vector3 = (0.0, 1.0, 0.0)
 Z: Vector3 = (0.0, 0.0, 1.0)
 
-#: Larger angles are degrees by mistake [rad].
+#: Angles larger than this [rad] must be degrees by mistake.
 MAX_ANGLE = 4.0 * pi
-#: Directions that are nearer than this are parallel [rad].
+#: Directions that differ by less than this [rad] are parallel.
 _PARALLEL = 1e-6
 
 
 def roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
     """
-    Return the rotation by roll about x, then pitch about y, then yaw about z, all fixed [rad].
+    Return the rotation by roll, pitch and yaw [rad] about the fixed axes x, then y, then z.
 
     :raises InvalidGoal: an angle looks like degrees.
     """
@@ -78,7 +78,7 @@ def against(normal: Sequence[float], x: Sequence[float]) -> Quaternion:
 
 def tilted(angle: float, about: Sequence[float] = X, of: Quaternion = DOWN) -> Quaternion:
     """
-    Return an orientation that leans: straight down, say, turned about an axis of the frame [rad].
+    Return an orientation turned by an angle [rad] about an axis of the frame; by default, DOWN.
 
     :raises InvalidGoal: as :func:`axis_angle`.
     """
@@ -99,7 +99,7 @@ def direction(name: str, vector: Sequence[float]) -> Vector3:
 
 
 def _of_axes(ex: Vector3, ey: Vector3, ez: Vector3) -> Quaternion:
-    """Return the orientation of a frame from its axes: the largest component first."""
+    """Return the orientation of a frame from its axes, by its largest component."""
     m = (ex, ey, ez)  # columns
     trace = ex[0] + ey[1] + ez[2]
     candidates = (trace, ex[0], ey[1], ez[2])

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """One output of the robot; :func:`digital`, :func:`analog` and their like make it."""
+    """One output of the robot; made by :func:`digital`, :func:`analog` and similar functions."""
 
     kind: OutputKind
     pin: int
@@ -32,9 +32,9 @@ class Output:
 
     def command(self, value: float, waypoint: int, offset: float) -> IOCommand:
         """
-        Return the command that sets it at a waypoint.
+        Return the command that sets the output at a waypoint.
 
-        :raises InvalidGoal: the output does not take this value.
+        :raises InvalidGoal: the output cannot have this value.
         """
         return IOCommand(
             waypoint=waypoint,
@@ -47,9 +47,9 @@ class Output:
 
     def safe(self, value: float, restore: bool) -> SafeOutput:
         """
-        Return the value that it takes when the motion does not go on as planned.
+        Return the value that the output takes when the motion does not go on as planned.
 
-        :raises InvalidGoal: the output does not take this value.
+        :raises InvalidGoal: the output cannot have this value.
         """
         return SafeOutput(
             output=self.kind,
@@ -89,13 +89,13 @@ def analog(pin: int, domain: AnalogDomain = AnalogDomain.CURRENT) -> Output:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """One input of the robot; :func:`digital_input` and its like make it."""
+    """One input of the robot; made by :func:`digital_input` and similar functions."""
 
     kind: InputKind
     pin: int
 
     def wait(self, value: float, timeout: float, below: bool, go_on: bool) -> InputWait:
-        """Return the wait for a value; it is not checked."""
+        """Return the wait for a value; the value is not checked."""
         return InputWait(
             waypoint=0,
             input=self.kind,

@@ -4,8 +4,8 @@
 A path of the tool, composed motion by motion.
 
 A :class:`Path` never changes: each method returns a new one. Units are SI (:func:`~.units.mm` and
-:func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A
-mistake is an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line that makes it.
+:func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A mistake
+raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line that makes it.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ class Path(PathWithEvents):
         )
         driver.execute(square).raise_for_error()
 
-    The start is no point of the goal. The arm is to stand there, the first :meth:`by` counts from
-    there, and its orientation holds until another one is given.
+    The start is not a point of the goal. The arm has to be there when the goal begins, the first
+    :meth:`by` is relative to it, and its orientation holds until another one is given.
     """
 
     # ---- the path as a whole -------------------------------------------------------------------
@@ -93,7 +93,7 @@ class Path(PathWithEvents):
         """
         Set the largest deviations on the path and at its end; None = as before.
 
-        :param time: how much later than planned the end may come [s], negative = any time.
+        :param time: largest delay of the end after its planned time [s], negative = any.
         :param stall: how long the motion waits for an arm that is off its path [s], SERVO only;
             0 = such an arm is stopped, and the goal ends.
         """
@@ -118,7 +118,7 @@ class Path(PathWithEvents):
         """
         Set fields of the goal for which there is no method, by their names in the action.
 
-        :raises InvalidGoal: a field does not take the value.
+        :raises InvalidGoal: a field cannot have the value.
         """
         return self._with(_settings=with_fields('asking()', self._settings, fields))
 
@@ -127,7 +127,7 @@ class Path(PathWithEvents):
         return self._with(_settings=replace(self._settings, execution=mode))
 
     def steady(self, min_fraction: float = 0.95) -> Path:
-        """Refuse the path where the tool would be slower than this part of its speed (0 to 1)."""
+        """Demand this fraction of the asked speed (0 to 1) everywhere; else refuse the path."""
         return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
 
     def path_offset(
@@ -142,14 +142,15 @@ class Path(PathWithEvents):
         on_stale: StaleOffset = StaleOffset.HOLD,
     ) -> Path:
         """
-        Let the path give way to offsets that come while the arm moves, PRIMITIVES or SERVO.
+        Allow offsets from the path while the arm moves, in PRIMITIVES or SERVO.
 
-        They are given by ``set_path_offset`` of the running motion, or on ``~/path_offset``.
+        Offsets come by ``set_path_offset`` of the running motion, or on ``~/path_offset``.
 
-        :param along: how far to both sides [m], as ``across`` the path and ``normal`` to it.
+        :param along: largest offset along the path, either way [m]; likewise ``across`` it and
+            ``normal`` to it.
         :param speed: of the offset along each axis [m/s]; 0 = 0.02.
-        :param acceleration: [m/s^2]; 0 = 0.2.
-        :param timeout: an offset that is older [s] is stale; 0 = 0.5.
+        :param acceleration: of the offset along each axis [m/s^2]; 0 = 0.2.
+        :param timeout: age from which an offset is stale [s]; 0 = 0.5.
         :param on_stale: whether a stale offset stays, or the tool goes back to its path.
         """
         offset = PathOffset(
@@ -163,10 +164,10 @@ class Path(PathWithEvents):
 
     def keep_open(self, replace_horizon: float = 0.0) -> Path:
         """
-        Let points be appended while the arm moves.
+        Allow points to be appended while the arm moves.
 
-        :param replace_horizon: how far ahead of the arm points are final, so that later ones can
-            be replaced [s]; 0 = they will not be.
+        :param replace_horizon: how far ahead of the arm points are final [s], so that later ones
+            can be replaced; 0 = none can be replaced.
         """
         return self._with(
             _settings=replace(self._settings, keep_open=True, replace_horizon=replace_horizon)
@@ -176,8 +177,8 @@ class Path(PathWithEvents):
         """
         Name the value that an output takes when the motion does not go on as planned.
 
-        :param restore: whether it gets its value back after a pause.
-        :raises InvalidGoal: there is no such output or value, or it has one already.
+        :param restore: whether the output gets its value back after a pause.
+        :raises InvalidGoal: the output cannot have the value, or has a safe value already.
         """
         safe, known = output.safe(value, restore), self._settings.safe_outputs
         if any((other.output, other.pin) == (safe.output, safe.pin) for other in known):
@@ -188,9 +189,9 @@ class Path(PathWithEvents):
 
     def then(self, other: Path) -> Path:
         """
-        Return this path and another one after it.
+        Return this path followed by another one.
 
-        :raises InvalidGoal: frames, tools or settings differ, or the other begins elsewhere.
+        :raises InvalidGoal: frames, tools or settings differ, or the other path begins elsewhere.
         """
         for name in ('frame', 'tool'):
             mine, its = getattr(self, name), getattr(other, name)
@@ -228,10 +229,10 @@ class Path(PathWithEvents):
         self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0, *, of_tool: bool = False
     ) -> Path:
         """
-        Return this path beside itself.
+        Return this path moved by a distance [m].
 
-        :param of_tool: along the axes of the tool at each point, not of the frame.
-        :raises InvalidGoal: of the tool, where it turns on an arc: the result is no arc.
+        :param of_tool: move each point along the axes of the tool there, not of the frame.
+        :raises InvalidGoal: ``of_tool`` on an arc that turns the tool: the result is no arc.
         """
         step = vector('offset()', (dx, dy, dz), MAX_COORDINATE_OF_BASE, 'd')
         if not of_tool:
@@ -262,7 +263,7 @@ class Path(PathWithEvents):
         """
         Return the way back: from the end to the start.
 
-        :raises InvalidGoal: the path has no start to end at, or outputs, which have no reverse.
+        :raises InvalidGoal: the path has no start to end at, or events, which have no reverse.
         """
         if self._start is None:
             raise InvalidGoal('reversed()', 'has no start to go back to', 'write Path(start)')
@@ -275,7 +276,7 @@ class Path(PathWithEvents):
         if not self._points:
             return self
         places = (self._start, *self._points)
-        # Blend and dwell belong to their point, all else of a segment to the motion.
+        # Blend and dwell belong to their point, everything else in a segment to the motion.
         points = [
             replace(
                 motion,
@@ -299,9 +300,9 @@ class Path(PathWithEvents):
         self, place: PathPlace, *, overlap: float = OVERLAP, approach: float = APPROACH
     ) -> Path:
         """
-        Return the rest of the path when it was stopped at a place (``outcome.stopped``).
+        Return the rest of the path after it was stopped at a place (``outcome.stopped``).
 
-        As :func:`~.resumption.resume`: overlap and approach are lengths [m].
+        For ``overlap`` and ``approach`` [m] see :func:`~.resumption.resume`.
 
         :raises InvalidGoal: the path is kept open, its frame moves with the arm, or a number is
             out of its range.
@@ -319,10 +320,10 @@ class Path(PathWithEvents):
         alternating: bool = False,
     ) -> Path:
         """
-        Return this path several times, each one a step beside the one before.
+        Return this path several times, each pass moved by a step [m] from the one before.
 
-        Where a pass begins away from the end of the one before, a line leads there, with speed and
-        blend of the end of the path.
+        If a pass does not begin at the end of the one before, a line leads there, with the speed
+        and blend that hold at the end of the path.
 
         :param alternating: every second pass goes backwards.
         :raises InvalidGoal: the path has no start, or the passes cannot be joined.
@@ -347,12 +348,12 @@ class Path(PathWithEvents):
         Return a spline that swings to both sides of this path, across the axis z of the tool.
 
         Lines and arcs without corners become a spline through eight points on each wave. The
-        speed along the path is set by :meth:`at`, from rest to rest; whole waves fit into it.
+        motion is from rest to rest, at the speed along the path that :meth:`at` has set.
 
         :param amplitude: to either side [m].
-        :param wavelength: about the length of one wave [m].
-        :raises InvalidGoal: the path has a corner, outputs, no start or no speed, or is no path of
-            lines and arcs by speed.
+        :param wavelength: of one wave [m], rounded so that whole waves fit into the path.
+        :raises InvalidGoal: the path has a corner, events, durations, no start or no speed, or a
+            motion that is no line or arc.
         """
         for name, value in (('amplitude', amplitude), ('wavelength', wavelength)):
             amount('weave()', name, value, MAX_BLEND, 'm')
@@ -381,7 +382,7 @@ class Path(PathWithEvents):
         """
         Return the goal, as the driver plans it.
 
-        :param frames: places of the frames that the path names; None = the frames of every robot.
+        :param frames: poses of the frames that the path names; None = the frames of every robot.
         :param snapshot: where the arm is, for frames that move with it.
         :raises InvalidGoal: a frame is not known.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
@@ -392,11 +393,11 @@ class Path(PathWithEvents):
     @classmethod
     def from_goal(cls, goal: Goal) -> Path:
         """
-        Return the path of a goal; it has no start.
+        Return the path of a goal; the path has no start.
 
         A goal in a frame without a name is transformed into the base.
 
-        :raises InvalidGoal: the goal is refused anyway, or its controlled frame has no name.
+        :raises InvalidGoal: the goal would be refused anyway, or its controlled frame has no name.
         """
         if goal.T_flange_controlled is not None and not goal.controlled_frame:
             raise InvalidGoal(
@@ -417,9 +418,9 @@ class Path(PathWithEvents):
     @classmethod
     def from_message(cls, message: Any) -> Path:
         """
-        Return the path of a goal message, in either form.
+        Return the path of a goal message, whether its points are packed or not.
 
-        :raises InvalidGoal: it has what a path has not: a start time, or ``validate_only``.
+        :raises InvalidGoal: it sets what a path does not have: a start time or ``validate_only``.
         """
         if nanoseconds(message.trajectory.header.stamp) or message.validate_only:
             raise InvalidGoal(
@@ -430,7 +431,7 @@ class Path(PathWithEvents):
         return cls.from_goal(goal_from_fields(message))
 
     def to_yaml(self) -> str:
-        """Return the YAML of a goal file, exactly."""
+        """Return the YAML of a goal file; numbers keep every bit."""
         return goal_text(self._fields())
 
     @classmethod
@@ -449,7 +450,7 @@ class Path(PathWithEvents):
 
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Path:
-        """Read a goal file; as :meth:`from_yaml`."""
+        """Return the path of a goal file; raises as :meth:`from_yaml`."""
         return cls.from_message(read_goal_file(FilePath(file)))
 
     def _table(self) -> GoalTable:

@@ -28,7 +28,7 @@ from ur_cartesian_driver.path.path_points import PathPoint
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
 
-#: Of events with a begin and an end: the methods that name both, and the words for a missing end.
+#: Of events with a begin and an end: the methods that set both, and words that identify the event.
 _METHODS = {
     Press: ('press()', 'end_press()', ''),
     ProportionalOutput: ('follow_speed()', 'end_follow_speed()', ' for analog output {0.pin}'),
@@ -43,11 +43,11 @@ class PathWithEvents(PathOfMotions):
         self, output: Output, value: float, *, after: float = 0.0, before: float = 0.0
     ) -> Self:
         """
-        Set an output when the tool passes the point before.
+        Set an output when the tool passes the last point.
 
-        :param value: True or False of a digital output, a fraction of the range of an analog one.
+        :param value: True or False for a digital output, fraction of the range for an analog one.
         :param after: time after the point [s].
-        :param before: time before the point [s]; only where the motion to it has a duration.
+        :param before: time before the point [s]; only if the motion to it has a duration.
         :raises InvalidGoal: there is no point, no such output, or no such value.
         """
         if not self._points:
@@ -83,15 +83,16 @@ class PathWithEvents(PathOfMotions):
         idle: float = 0.0,
     ) -> Self:
         """
-        Let an analog output follow the speed of the tool from the point before on.
+        Make an analog output follow the speed of the tool from the last point on.
 
-        It is ``offset + gain * speed``, within the bounds, all fractions of its range.
+        The output is ``offset + gain * speed``, from ``minimum`` to ``maximum``; its values are
+        fractions of its range.
 
-        :param gain: per speed [1/(m/s)].
+        :param gain: fraction of the range per speed [1/(m/s)].
         :param filter_time: time constant of a low-pass filter for the speed [s].
-        :param lead: begin so long before the point [s].
-        :param idle: value at its end, and when the motion does not go on as planned.
-        :raises InvalidGoal: there is no point or no such output, or a number cannot be meant.
+        :param lead: time before the point at which the output begins to follow [s].
+        :param idle: value after the end, and when the motion does not go on as planned.
+        :raises InvalidGoal: there is no point or no such output, or a number must be a mistake.
         """
         where = f'follow_speed() at point {len(self) - 1}'
         if not self._points:
@@ -115,10 +116,10 @@ class PathWithEvents(PathOfMotions):
 
     def end_follow_speed(self, output: Output, *, lead: float = 0.0) -> Self:
         """
-        End :meth:`follow_speed` at the point before.
+        End :meth:`follow_speed` at the last point.
 
-        :param lead: end so long before the point [s].
-        :raises InvalidGoal: the output does not follow the speed, or began to at this point.
+        :param lead: time before the point at which the output ceases to follow [s].
+        :raises InvalidGoal: the output does not follow the speed from an earlier point on.
         """
         begun = self._begun(
             lambda one: isinstance(one, ProportionalOutput) and one.pin == output.pin
@@ -148,19 +149,20 @@ class PathWithEvents(PathOfMotions):
         contact: ContactEnd = ContactEnd.NONE,
     ) -> Self:
         """
-        Press with the controller's force mode from the point before on; there it has no blend.
+        Press with the controller's force mode from the last point on, where the arm stops.
 
-        :param forces: forces along the compliant axes of the frame, 'x' 'y' 'z' [N],
-            and about them, 'rx' 'ry' 'rz' [Nm]; empty where it only watches for contact.
-        :param speed_limits: how fast it gives way, for the same axes [m/s], [rad/s]; None = 0.05
-            and 0.2.
-        :param max_yield: how far it may give way along them [m]; ``max_yield_angle`` [rad].
-        :param max_deviation: how far it may be off its path along the others [m];
-            ``max_deviation_angle`` [rad]. 0 = the default, for all four.
+        :param forces: forces along the compliant axes of the frame, 'x' 'y' 'z' [N], and about
+            them, 'rx' 'ry' 'rz' [Nm]; empty = none, only watch for contact.
+        :param speed_limits: how fast the tool may give way, for the same axes [m/s], [rad/s];
+            None = 0.05 and 0.2.
+        :param max_yield: how far the tool may give way along the compliant axes [m]; about them:
+            ``max_yield_angle`` [rad].
+        :param max_deviation: how far the tool may be off its path along the other axes [m]; about
+            them: ``max_deviation_angle`` [rad]. For all four, 0 = the default.
         :param damping: of force mode, 0 to 1; ``gain_scaling``: 0 to 2.
         :param zero_sensor: zero the force sensor before.
         :param contact: whether the goal ends where the tool touches.
-        :raises InvalidGoal: as :meth:`dwell`, or a number cannot be meant.
+        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
         """
         where, point = self._stop('press')
         limits = speed_limits or {}
@@ -189,9 +191,9 @@ class PathWithEvents(PathOfMotions):
 
     def end_press(self) -> Self:
         """
-        End :meth:`press` at the point before; there it has no blend.
+        End :meth:`press` at the last point, where the arm stops.
 
-        The motion to the next point begins where the tool is, and leads straight there.
+        The motion to the next point begins where the tool is, and leads straight to that point.
 
         :raises InvalidGoal: as :meth:`dwell`, or no press has begun at a point before.
         """
@@ -203,11 +205,11 @@ class PathWithEvents(PathOfMotions):
 
     def dwell(self, time: float) -> Self:
         """
-        Let the arm rest at the point before for a time; there it has no blend.
+        Make the arm stop at the last point and rest there for a time [s].
 
-        Durations count motions only: all that follows is later by the time [s].
+        The durations of motions do not include it: everything that follows is later by this time.
 
-        :raises InvalidGoal: there is no point, or it is passed with a blend or a twist of its own.
+        :raises InvalidGoal: there is no point, or the point has a blend or a twist of its own.
         """
         where, point = self._stop('dwell')
         length = (
@@ -218,11 +220,11 @@ class PathWithEvents(PathOfMotions):
 
     def call(self, function: str, *arguments: float, timeout: float = 10.0) -> Self:
         """
-        Call a function of ``script_prelude`` at the point before; there it has no blend.
+        Call a function of ``script_prelude`` at the last point, where the arm stops.
 
         :param function: its name; a driver that does not have it refuses the path.
         :param timeout: longest time until it returns [s].
-        :raises InvalidGoal: as :meth:`dwell`, or a number cannot be meant.
+        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
         """
         where, point = self._stop('call')
         numbers = tuple(float(argument) for argument in arguments)
@@ -239,13 +241,13 @@ class PathWithEvents(PathOfMotions):
         go_on: bool = False,
     ) -> Self:
         """
-        Let the arm rest at the point before until an input has a value; there it has no blend.
+        Make the arm stop at the last point and rest there until an input has a value.
 
-        A :meth:`dwell` there, and the time of an output, count from when the input has come.
+        A :meth:`dwell` and the times of outputs at this point begin when the input has come.
 
-        :param value: True or False of a digital input, the level of an analog one [A] or [V].
+        :param value: True or False for a digital input, the level of an analog one [A] or [V].
         :param timeout: longest wait [s].
-        :param below: until an analog input is below the level, not at it or above.
+        :param below: wait until an analog input is below the level, not at it or above.
         :param go_on: go on if the input does not come; else the goal fails.
         :raises InvalidGoal: as :meth:`dwell`, or there is no such input or level.
         """
@@ -262,11 +264,11 @@ class PathWithEvents(PathOfMotions):
 
     def payload(self, mass: float, center_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> Self:
         """
-        Set the payload where the arm stops at the point before; there it has no blend.
+        Set the payload at the last point, where the arm stops.
 
         :param mass: [kg].
         :param center_of_gravity: in the flange frame [m].
-        :raises InvalidGoal: as :meth:`dwell`, or a number cannot be meant.
+        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
         """
         where, point = self._stop('payload')
         cog = vector(where, center_of_gravity, MAX_OFFSET)
@@ -276,16 +278,17 @@ class PathWithEvents(PathOfMotions):
     # ---- inside --------------------------------------------------------------------------------
 
     def _with_point(self, index: int, point: PathPoint) -> Self:
-        """Return the path with another one of its points."""
+        """Return the path with one of its points replaced."""
         points = list(self._points)
         points[index] = point
         return self._with(_points=tuple(points))
 
     def _happening(self, where: str, point: PathPoint, event: Any) -> Self:
         """
-        Return the path with an event at the last point, given as it is there.
+        Return the path with an event at the last point.
 
-        :param event: at point 0; if it has an end, at point 1, as if it ended at the next one.
+        :param point: the last point as it is with the event.
+        :param event: begins at point 0; if it has an end, this is at point 1 for the check.
         """
         check_event(where, event)
         if type(event) in _METHODS:
@@ -293,7 +296,7 @@ class PathWithEvents(PathOfMotions):
         return self._with_point(-1, replace(point, events=(*point.events, event)))
 
     def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
-        """Return the latest event that has no end, with the point at which it begins."""
+        """Return the latest wanted event without an end, and the earlier point where it begins."""
         for i in range(len(self) - 2, -1, -1):
             for event in self._points[i].events:
                 if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):
@@ -301,7 +304,7 @@ class PathWithEvents(PathOfMotions):
         return None
 
     def _ended(self, i: int, event: Any, **changes: float) -> Self:
-        """Return the path with the end of an event, which begins at a point, at the last one."""
+        """Return the path in which an event that begins at point i ends at the last point."""
         ended = replace(event, last_waypoint=len(self) - 1 - i, **changes)
         point = self._points[i]
         events = tuple(ended if each is event else each for each in point.events)
@@ -309,9 +312,9 @@ class PathWithEvents(PathOfMotions):
 
     def _check_ends(self) -> None:
         """
-        Refuse what has no end.
+        Refuse events without an end.
 
-        :raises InvalidGoal: names the method that begins it, and the one that ends it.
+        :raises InvalidGoal: names the methods that begin and end the event.
         """
         for i, point in enumerate(self._points):
             for event in point.events:
@@ -324,7 +327,7 @@ class PathWithEvents(PathOfMotions):
                     )
 
     def _stop(self, name: str) -> tuple[str, PathPoint]:
-        """Return where the method is, and the last point as one at which the arm stops."""
+        """Return words for a method's place, and the last point as one where the arm stops."""
         if not self._points:
             raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
         where, point = f'{name}() at point {len(self) - 1}', self._points[-1]

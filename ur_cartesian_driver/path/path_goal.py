@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From the points of a path to a goal and back."""
+"""Convert the points of a path to a goal, and back."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 
-#: The blend of a point on a process that has none [m], and how long the tool is in it at least
-#: [s]: the cycle of the slowest controller is 8 ms, and a blend that is passed in one is left out.
+#: The blend of a point on a process for which none is given [m], and the least time in it [s]: the
+#: robot leaves out a blend that it passes within one cycle, 8 ms on the slowest controller.
 PROCESS_BLEND = 0.002
 _PROCESS_BLEND_TIME = 0.01
-#: The share of a segment that such a blend takes at most.
+#: The largest fraction of a segment that such a blend takes.
 _PROCESS_BLEND_SHARE = 0.3
 
 
@@ -32,10 +32,10 @@ def goal_of_points(
     points: Sequence[PathPoint], settings: Goal, start: Pose | None, frame: str, tool: str
 ) -> GoalTable:
     """
-    Return a goal whose frames only have their names.
+    Return the goal of points, with frames given by name only.
 
-    :param settings: a goal without points, for what holds for the whole path.
-    :param start: where the path begins, if it says so.
+    :param settings: a goal without points, with the settings of the whole path.
+    :param start: the pose at which the path begins, if it is known.
     """
     rests = [0, *(_nanoseconds(point.segment.dwell) for point in points[:-1])]
     times = accumulate(
@@ -73,7 +73,7 @@ def goal_of_points(
 
 
 def settings_of(goal: Goal) -> Goal:
-    """Return a goal without points, for what holds for the whole path of a goal."""
+    """Return a goal without points, with the settings of a goal that hold for its whole path."""
     events = {kind.field for kind in EVENT_KINDS.values()}
     others = {'waypoints', 'segments', 'frame_id', 'controlled_frame', *events}
     given = {each.name: getattr(goal, each.name) for each in goal_fields(Goal)}
@@ -115,7 +115,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
 
 
 def _events(goal: Goal) -> dict[int, list[Any]]:
-    """Return what happens at points, or begins there, by the point."""
+    """Return the events that happen or begin at each point, by its number."""
     found: dict[int, list[Any]] = {}
     for kind in EVENT_KINDS.values():
         for event in kind.of(goal):
@@ -139,9 +139,9 @@ def _nanoseconds(time: float) -> int:
 
 def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) -> float:
     """
-    Return the radius at a point without one where a process goes on; 0 where none fits.
+    Return the radius of the blend at a point that has none; 0 if none is needed, or none fits.
 
-    An arc is part of a process where one follows.
+    A blend is needed if the motion to the point or the one after it is a PROCESS motion.
     """
     if index + 1 == len(points):
         return 0.0

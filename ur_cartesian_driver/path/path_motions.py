@@ -44,10 +44,11 @@ from ur_cartesian_driver.path.path_points import (
 #: A place: a position x y z [m], or a pose.
 Place: TypeAlias = Sequence[float] | Pose
 
-#: In a twist or an acceleration of a spline: the driver chooses what fits the neighbours.
+#: A twist or an acceleration of a spline point that the driver chooses to fit the neighbours.
 FREE: Vector6 = (nan,) * 6
 
-#: Larger numbers are mistakes, mostly of the unit. Other frames may be far from the robot.
+#: Larger numbers must be mistakes, mostly of the unit. Frames other than the base may be far from
+#: the robot.
 MAX_COORDINATE_OF_BASE = 3.0
 MAX_COORDINATE = 50.0
 MAX_BLEND = 0.5
@@ -60,7 +61,7 @@ _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
-#: Fields of a segment for which methods have words of their own; the others go by their names.
+#: Fields of a segment that methods set by other parameters; the other fields are given by name.
 _OWN_WORDS = {
     *('type', 'blend_radius', 'dwell', 'velocity', 'acceleration'),
     *('via', 'via_posture', 'arc_mode', 'free_axis', 'free_min', 'free_max'),
@@ -78,11 +79,11 @@ class PathOfMotions:
 
     frame: str
     tool: str
-    #: A place like a point, with no motion to it.
+    #: The start, as a point to which no motion leads.
     _start: PathPoint | None
     _points: tuple[PathPoint, ...]
     _feed: Feed
-    #: A goal without points, for what holds for the whole path.
+    #: A goal without points, with the settings of the whole path.
     _settings: Goal
 
     def __init__(
@@ -96,10 +97,10 @@ class PathOfMotions:
         """
         Begin a path.
 
-        :param start: where the arm stands; None where the first motion says where it goes.
+        :param start: where the arm stands; None = not known.
         :param frame: the frame of all poses, as ``header.frame_id`` of a goal.
         :param tool: the controlled frame; empty = the robot's active TCP.
-        :raises InvalidGoal: the start is no place that an arm can reach.
+        :raises InvalidGoal: a name is no text, or the start is no pose within an arm's reach.
         """
         for name, value in (('frame', frame), ('tool', tool)):
             if not isinstance(value, str):
@@ -145,7 +146,7 @@ class PathOfMotions:
 
     @property
     def starts_with_joint_motion(self) -> bool:
-        """Whether the first motion goes from wherever the arm stands, as joint motions can."""
+        """Whether the first motion is a joint motion, which can begin wherever the arm stands."""
         return bool(self._points) and self._points[0].segment.type in _JOINT_TYPES
 
     # ---- what holds from here on ---------------------------------------------------------------
@@ -191,26 +192,26 @@ class PathOfMotions:
         start = path._start
         if start is None or self._points or 'blend' not in given:
             return path
-        segment = replace(start.segment, blend_radius=given['blend'])  # for the way back
+        segment = replace(start.segment, blend_radius=given['blend'])  # for the reversed path
         start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
         return path._with(_start=start)
 
     def _with_segment(self, segment: Segment) -> Self:
-        """Return the path with other fields of the segments of motions that follow."""
+        """Return the path with another segment for the motions that follow."""
         start = self._start
-        if start is not None and not self._points:  # for the way back
+        if start is not None and not self._points:  # for the reversed path
             own = {**point_fields(segment), 'blend_radius': start.segment.blend_radius}
             start = replace(start, segment=replace(start.segment, **own))
         return self._with(_feed=replace(self._feed, segment=segment), _start=start)
 
     def free(self, axis: str | None, low: float | None = None, high: float | None = None) -> Self:
         """
-        Let the tool turn about an axis of its own at the points that follow; the driver chooses.
+        Free an axis of the tool at the points that follow: the driver chooses the turn about it.
 
-        :param axis: ``x``, ``y`` or ``z``; None ends it.
-        :param low: the least rotation from the orientation of each point [rad], with ``high``;
-            without both any will do.
-        :raises InvalidGoal: there is no such axis, or the range is none.
+        :param axis: ``x``, ``y`` or ``z``; None = no axis is free any longer.
+        :param low: least rotation from the orientation of each point [rad]; ``high``: greatest
+            rotation; if neither is given, any is allowed.
+        :raises InvalidGoal: there is no such axis, or the range is empty or too large.
         """
         where = f'free() after {len(self)} points'
         if axis is not None and axis not in _FREE_AXES:
@@ -253,15 +254,14 @@ class PathOfMotions:
         """
         Add a straight line.
 
-        :param place: where it ends: a position with the orientation of the point before, or with
-            its own, or a pose.
-        :param blend: in place of the one of :meth:`at`, as ``speed`` and ``acceleration``.
+        :param place: where the line ends: a pose, or a position.
+        :param orientation: at its end; None = that of the pose, or of the point before.
+        :param blend: replaces the one of :meth:`at`, as do ``speed`` and ``acceleration``.
         :param duration: of this motion [s]; a path has durations everywhere, or nowhere.
-        :param posture: joint positions to arrive near to, by joint name [rad].
-        :param optimized: as fast as the robot can (optimovel); speed and acceleration are
-            fractions then.
+        :param posture: joint positions near which to arrive, by joint name [rad].
+        :param optimized: use optimovel, where speed and acceleration are fractions of the limits.
         :param fields: other fields of its segment, by their names in ``MotionSegment``.
-        :raises InvalidGoal: a value cannot be meant.
+        :raises InvalidGoal: a value must be a mistake.
         """
         kind = SegmentType.OPTIMIZED_LINEAR if optimized else SegmentType.LINEAR
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
@@ -283,7 +283,7 @@ class PathOfMotions:
         """
         Add a joint motion, in which the path of the tool is not straight; as :meth:`line`.
 
-        ``speed`` and ``acceleration`` count on the leading axis [rad/s], [rad/s^2].
+        ``speed`` and ``acceleration`` are those of the leading axis [rad/s], [rad/s^2].
         """
         kind = SegmentType.OPTIMIZED_JOINT if optimized else SegmentType.JOINT
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
@@ -304,8 +304,8 @@ class PathOfMotions:
         """
         Add a straight line at constant speed with rounded corners (movep); as :meth:`line`.
 
-        Without a blend it gets one of 2 mm or so, because the arm would stop at its point;
-        ``blend=0`` means a stop. So does an arc before it.
+        Without a given blend it gets one of about 2 mm, because the arm would stop at its point;
+        ``blend=0`` means a stop. An arc before it gets such a blend, too.
         """
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
         return self._move(SegmentType.PROCESS, place, orientation, options)
@@ -328,7 +328,7 @@ class PathOfMotions:
         """
         Add an arc through a point on the way; as :meth:`line`.
 
-        :param via: a position on the arc, or a pose (whose orientation only counts with
+        :param via: a position on the arc, or a pose (whose orientation is only used with
             ``via_posture``).
         :param follow: turn the tool with the arc, so that it keeps its angle to the tangent; the
             orientation at the end follows from that.
@@ -384,12 +384,12 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add a point that a spline passes through; the points of a path are all of one, or none is.
+        Add a point of a spline; either all points of a path are of a spline, or none is.
 
         :param duration: from the point before [s].
         :param twist: linear [m/s] and angular [rad/s] velocity there, in the frame of the path, or
             the linear one alone; NaN = the driver chooses, 0 = the arm stops.
-        :param acceleration: the same [m/s^2], [rad/s^2].
+        :param acceleration: likewise [m/s^2], [rad/s^2].
         :raises InvalidGoal: as :meth:`line`.
         """
         where = self._where('spline')
@@ -431,10 +431,10 @@ class PathOfMotions:
         """
         Add a motion from the point before by a distance [m] and a turn.
 
-        :param turn: a rotation, by :func:`~.orientations.axis_angle` for example.
-        :param of_tool: distance and turn along the axes of the tool, not of the frame.
-        :param motion: ``line``, ``process`` or ``joint``; all else as there.
-        :raises InvalidGoal: the path does not say where it is, or as :meth:`line`.
+        :param turn: a rotation, made by :func:`~.orientations.axis_angle` for example.
+        :param of_tool: take distance and turn along the axes of the tool, not of the frame.
+        :param motion: ``line``, ``process`` or ``joint``; all else as in that method.
+        :raises InvalidGoal: the path has neither a point nor a start, or as :meth:`line`.
         """
         if motion not in _BY_NAME:
             raise InvalidGoal(
@@ -464,7 +464,7 @@ class PathOfMotions:
         return f'point {len(self)} ({kind})'
 
     def _pose(self, where: str, place: Place, orientation: Quaternion | None) -> Pose:
-        """Return the pose of a place; the orientation holds on if none is given."""
+        """Return the pose of a place; without an orientation, that of the point before holds."""
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:
@@ -521,7 +521,7 @@ class PathOfMotions:
         return self._with(_points=(*self._points, point))
 
     def _segment(self, where: str, fields: Mapping[str, Any]) -> Segment:
-        """Return the segment of a motion, as far as no words of the methods make it."""
+        """Return the segment of a motion from the fields that are given by name."""
         if own := _OWN_WORDS & set(fields):
             raise TypeError(f'{where} has a word of its own for the field {min(own)}')
         return with_fields(where, self._feed.segment, fields) if fields else self._feed.segment

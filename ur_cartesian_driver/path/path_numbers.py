@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers that people write: checked, and refused with a sentence where they cannot be meant."""
+"""Check the numbers that people write, and refuse mistakes with a sentence."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 
 NANOSECONDS = 1_000_000_000
-#: Larger twists and accelerations, and joint positions, are mistakes.
+#: Twists and accelerations, and joint positions, that are larger than these must be mistakes.
 _MAX_RATE, _MAX_JOINT = 100.0, 25.2
-#: Quaternions that differ from length 1 by less are meant as such, and by less are exact.
+#: Largest difference from 1 of the square of a quaternion that is accepted, and of an exact one.
 _UNIT, _EXACT_UNIT = 1e-3, 1e-12
 
 
@@ -73,12 +73,12 @@ def unit_quaternion(where: str, q: Sequence[float]) -> Quaternion:
             f'has the orientation {q!r:.80}, which is no unit quaternion x, y, z, w',
             'make it by against(), tilted(), roll_pitch_yaw() or axis_angle()',
         )
-    # One that is exact already stays as it is, so that goals survive.
+    # An exact quaternion stays as it is, so that reading a goal does not change it.
     return (x, y, z, w) if abs(square - 1.0) <= _EXACT_UNIT else normalize((x, y, z, w))
 
 
 def six_numbers(where: str, values: Sequence[float]) -> Vector6:
-    """Return linear and angular numbers; the angular ones are free if there are three."""
+    """Return three linear and three angular numbers; these are free (NaN) if not given."""
     try:
         numbers = [float(value) for value in values]
     except (TypeError, ValueError):

@@ -19,7 +19,7 @@ from ur_cartesian_driver.planning.request.field_rules import check_record
 
 T = TypeVar('T')
 
-#: Poses that are nearer are the same [m], [rad].
+#: Poses that differ by less than this [m], [rad] are the same.
 SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
 
 
@@ -29,7 +29,7 @@ class Feed:
 
     speed: float = 0.0
     acceleration: float = 0.0
-    #: None = none, and a small one at PROCESS points.
+    #: None = no blend, but a small one at PROCESS points.
     blend: float | None = None
     joint_speed: float = 0.0
     joint_acceleration: float = 0.0
@@ -41,30 +41,30 @@ class Feed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathPoint:
-    """A point, the motion that ends there, and what happens there."""
+    """A point, the motion that ends there, and the events there."""
 
     waypoint: Waypoint
     segment: Segment = field(default_factory=Segment)
-    #: Of the motion [ns]; 0 = by its speed.
+    #: Duration of the motion [ns]; 0 = the speed decides.
     duration: int = 0
-    #: The events that happen or begin here, as if this were point 0. One that ends behind point 0
-    #: has not ended yet.
+    #: The events that happen or begin here, as if this were point 0. An event that has to end, but
+    #: whose last waypoint is 0, has no end yet.
     events: tuple[Any, ...] = ()
-    #: Whether the blend comes from the feed, which the last point of a path does without, and
-    #: whether it is chosen when the path is finished.
+    #: Whether the blend comes from the feed (the last point of a path then has none), and whether
+    #: the blend is chosen when the path is finished.
     feed_blend: bool = False
     auto_blend: bool = False
     in_spline: bool = False
 
     @property
     def pose(self) -> Pose:
-        """The place."""
+        """The pose of the point."""
         return self.waypoint.pose
 
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """Settings of one motion, besides its place."""
+    """Settings of one motion, except its place."""
 
     blend: float | None
     speed: float | None
@@ -77,9 +77,10 @@ class MotionOptions:
 
 def with_fields(where: str, record: T, fields: Mapping[str, Any]) -> T:
     """
-    Return a dataclass of the table with other values in some fields.
+    Return a dataclass of a goal with other values in some fields.
 
-    :raises InvalidGoal: a field does not take the value; ``where`` is the name of the dataclass.
+    :param where: the name of the dataclass in a refusal.
+    :raises InvalidGoal: a field cannot have the value.
     """
     kind: type[T] = type(record)
     try:
@@ -121,7 +122,7 @@ def _turned(rates: Vector6, q: Quaternion) -> Vector6:
 
 
 def seen_from(point: PathPoint, T_tool_new: Pose, before: Pose | None, where: str) -> PathPoint:
-    """Return a point at which another frame of the tool is where the tool was."""
+    """Return a point as a frame on the tool passes it, at ``T_tool_new`` in the tool's frame."""
     waypoint, segment = point.waypoint, point.segment
     offset = rotate(waypoint.pose.quaternion, T_tool_new.position)
     if segment.via is not None:
@@ -154,7 +155,7 @@ def _negative(rates: Vector6) -> Vector6:
 
 
 def is_same(a: Pose, b: Pose) -> bool:
-    """Tell whether there is no motion between two poses."""
+    """Return whether two poses are the same, so that there is no motion between them."""
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
 
@@ -162,7 +163,7 @@ def merged(first: Goal, second: Goal) -> Goal:
     """
     Return the settings of two paths as one.
 
-    :raises InvalidGoal: both have chosen, and differ.
+    :raises InvalidGoal: both paths set a field, to different values.
     """
     usual, values = Goal(waypoints=()), {}
     for each in goal_fields(Goal):

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The goal that is left of a goal that ended on its way.
+Make the goal that is left of a goal that was stopped on its way.
 
-It approaches a place some way before the one where the other one was stopped (the overlap), puts
-the outputs in the state that they have there, and follows the same path to its end. The rest
-of a line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which
-the arm gathers speed within the overlap.
+The resumed goal approaches a place on the path some way before the stop (the overlap), puts the
+outputs in the state that they have there, and follows the original path to its end. The rest of a
+line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which the
+arm gathers speed within the overlap.
 
-A place on a path counts segments: ``k + u`` is on the segment to point k, at the fraction u of it.
+A place on a path is a number: ``k + u`` is on the segment to point k, at the fraction u of it.
 """
 
 from __future__ import annotations
@@ -41,19 +41,20 @@ from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
-#: How far before the place the path is resumed, and from how far behind the tool comes [m].
+#: How far before the stop the path is resumed, and how far from the path the approach begins,
+#: backwards along the tool's z axis [m].
 OVERLAP, APPROACH = 0.005, 0.03
-#: Times of the approach where a goal has times: to above the path [s], and down to it [m/s].
+#: In a goal with times: time to the begin of the approach [s], and speed of the approach [m/s].
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
-#: Blends begin somewhat farther from their points on arcs.
+#: Factor on blend radii: on arcs, blends begin somewhat farther from their points.
 _BLEND_MARGIN = 1.05
-#: A shorter rest of a segment is nothing [m].
+#: A rest of a segment that is shorter than this [m] is left out.
 _NOTHING = 1e-5
-#: The shortest arc, and the least height over its chord, that is left of an arc [m].
+#: The least length, and the least height over its chord, of the rest of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
-#: The shortest time in which a spline gathers speed [s], and the number of points meanwhile.
+#: The least time in which the arm gathers speed on a spline [s], and the number of points in it.
 _RAMP_TIME, _RAMP_POINTS = 0.4, 8
-#: Chords that measure the length of a piece of a spline.
+#: Number of chords that measure the length of a piece of a spline.
 _CHORDS = 64
 _DIGITS = 9
 _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
@@ -61,16 +62,16 @@ _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResumedGoal:
-    """The goal that is left of another one."""
+    """The goal that is left of an original goal, which was stopped."""
 
     goal: Goal
-    #: Where it takes the other one up.
+    #: The place on the original path where it begins.
     begin: PathPlace
-    #: (n,) the places on the path of the other one at which its points are; see the module.
+    #: (n,) the places of its points on the original path, as numbers; see the module.
     places: tuple[float, ...]
 
     def original(self, place: PathPlace) -> PathPlace:
-        """Return the place on the path of the other goal, for a place on this one."""
+        """Return the place on the original path for a place on the path of this goal."""
         here = self.places[min(place.point, len(self.places) - 1)]
         before = self.places[place.point - 1] if place.point else here
         return _path_place(before + place.fraction * (here - before), round(self.places[-1]))
@@ -87,13 +88,13 @@ def resume(
     """
     Return the goal that is left of a goal that was stopped at a place.
 
-    :param place: as its outcome says.
-    :param overlap: how far before it the path is resumed [m]; more where that is in a
-        blend, and never before a joint motion or the first point.
-    :param approach: how far from there the tool comes down to the path, backwards along its own z
+    :param place: of the stop, as the outcome of the goal reports it.
+    :param overlap: how far before that place the path is resumed [m]; farther if this would be in
+        a blend, but never before a joint motion or the first point.
+    :param approach: distance from which the tool comes down to the path, backwards along its own z
         axis [m]; 0 = straight to the path.
-    :param start: where the tool was when the goal began, in the frame of the goal. Only a spline
-        needs it whose first twist is NaN.
+    :param start: pose of the tool when the goal began, in the frame of the goal; needed only for a
+        spline whose first twist is NaN.
     :raises InvalidGoal: the goal is kept open, its frame moves with the arm, or a number is out of
         its range.
     """
@@ -101,7 +102,7 @@ def resume(
 
 
 class _Resumption:
-    """Makes the goal that is left."""
+    """Makes the resumed goal."""
 
     def __init__(
         self, goal: Goal, place: PathPlace, overlap: float, approach: float, start: Pose | None
@@ -120,7 +121,7 @@ class _Resumption:
         """Return the rest of the goal."""
         n, k = len(self.points), min(floor(self.begin), len(self.points) - 1)
         if k == self.begin == self.stopped > 0.0:
-            k -= 1  # it rests at a point, and not on its way to the next one
+            k -= 1  # the arm rests at a point, and is not on its way to the next one
         u = self.begin - k
         if self._is_new_start(k):
             points, segments = list(self.points[k:]), self._from_anywhere(k)
@@ -135,7 +136,7 @@ class _Resumption:
             if self._length(k) * (1.0 - u) > _NOTHING or is_turn:
                 points.append(self.points[k])
                 segments.append(self._cut(k, u))
-            else:  # it is there: the next segment follows
+            else:  # the arm is at the end of the segment: the next one follows
                 self.begin = k + 1.0
                 places = [self.begin] * len(points)
                 del times[len(points)]
@@ -172,13 +173,14 @@ class _Resumption:
     # -- where to begin --------------------------------------------------------------------------
 
     def _is_new_start(self, k: int) -> bool:
-        """Tell whether a segment is done from wherever the arm is."""
+        """Return whether a segment can begin wherever the arm is."""
         return k == 0 or self.segments[k].type in _JOINT_MOTIONS
 
     def _from_anywhere(self, k: int) -> list[Segment]:
-        """Return the segments from one on that begins where the arm is."""
+        """Return the segments from k on, the first of which begins wherever the arm is."""
         first, *rest = self.segments[k:]
-        # The arm may be in the blend already. Without one the tool would not keep its speed.
+        # The arm may be in the blend already. A goal that demands a speed keeps the blend, because
+        # the tool would stop without it.
         if self.stopped > k and not self.goal.min_speed_fraction:
             first = replace(first, blend_radius=0.0)
         return [first, *rest]
@@ -197,7 +199,7 @@ class _Resumption:
         return self._before_blends(k, u)
 
     def _before_blends(self, k: int, u: float) -> float:
-        """Return a place outside of blends, before those in which a place is."""
+        """Return a place outside of blends: the given one, or one before the blends around it."""
         if self.spline is not None:
             return k + u
         while True:
@@ -215,7 +217,7 @@ class _Resumption:
             k, u = k - 1, 1.0
 
     def _enough_of_an_arc(self, k: int, u: float) -> float:
-        """Return a fraction of a segment that leaves as much of an arc as makes a circle."""
+        """Return a fraction, reduced on an arc so that the rest of it determines a circle."""
         if self.segments[k].type is not SegmentType.CIRCULAR:
             return u
         arc = self._arc(k)
@@ -266,7 +268,7 @@ class _Resumption:
     # -- the approach ----------------------------------------------------------------------------
 
     def _approach(self, k: int, u: float) -> tuple[list[Waypoint], list[Segment], list[float]]:
-        """Return the points up to the place, at rest, and their places on the path."""
+        """Return the points and segments up to the place, at rest, and the points' places."""
         there = self._pose(k, u)
         poses = [there]
         if self.approach > 0.0:
@@ -275,7 +277,7 @@ class _Resumption:
         if self.spline is None and (len(poses) > 1 or self.goal.min_speed_fraction):
             kinds[0] = SegmentType.JOINT
         if self.goal.min_speed_fraction and self.spline is None:
-            kinds[-1] = SegmentType.JOINT  # a rest between lines would count
+            kinds[-1] = SegmentType.JOINT  # a rest between lines would miss min_speed_fraction
         cut = self.segments[k]
         free = Segment(free_axis=cut.free_axis, free_min=cut.free_min, free_max=cut.free_max)
         return (
@@ -290,14 +292,14 @@ class _Resumption:
         return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
 
     def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
-        """Return the times of all points of moves, of an approach first."""
+        """Return the times of all points of a goal of moves, those of an approach first."""
         if not self.timed:
             return [0.0] * (len(self.points) - k + approach)
         arrive = [point.time for point in self.points]
         took = arrive[k] - (arrive[k - 1] if k else 0.0)
         dwell = self.segments[k - 1].dwell if k else 0.0
         times = self._approach_times() if approach else []
-        # From rest to rest a part of it takes that much with the same acceleration.
+        # From rest to rest, at the same acceleration, the time is as the root of the distance.
         took = sqrt(1.0 - u) * (took - dwell)
         end = times[-1] + took if times else max(took, APPROACH_TIME * (k > 0))
         return [*times, *(round(end + time - arrive[k], _DIGITS) for time in arrive[k:])]
@@ -305,14 +307,14 @@ class _Resumption:
     # -- splines ---------------------------------------------------------------------------------
 
     def _resumed_spline(self, points: list[Waypoint]) -> ResumedGoal:
-        """Return the rest of a spline, on which the arm gathers speed first, as it is at rest."""
+        """Return the rest of a spline, on which the arm first gathers speed from rest."""
         assert self.spline is not None
         spline, zero = self.spline, self._approach_times()[: len(points)]
         points = [replace(point, time=time) for point, time in zip(points, zero, strict=True)]
         places = [self.begin] * len(points)
         begin, end = spline.time(self.begin), spline.end
         ramp = min(max(2.0 * (spline.time(self.stopped) - begin), _RAMP_TIME), end - begin)
-        # In the time t of the ramp the curve's time passes by t^2 / (2 ramp).
+        # After a time t of the ramp, t^2 / (2 ramp) of the curve's time has passed.
         knots = [time for time in spline.knots if begin + NO_FRACTION < time]
         gathered = begin + 0.5 * ramp * np.linspace(0.0, 1.0, _RAMP_POINTS + 1)[1:] ** 2
         apart = ramp / _RAMP_POINTS**2
@@ -338,7 +340,7 @@ class _Resumption:
     # -- events ----------------------------------------------------------------------------------
 
     def _time_since(self, waypoint: int, field: str, offset: float) -> float:
-        """Return how long before the place a point was passed [s]; no less than needed."""
+        """Return the time from a waypoint to the place [s]; 0 if the offset does not need it."""
         if offset <= 0.0:
             return 0.0
         if self.timed:
@@ -364,7 +366,7 @@ class _Resumption:
 
 
 class _Spline:
-    """The curve of a spline in the frame of its goal, from its first point or its start on."""
+    """The curve of a spline in the frame of its goal, from its first point or the start on."""
 
     def __init__(self, table: GoalTable, start: Pose | None) -> None:
         points = table.waypoints
@@ -423,7 +425,12 @@ class _Spline:
         )
 
     def waypoint(self, time: float, at: float, rate: float, gain: float) -> Waypoint:
-        """Return the point of a time [s], for a time of which so much passes in a second."""
+        """
+        Return the point of the curve at a time [s], for a goal that passes it at another rate.
+
+        :param at: time of the point in that goal [s].
+        :param rate: time of the curve that passes in each second; ``gain``: its change [1/s].
+        """
         assert self.curve is not None
         rows = self.curve.at(np.array([time]))
         last = time >= self.end - 1e-9
@@ -449,7 +456,7 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             'is true, so the goal does not hold all points of its path',
             'send what is left of the path as a goal of its own',
         )
-    # The name may have a prefix. A goal that knows the pose of its frame keeps it.
+    # The name may have a prefix. A goal that has the pose of its frame keeps this pose.
     if goal.frame_id.endswith(FRAMES_OF_TOOL) and goal.T_base_frame == IDENTITY:
         raise InvalidGoal(
             'trajectory.header.frame_id',

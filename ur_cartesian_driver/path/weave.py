@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, line, RestToRest, Stroke
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 
-#: Points on each wave, and the step of their numeric twists [s].
+#: Points on each wave, and the time step of the differences that give their twists [s].
 _POINTS_PER_WAVE = 8
 _STEP = 1e-5
 

@@ -3,9 +3,9 @@
 """
 Check a goal and plan it: primitives, times, joint configurations, report.
 
-:func:`check` makes the checks that need no robot, :func:`plan` all others; both refuse a goal by
-raising a :class:`~ur_cartesian_driver.motion.errors.GoalRefused`; :func:`plan_joint_goal` does
-both for a joint goal. A goal that passes becomes a
+:func:`check` makes the checks that need no robot; :func:`plan` makes these and all others;
+:func:`plan_joint_goal` does the same for a joint goal. Each of them refuses a goal by raising a
+:class:`~ur_cartesian_driver.motion.errors.GoalRefused`. A goal that passes becomes a
 :class:`~ur_cartesian_driver.motion.plan.plan.Plan`. Nothing here moves a robot.
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ['PlanningOptions', 'check', 'plan', 'plan_joint_goal']
 
-# Who composes a path or sends a goal needs the rules for its fields, and no planner.
+# Code that composes a path or sends a goal needs the rules for its fields, but no planner.
 __getattr__ = lazy_names(
     __name__,
     {

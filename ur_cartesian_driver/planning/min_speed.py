@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The demand of a goal that its tool is not slower than asked (``min_speed_fraction``)."""
+"""Check that the tool of a goal is nowhere slower than demanded (``min_speed_fraction``)."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ur_cartesian_driver.motion.plan.slow_stretch import (
 )
 
 _FIELD = 'min_speed_fraction'
-#: Speeds that are lower by less than this part are rounded.
+#: A speed that is too low by less than this fraction is taken for a rounding error.
 _ROUNDING = 1e-6
 
 
 def slower_by(goal: Goal) -> float:
-    """Return the part of a speed by which slow stretches must be found for a goal."""
+    """Return the fraction by which the tool must be slower than asked for a stretch to be slow."""
     return min(SLOWER_BY, 1.0 - goal.min_speed_fraction + _ROUNDING)
 
 
@@ -29,8 +29,8 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
     """
     Refuse a goal whose tool is slower than demanded.
 
-    :raises JointLimitExceeded: joints limit its speed.
-    :raises InvalidGoal: the path or its numbers do.
+    :raises JointLimitExceeded: joint limits make the tool slow.
+    :raises InvalidGoal: the path or the numbers of the goal make it slow.
     """
     counted = [each for each in stretches if each.counts]
     worst = min(counted, key=lambda each: each.lowest / each.asked, default=None)
@@ -48,7 +48,7 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
 
 def unknown_speed_remark(goal: Goal, blends: Sequence[int], free: Sequence[int]) -> list[str]:
     """
-    Return the remark on what a demand does not hold for.
+    Return the remark that names the motions whose tool speed is not known, and so not checked.
 
     :param blends: the points with blends.
     :param free: the points of joint and OPTIMIZED motions.

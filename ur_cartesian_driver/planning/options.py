@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of planning: bounds, defaults and what to do where a goal exceeds a bound."""
+"""The parameters of planning: bounds, defaults and what to do if a goal exceeds a bound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, D
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
-#: The longest path, and the widest clearance [m], that make sense.
+#: The largest number of points, and the largest clearance [m], that make sense.
 MAX_POINTS, MAX_CLEARANCE = 1_000_000, 1.0
 
 
@@ -23,11 +23,11 @@ class ProgramTraits(Protocol):
 
     @property
     def dialect(self) -> Dialect:
-        """The messages that it understands."""
+        """The messages that the program understands."""
 
     @property
     def prelude(self) -> Prelude:
-        """The functions of others that it contains."""
+        """The user's functions that the program contains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,13 +38,12 @@ class PlanningOptions:
     :raises ValueError: an option is not in its range.
     """
 
-    #: Largest number of points. 20,000 in flat arrays (packed) arrive within milliseconds, as
-    #: messages of their own within 2 s.
+    #: Largest number of points. 20,000 points arrive within milliseconds in flat arrays (packed),
+    #: within 2 s as separate messages.
     max_points: Annotated[int, Range(1, MAX_POINTS)] = 100_000
     #: Largest age of a goal's header.stamp on arrival [s].
     stamp_tolerance: Annotated[float, Range(0.0, 3600.0)] = 1.0
-    #: Largest distance of the TCP from a first point at time 0, which is where the robot stands
-    #: [m].
+    #: Largest distance of the TCP from a first point at time 0 [m]: the robot must stand there.
     start_tolerance_position: Annotated[float, Range(0.0, 1.0)] = 0.001
     #: Largest angle of the TCP from a first point at time 0 [rad].
     start_tolerance_angle: Annotated[float, Range(0.0, 3.2)] = 0.01
@@ -55,16 +54,18 @@ class PlanningOptions:
     #: for timed ones that need more, see on_too_fast. 0.25 m/s is the usual limit for working next
     #: to an arm; raise it when you know your cell.
     max_tool_speed: Annotated[float, Range(0.0, 10.0)] = 0.25
-    #: The times of a goal need more speed than the limits allow: refuse it, or slow it down.
+    #: What to do if the times of a goal need more speed than the limits allow: refuse the goal, or
+    #: slow it down.
     on_too_fast: Literal['refuse', 'slow'] = 'refuse'
-    #: A line or arc cannot arrive in the required posture, or passes a singularity, the end of a
-    #: joint's range or poses out of reach. refuse: refuse the goal. movej: go to its end by a
-    #: joint motion; the path is then not straight.
+    #: What to do if a line or arc cannot arrive in the required posture, or passes a singularity,
+    #: the end of a joint's range or poses out of reach. refuse: refuse the goal. movej: go to its
+    #: end by a joint motion; the path is then not straight.
     on_posture_change: Literal['refuse', 'movej'] = 'refuse'
-    #: The arm comes closer to itself than min_clearance: 'off' (in quotes: YAML reads the bare
-    #: word as false), warn (in the report), refuse, or auto: refuse for the models that have
-    #: meshes (UR3, UR5, UR10, UR3e, UR5e, UR7e), warn for the others. Cylinders that contain the
-    #: arm are measured where there are no meshes or the extra `collision` is not installed.
+    #: What to do if the arm comes closer to itself than min_clearance: 'off' (in quotes: YAML
+    #: reads the bare word as false), warn (in the report), refuse, or auto: refuse for the models
+    #: that have meshes (UR3, UR5, UR10, UR3e, UR5e, UR7e), warn for the others. If there are no
+    #: meshes or the extra `collision` is not installed, cylinders that contain the arm are
+    #: measured.
     self_collision: Literal['auto', 'off', 'warn', 'refuse'] = 'auto'
     #: Smallest distance of the arm to itself [m]. An arm differs from its model by some
     #: millimetres.
@@ -82,15 +83,15 @@ class PlanningOptions:
     #: Each 'kind pin value [current | voltage] [restore]': the value that an output takes when a
     #: goal or live session ends other than by success, and when the arm stops in a pause or a
     #: protective stop. kind is standard_digital, configurable_digital, tool_digital or
-    #: standard_analog (value: fraction of the range). restore: it gets its value back after a
-    #: pause; without it, a pause that changed the output ends the goal. A goal may name others.
-    #: Empty texts are skipped.
+    #: standard_analog (value: fraction of the range). restore: the output gets its value back
+    #: after a pause; without it, a pause that changed the output ends the goal. A goal may name
+    #: more outputs, and other values for these. Empty texts are skipped.
     #:
     #: Example: ['standard_digital 3 0', 'standard_analog 0 0.0 current']
     safe_outputs: tuple[str, ...] = ()
     #: Smallest angle between wrist 2 and the straight wrist on lines and arcs [rad]; 0.0: no
     #: limit. Near a singularity joints move fast or have to flip. Does not apply to joint motions,
-    #: nor where the arm starts there and moves away.
+    #: nor to an arm that starts near the singularity and moves away from it.
     singularity_margin_wrist: Annotated[float, Range(0.0, 1.0)] = 0.05
     #: Smallest angle between the elbow and the stretched arm on lines and arcs [rad]; 0.0: no
     #: limit.
@@ -98,61 +99,58 @@ class PlanningOptions:
     #: Smallest distance of the wrist centre from the point above or below the shoulder, measured
     #: along the arm, on lines and arcs [m]; 0.0: no limit.
     singularity_margin_shoulder: Annotated[float, Range(0.0, 1.0)] = 0.02
-    #: The controlled_frame of a goal is not the robot's active TCP. true: the TCP is set to that
-    #: frame until the goal ends. false: only goals that do not rotate it on straight or circular
-    #: segments are accepted.
+    #: What to do if the controlled_frame of a goal is not the robot's active TCP. true: the TCP is
+    #: set to that frame until the goal ends. false: only goals that do not rotate the frame on
+    #: straight or circular segments are accepted.
     allow_tcp_change: bool = True
     #: Whether the kinematics is the robot's calibrated one; if not, arcs are sent as poses.
     calibration_known: Detected[bool] = True
     #: Whether the robot's software has OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
     optimove_known: Detected[bool] = True
-    #: Whether it has path offsets of its own (PolyScope 5 from 5.6 on).
+    #: Whether the robot's software has path offsets of its own (PolyScope 5 from 5.6 on).
     path_offset_known: Detected[bool] = True
     #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: Detected[bool] = True
     #: The wire dialect of the robot program.
     dialect: Detected[Dialect] = NEWEST_DIALECT
-    #: The functions of others that it contains.
+    #: The user's functions that the robot program contains.
     prelude: Detected[Prelude] = NO_PRELUDE
     #: Prefix of joint and frame names, for two robots in one description, for example left_.
     tf_prefix: str = ''
 
-    #: Largest position error on the path, where the goal does not specify one [m]; 0.0: no limit.
+    #: Largest position error on the path if the goal does not specify one [m]; 0.0: no limit.
     path_tolerance_position: Annotated[float, Range(0.0, 10.0)] = 0.0
-    #: Largest orientation error on the path, where the goal does not specify one [rad]; 0.0: no
-    #: limit.
+    #: Largest orientation error on the path if the goal does not specify one [rad]; 0.0: no limit.
     path_tolerance_orientation: Annotated[float, Range(0.0, 3.2)] = 0.0
-    #: Largest velocity error on the path, where the goal does not specify one [m/s]; 0.0: no
-    #: limit.
+    #: Largest velocity error on the path if the goal does not specify one [m/s]; 0.0: no limit.
     path_tolerance_linear_velocity: Annotated[float, Range(0.0, 10.0)] = 0.0
-    #: Largest angular velocity error on the path, where the goal does not specify one [rad/s];
-    #: 0.0: no limit.
+    #: Largest angular velocity error on the path if the goal does not specify one [rad/s]; 0.0: no
+    #: limit.
     path_tolerance_angular_velocity: Annotated[float, Range(0.0, 50.0)] = 0.0
-    #: Largest acceleration error on the path, where the goal does not specify one [m/s^2]; 0.0: no
+    #: Largest acceleration error on the path if the goal does not specify one [m/s^2]; 0.0: no
     #: limit.
     path_tolerance_linear_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
-    #: Largest angular acceleration error on the path, where the goal does not specify one
-    #: [rad/s^2]; 0.0: no limit.
+    #: Largest angular acceleration error on the path if the goal does not specify one [rad/s^2];
+    #: 0.0: no limit.
     path_tolerance_angular_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
-    #: Largest position error at the end, where the goal does not specify one [m]; 0.0: no limit.
+    #: Largest position error at the end if the goal does not specify one [m]; 0.0: no limit.
     goal_tolerance_position: Annotated[float, Range(0.0, 10.0)] = 0.0
-    #: Largest orientation error at the end, where the goal does not specify one [rad]; 0.0: no
-    #: limit.
+    #: Largest orientation error at the end if the goal does not specify one [rad]; 0.0: no limit.
     goal_tolerance_orientation: Annotated[float, Range(0.0, 3.2)] = 0.0
-    #: Largest velocity error at the end, where the goal does not specify one [m/s]; 0.0: no limit.
+    #: Largest velocity error at the end if the goal does not specify one [m/s]; 0.0: no limit.
     goal_tolerance_linear_velocity: Annotated[float, Range(0.0, 10.0)] = 0.0
-    #: Largest angular velocity error at the end, where the goal does not specify one [rad/s]; 0.0:
-    #: no limit.
+    #: Largest angular velocity error at the end if the goal does not specify one [rad/s]; 0.0: no
+    #: limit.
     goal_tolerance_angular_velocity: Annotated[float, Range(0.0, 50.0)] = 0.0
-    #: Largest acceleration error at the end, where the goal does not specify one [m/s^2]; 0.0: no
+    #: Largest acceleration error at the end if the goal does not specify one [m/s^2]; 0.0: no
     #: limit.
     goal_tolerance_linear_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
-    #: Largest angular acceleration error at the end, where the goal does not specify one
-    #: [rad/s^2]; 0.0: no limit.
+    #: Largest angular acceleration error at the end if the goal does not specify one [rad/s^2];
+    #: 0.0: no limit.
     goal_tolerance_angular_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
 
-    #: How fast the robot turns the tool on lines for each m/s of their speed [rad/s]: 4 was
-    #: recorded once, 1 is the manual's word.
+    #: Angular speed of the tool on lines for each m/s of their speed [rad/s]: 4 was recorded once,
+    #: 1 is what the manual says.
     turn_ratio: Annotated[float, Range(1.0, 4.0)] = 4.0
 
     #: Speed of the tool on lines and arcs [m/s].
@@ -182,8 +180,8 @@ class PlanningOptions:
     live_target_angular_acceleration: Annotated[float, Range(0.01, 400.0)] = 4.0
     #: Largest speed of a joint when the tool follows live targets [rad/s].
     live_target_joint_velocity: Annotated[float, Range(0.001, 10.0)] = 1.5
-    #: Largest age of a live target, by its stamp or else since its receipt [s]; then the arm stops
-    #: smoothly until a newer one arrives.
+    #: Largest age of a live target [s], by its stamp or, without a stamp, since its receipt; after
+    #: that, the arm stops smoothly until a newer target arrives.
     live_target_max_age: Annotated[float, Range(0.01, 10.0)] = 0.2
     #: Time after the last live target at which the session ends [s].
     live_target_timeout: Annotated[float, Range(0.1, 3600.0)] = 2.0
@@ -195,12 +193,12 @@ class PlanningOptions:
     max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
     #: Largest acceleration of a joint that the times of a goal may need [rad/s^2].
     max_joint_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
-    # The wire carries joint positions no finer than the least tolerance.
+    # The least tolerance is the resolution of the joint positions on the wire.
     #: Largest distance of the tool from the curve through the points of SPLINE and SERVO goals
-    #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value takes more
+    #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value needs more
     #: pieces on the wire.
     spline_tolerance: Annotated[float, Range(1e-6, 0.01)] = 0.00005
-    #: Deceleration of the fastest joint where a goal with keep_open runs out of points [rad/s^2].
+    #: Deceleration of the fastest joint when a goal with keep_open runs out of points [rad/s^2].
     keep_open_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
     #: Longest duration of one segment [s]; the default is the largest that the robot accepts.
     max_segment_time: Annotated[float, Range(0.1, NEWEST_DIALECT.max_duration)] = (
@@ -219,11 +217,11 @@ class PlanningOptions:
             self,
             dialect=settings.dialect,
             prelude=settings.prelude,
-            # Another program may skip the command, and would then move the wrong TCP.
+            # An older program may skip the command, and would then move the wrong TCP.
             allow_tcp_change=self.allow_tcp_change and settings.dialect.is_own,
         )
 
     @property
     def older_program(self) -> str:
-        """The version of a robot program that is not the driver's own; '' = it is."""
+        """The version of the robot program if it is not the driver's own, else ''."""
         return self.dialect.older_program

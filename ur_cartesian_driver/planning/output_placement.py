@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Place the outputs of a goal, which are switched during the motion, as records of a plan."""
+"""Place the outputs that a goal switches during its motion as records in the plan."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def place_outputs(
     Return the segments with the outputs that are switched during the motion, in order of time.
 
     :param reference: the path of the TCP, with the times of the segments.
-    :param events: by the field of the goal, with waypoints numbered as the segments are.
+    :param events: the output events by goal field; their waypoints are numbered as the segments.
     :param blend_halves: the time in the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].
-    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at a time.
+    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
@@ -62,5 +62,5 @@ def place_outputs(
 
 
 def _waiting(records: Sequence[OutputRecord]) -> int:
-    """Return how many records wait for a trigger pose, laws included."""
+    """Return the number of records that wait for a trigger pose; speed laws do, too."""
     return sum(isinstance(each, SpeedLaw) or each.trigger_pose is not None for each in records)

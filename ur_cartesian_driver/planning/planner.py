@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal to a plan: choose the primitives, and refuse goals that the arm cannot execute.
+Plan a goal: choose the primitives, and refuse goals that the arm cannot execute.
 
-:func:`plan` checks a goal as far as that needs no robot
-(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses it for the TCP with which
-it runs, and gives it to the planner of its execution mode: :func:`plan_moves` or
+:func:`plan` makes the checks that need no robot
+(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses the goal for the TCP with
+which it runs, and gives it to the planner of its execution mode: :func:`plan_moves` or
 :func:`plan_spline_goal`.
 
-The stages of :func:`plan_moves`: the curve of every segment with the configuration in which it
-arrives, and the blends between them; clearance; times and speeds; primitives, outputs, reference
-path and report. The first reason for a refusal is raised.
+The stages of :func:`plan_moves`: the curve of every segment with the configuration in which the
+arm arrives, and the blends between the curves; clearance; times and speeds; primitives, outputs,
+reference path and report. The first stage that finds a reason for a refusal raises it.
 """
 
 from __future__ import annotations
@@ -91,13 +91,14 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
 )
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
-#: How far a CB3 arm may stand beside its target: 0.2 to 0.4 mrad were recorded of a UR10 [m].
+#: Static error of the TCP of a CB3 arm at full reach [m]: about 0.3 mm, from the 0.2 to 0.4 mrad
+#: that were recorded on the joints of a UR10.
 CB3_STATIC_ERROR = 3e-4
-#: Samples of the searches for rotations about a free axis, as multiples: the denser one sees
-#: singularities between those of the first.
+#: Sample densities of the two searches for rotations about a free axis, as multiples: the denser
+#: search sees singularities between the samples of the first.
 _SEARCH_DENSITIES = (1, 4)
 
-#: Plans a checked goal.
+#: A function that plans a checked goal.
 PlanGoal: TypeAlias = Callable[['GoalPlanner'], Plan]
 
 
@@ -112,8 +113,8 @@ def plan(
     Return the plan of a goal for a robot that rests in a state.
 
     :param state: joints, TCP pose and TCP offset are read from it.
-    :param arm: the kinematics, the robot's own calibrated one where it is known.
-    :param running: the motion to the first point as it was planned, where it has been sent.
+    :param arm: the kinematics, the robot's own calibrated one if it is known.
+    :param running: the planned motion to the first point, if it has been sent already.
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
     table = check(goal, options)
@@ -140,7 +141,7 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
     """
     Return the plan of a checked goal whose rotations about its free axis are to be chosen.
 
-    Where no choice passes, the orientations that the goal names may.
+    If no choice passes the checks, the orientations that the goal names are planned.
     """
     refusal: GoalRefused | None = None
     found = 'no rotation about the free axis was found that leads along the whole path'
@@ -189,7 +190,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
     )
     timings = SegmentTimings(geometries, options, arm.model, paths.blend_samples, planner.running)
     segments = _planned_rows(paths, geometries, timings)
-    del paths, samples  # long goals have many, and so has the reference
+    del paths, samples  # frees memory: long goals have many samples, and so has the reference
     motion = reference_path(
         state.actual_tcp_pose, geometries.begin, geometries.path, timings.chain.times
     )
@@ -261,9 +262,9 @@ PLANNERS: Mapping[ExecutionMode, PlanGoal] = {
 
 def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
     """
-    Return a plan whose path may give way.
+    Return a plan with the band in which path offsets may move the tool.
 
-    :raises GoalRefused: nowhere, or the arm could not be everywhere in the band.
+    :raises GoalRefused: offsets are possible nowhere, or the arm cannot reach all of the band.
     """
     path, settling = plan.reference, 0.0
     if plan.execution.traits.streams_setpoints:
@@ -287,11 +288,11 @@ def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
 
 class GoalPlanner:
     """
-    A goal as the planners of all execution modes get it; collects the remarks of its report.
+    The input of the planners of all execution modes; collects the remarks for the goal's report.
 
     :param retargeted: the checked goal for the TCP with which it runs.
     :param T_flange_active: the TCP that the robot has now.
-    :param running: the first segment as it was planned, where it has been sent.
+    :param running: the planned first segment, if it has been sent already.
     """
 
     def __init__(
@@ -311,7 +312,7 @@ class GoalPlanner:
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks = list(retargeted.remarks)
-        #: By point: why its primitive is not the plain one of its segment type.
+        #: By point: the reasons why its primitive is not the usual one of its segment type.
         self.reasons: dict[int, list[str]] = {}
         #: The points in base, rows (n, 7).
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
@@ -339,7 +340,7 @@ class GoalPlanner:
         """
         Return the number of the first point to which there is a motion.
 
-        That is 1 where point 0 is at time 0, because the robot is there already.
+        It is 1 if point 0 is at time 0, because the robot is at point 0 already; else it is 0.
 
         :raises InvalidGoal: point 0 is at time 0, but the robot is elsewhere.
         :raises InvalidPosture: point 0 is at time 0, but the arm has another posture.
@@ -360,10 +361,11 @@ class GoalPlanner:
         find_slow_stretches: Callable[[], tuple[SlowStretch, ...]],
     ) -> Plan:
         """
-        Return the plan of a motion with its stops and outputs; its remarks follow those collected.
+        Return the plan of a motion with its stops and outputs.
 
         :param goal: as planned, without stops.
-        :raises GoalRefused: the tool is slower than demanded, or an output has no place.
+        :param remarks: appended to the remarks that have been collected so far.
+        :raises GoalRefused: the tool is slower than demanded, or an output cannot be placed.
         """
         if goal.min_speed_fraction:
             check_min_speed(goal, find_slow_stretches())

@@ -6,9 +6,9 @@ The states from which goals are planned: an arm at rest, and a moving one after 
 A goal that preempts another one is checked from where the arm comes to rest.
 
 The robot program stops the arm along its joints (``stopj``): the leading joint brakes evenly and
-the others in proportion, so each travels half the way it would have travelled in the time of
-the stop. The prediction assumes that the stop begins now. The arm moves on while the goal is
-checked, for an unknown time; so a goal that passes is planned again when the arm is at rest.
+the others in proportion, so each travels half the distance that it would have travelled in the
+time of the stop. The prediction assumes that the stop begins now. But the arm moves on while the
+goal is checked, for an unknown time; so a goal that passes is planned again once the arm rests.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Joints, subtract6, ZERO6
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: How far friction may leave a joint beside its set-point [rad]: 0.2 to 0.4 mrad were recorded.
+#: Largest distance from its set-point at which friction may hold a joint [rad]: 0.2 to 0.4 mrad
+#: were recorded.
 MAX_STATIC_ERROR = 0.005
 
 
@@ -39,10 +40,11 @@ def state_at_rest(arm: Arm, q: Joints, T_flange_tcp: Pose = IDENTITY) -> RobotSt
 
 def at_set_point(state: RobotState, arm: Arm) -> RobotState:
     """
-    Return the state of an arm that stands exactly where its controller wants it to.
+    Return the state of an arm that rests exactly at its set-point.
 
-    The controller's moves begin at its set-point, and friction leaves the arm 0.2 to 0.4 mrad
-    beside it (recordings of real arms). An arm further away was moved by something else; it stays.
+    The controller's moves begin at its set-point, from which friction holds the arm 0.2 to 0.4
+    mrad away (recordings of real arms). The state of an arm that is farther away than
+    ``MAX_STATIC_ERROR`` is returned unchanged: something else has moved that arm.
     """
     q = state.target_q
     if max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
@@ -75,5 +77,5 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _tcp_at(state: RobotState, arm: Arm, q: Joints) -> Pose:
-    """Return the TCP at other joints by its change: an arm may be off its model."""
+    """Return the reported TCP, moved by the model's change: the arm may differ from its model."""
     return arm.forward(q) @ (arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A plan that knows its arm, so that it can be looked at."""
+"""A plan that knows its arm, so that it can be displayed."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A page that follows a robot: where the arm is, the planned path, its deviation, its state."""
+"""A page that follows a robot: the arm, the planned path, the deviation from it, the state."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.preview.motion_page import scene_of_plan, serve, Server
 
-#: The trail of the TCP has an edge for each of these lengths [m], and so many of them at most.
+#: The least length of an edge in the trail of the TCP [m], and the largest number of edges.
 TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
 
 
 class LivePage:
-    """A page that is served; :func:`live_page` gives one."""
+    """A page that is served; made by :func:`live_page`."""
 
     def __init__(self, server: Server, arm: Arm, state: RobotState, plan: Plan | None) -> None:
         """Draw the arm where it is, and the plan if there is one."""
@@ -34,7 +34,7 @@ class LivePage:
         if plan is None:
             self._scene.look_at(self._trail)
         self._text = server.gui.add_markdown('')
-        #: Where the page is.
+        #: The address of the page.
         self.url = f'http://{server.get_host()}:{server.get_port()}'
         self.update(state)
 
@@ -51,7 +51,7 @@ class LivePage:
         self._text.content = _text(state, self._plan)
 
     def say_lost(self, reason: str) -> None:
-        """Say that the robot is not heard; the arm stays where it was."""
+        """Say that the connection is lost; the arm is still drawn where it was."""
         self._text.content = f'**Not connected**: {reason}. The arm is drawn where it last was.'
 
 
@@ -68,10 +68,10 @@ def live_page(
     """
     Serve a page that follows a robot, until the end of the context.
 
-    :param state: returns the robot's present state.
-    :param plan: the motion that is expected of it.
-    :param host: the address that is listened on: everybody who reaches it sees the robot.
-    :param port: the first one that is tried; a free one is found from there on.
+    :param state: the robot's present state.
+    :param plan: the motion that is expected of the robot.
+    :param host: the address to listen on: anyone who can reach it sees the robot.
+    :param port: the first port to try; the next free one is taken.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     with serve(planes, host, port) as server:

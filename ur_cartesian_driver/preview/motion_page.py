@@ -3,8 +3,8 @@
 """
 One HTML page that shows the arm on its path: it opens in any browser, without a network.
 
-viser draws the scene, plays it over time, and makes the page. The scene is there once for each
-colouring of the path; beside it stand the legend and the report.
+viser draws the scene, plays it over time, and makes the page. The page holds the scene once for
+each colouring of the path, with the legend and the report beside it.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from ur_cartesian_driver.preview.plan_samples import Preview, sample, table
 
 Colours = NDArray[np.uint8]
 Colour = tuple[int, int, int]
-#: viser's, which has to be installed only where a page is made.
+#: A server of viser, which has to be installed only to make a page.
 Server = Any
 
-#: Time between two pictures of the arm at least, and how many there are at most [s].
+#: Least time between two pictures of the arm [s], and largest number of pictures.
 MIN_PERIOD = 0.04
 MAX_PICTURES = 600
-#: Largest number of points that are numbered.
+#: Largest number of points that are drawn.
 MAX_NUMBERED_POINTS = 60
 #: A margin of this fraction or more is drawn as ample; see :func:`normalized_margins`.
 AMPLE_MARGIN = 0.5
@@ -66,13 +66,14 @@ _TYPES: dict[str, tuple[str, Colour]] = {
     'OptimoveJ': ('optimized joint motion', (200, 60, 140)),
     'Spline': ('spline', (60, 80, 200)),
 }
-#: Where the camera is, where the path says nothing about it.
+#: Direction to the camera if the path gives none.
 _ASIDE = np.array((0.65, 0.65, 0.4))
 _BLEND: Colour = (240, 200, 60)
 _LOW, _MIDDLE, _HIGH = np.array([(205, 40, 40), (235, 190, 40), (40, 150, 70)], dtype=np.float64)
-#: Where a refusal happens: the point, and how far on the path to it.
+#: The scene and the settings in viser's page.
 _DATA = re.compile(r'window\.__VISER_EMBED_DATA__="([^"]*)";')
 _CONFIG = 'window.__VISER_EMBED_CONFIG__'
+#: The place in the text of a refusal: the point, and the fraction of the segment to it.
 _PLACE = re.compile(r'(?:points|segments)\[(\d+)\]|point (\d+)')
 _FRACTION = re.compile(r'at ([\d.]+) % of its segment')
 
@@ -88,7 +89,7 @@ aside .refused { color: #c01818; font-weight: 600; }
 aside i { display: inline-block; width: .8em; height: .8em; margin: 0 .4em 0 .8em; }
 </style>
 """
-#: The scene that the address names is put where viser's page looks for it.
+#: Puts the scene that the address names where viser's page looks for it.
 _CHOICE = """
 <script>
 window.__VISER_EMBED_DATA__ = (SCENES => SCENES[location.hash.slice(1)] || SCENES.type)(%s);
@@ -109,7 +110,7 @@ def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
     """
     Return the page of a plan.
 
-    :param arm: the arm for which it was made.
+    :param arm: the arm for which the plan was made.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     preview = sample(plan, arm, plan.T_flange_active, _period(plan.duration))
@@ -136,7 +137,7 @@ def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Sce
 
 def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pose) -> str:
     """
-    Return the page of a goal that was refused: its points, and the place in red.
+    Return the page of a goal that was refused: its points, and the place of the refusal in red.
 
     :param q: where the arm stands [rad].
     :raises ImportError: viser is not installed; the text says how to get it.
@@ -199,7 +200,7 @@ def _by_speed(plan: Plan) -> _Colouring:
 
 
 def _by_margin(plan: Plan, arm: Arm, preview: Preview) -> _Colouring:
-    """Colour by the smaller of the distances from singularities and joint limits."""
+    """Colour by the smallest of the distances from singularities and joint limits."""
     known = ~np.isnan(preview.joints).any(axis=1)
     margins = normalized_margins(arm, preview.joints[known])
     at = np.interp(plan.reference.time[1:], preview.time[known], margins)
@@ -286,7 +287,7 @@ class Scene:
         self.set_tool(tcp)
 
     def set_tool(self, tcp: Pose) -> None:
-        """Draw the tool from flange to TCP, in the place of the one before."""
+        """Draw the tool from flange to TCP, in place of the previous tool."""
         T_link_tcp = self._frames.flange @ tcp
         reach = np.array([self._frames.flange.position, T_link_tcp.position])
         self._scene.add_line_segments(
@@ -332,22 +333,22 @@ class Scene:
         camera.position, camera.look_at = center + distance * out, center
 
     def set_trail(self, positions: Floats) -> None:
-        """Draw where the TCP has been, in the place of the trail before."""
+        """Draw the trail of the TCP, in place of the previous trail."""
         edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
         self._scene.add_line_segments('/trail', edges, _TRAIL, thickness=0.004)
 
     def pose_arm(self, q: Joints) -> None:
-        """Draw the arm with its joints there [rad]."""
+        """Draw the arm at joint positions [rad]."""
         self._move(self._frames.poses(np.array([q]))[0])
 
     def add_points(self, points: Iterable[tuple[int, Floats]]) -> None:
-        """Draw numbered points."""
+        """Draw points with their numbers, up to :data:`MAX_NUMBERED_POINTS` of them."""
         for number, place in list(points)[:MAX_NUMBERED_POINTS]:
             self.add_ball(f'points/{number}', place, 0.006, _POINT)
             self._scene.add_label(f'/points/{number}/label', str(number), font_screen_scale=0.7)
 
     def add_outputs(self, outputs: Iterable[tuple[str, Floats]]) -> None:
-        """Draw where outputs switch."""
+        """Mark the places where outputs switch."""
         for k, (text, place) in enumerate(outputs):
             self.add_ball(f'outputs/{k}', place, 0.008, _OUTPUT)
             self._scene.add_label(f'/outputs/{k}/label', text, font_screen_scale=0.7)
@@ -360,7 +361,7 @@ class Scene:
         """
         Return viser's page of the scene with the arm in motion.
 
-        Where the joints are not known the arm stays where it was.
+        While the joints are not known, the arm stays where it was.
         """
         known = ~np.isnan(q.sum(axis=1))
         poses = self._frames.poses(np.where(known[:, None], q, 0.0))
@@ -381,9 +382,9 @@ class Scene:
 @contextmanager
 def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> Iterator[Server]:
     """
-    Give a server of viser with floor and planes.
+    Run a server of viser with floor and planes.
 
-    :param port: 0 = any: it is only there to record the scene.
+    :param port: the first port to try; 0 = any, for a server that only records a scene.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     try:
@@ -394,7 +395,7 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
             '`pip install viser trimesh`.',
             name='viser',
         ) from error
-    with redirect_stdout(io.StringIO()):  # it greets, whatever it is told
+    with redirect_stdout(io.StringIO()):  # it prints a greeting in spite of verbose=False
         server = viser.ViserServer(host=host, port=port, verbose=False)
     try:
         _light(server.scene)
@@ -408,7 +409,7 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
 
 
 def _light(scene: Any) -> None:
-    """Light by lamps only: without a graphics card, viser's surroundings take many seconds."""
+    """Light by lamps only: without a graphics card, viser's environment map takes many seconds."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(cast_shadow=False)
     scene.add_light_hemisphere(

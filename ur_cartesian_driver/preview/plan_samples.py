@@ -3,8 +3,8 @@
 """
 Preview a plan: tool and joints over time, and a table.
 
-For pictures, markers and a check before the first run. The robot uses its own speed profile, so
-times are those expected at full speed.
+Samples serve for pictures, markers and a check before the first run. The robot uses its own speed
+profile; times are those that are expected of it at full speed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, Optimove
 class Preview:
     """A plan, sampled; one row for each time."""
 
-    #: (n,) from the start of the motion [s], the last one is its end.
+    #: (n,) the times since the start of the motion [s]; the last one is its end.
     time: Floats
     #: (n, 7) of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
     poses: Floats
@@ -43,7 +43,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     """
     Return the expected motion of tool and joints.
 
-    :param T_flange_tcp: the TCP of the robot, where the plan does not need another one.
+    :param T_flange_tcp: the TCP of the robot, used if the plan does not set another one.
     :param period: time between two samples [s].
     :raises ValueError: the period is not positive.
     """
@@ -52,7 +52,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     reference = plan.reference
     end = float(reference.time[-1])
     time = np.minimum(np.arange(ceil(end / period - 1e-9) + 1) * period, end)
-    # Where times repeat the later row counts, as the robot passes through both at once.
+    # Where times repeat, the later row is used, as the robot passes through both at once.
     row = np.clip(
         np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
     )
@@ -92,7 +92,7 @@ def postures(plan: Plan) -> str:
 
 
 def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
-    """Return what leads to each point, several pieces where it is a spline."""
+    """Return the segments that lead to each point, several in a spline."""
     return [
         list(segments)
         for _, segments in groupby(plan.segments, key=lambda segment: segment.waypoint)
@@ -114,7 +114,7 @@ def _line(segments: Sequence[PlannedSegment]) -> str:
 
 
 def _time(segments: Sequence[PlannedSegment]) -> str:
-    """Return the time of segments; OPTIMIZED moves have none that is known before."""
+    """Return the time of segments; that of OPTIMIZED moves is not known in advance."""
     if any(isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in segments):
         return '      ? s'
     return f'{sum(segment.duration for segment in segments):7.3f} s'
@@ -144,8 +144,8 @@ def _joints(
     """
     Return joint positions for poses at row positions (row + fraction) of the reference path.
 
-    The solution nearest to the one before; in joint moves, which may pass through singularities
-    where branches meet, the one nearest to the straight line in joint space.
+    Each row is the solution nearest to the one before. In joint moves, which may pass through
+    singularities where branches meet, it is the one nearest to the straight line in joint space.
     """
     lines = _joint_moves(plan)
     point = plan.reference.point

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The dashboard (29999): a command is one line of text, and so is its reply.
+The dashboard (port 29999): a command is one line of text, and so is its reply.
 
 The server greets with one line. Then it answers each command with exactly one line, in order;
 nothing else links reply and command. The reply to a refused command is a sentence for people, so
-success is recognized by its form (:data:`COMMAND_SPECS`).
+success is recognized by the form of the reply (:data:`COMMAND_SPECS`).
 
 The available commands depend on the software: CB3 robots have versions up to 3, e-Series robots
 from 5. PolyScope X has no dashboard.
@@ -26,7 +26,7 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 BANNER = 'Connected: Universal Robots Dashboard Server'
 #: Longest line in either direction [bytes].
 MAX_LINE_LENGTH = 8192
-#: Most commands that may wait for their replies.
+#: Largest number of commands that wait for their replies.
 MAX_PENDING_REQUESTS = 64
 
 
@@ -38,8 +38,8 @@ class CommandSpec:
     :param reply: the reply, with ``{}`` for its value.
     :param takes_argument: whether a text follows the command.
     :param argument_is_optional: whether the text may be left out.
-    :param cb3: first CB3 software that has the command; None = none has.
-    :param e_series: the same for e-Series.
+    :param cb3: first CB3 software version that has the command; None = no version has it.
+    :param e_series: first e-Series software version that has it; None = no version has it.
     """
 
     reply: str
@@ -54,7 +54,7 @@ class CommandSpec:
         return re.compile(re.escape(before) + ('(.*)' if value else '') + re.escape(after))
 
     def is_available(self, version: tuple[int, int]) -> bool:
-        """Tell whether a software version has the command."""
+        """Return whether a software version has the command."""
         min_version = self.cb3 if version < (5, 0) else self.e_series
         return min_version is not None and version >= min_version
 
@@ -122,7 +122,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     }
 )
 
-#: Possible values of replies that consist of nothing else.
+#: Possible values in some replies, above all in those that consist only of the value.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     {
         'running': re.compile('true|false'),
@@ -146,7 +146,7 @@ class DashboardRequest:
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Check that the command exists and is one line."""
+        """Refuse an unknown command, several lines, and a missing or surplus argument."""
         spec = COMMAND_SPECS.get(self.name)
         if spec is None:
             raise LocalProtocolError(f'{self.name!r} is not a dashboard command.')
@@ -172,7 +172,7 @@ class DashboardReply:
     A reply and the command that it belongs to.
 
     :param text: the line.
-    :param value: its value if the command succeeded ('' if it has none), otherwise None.
+    :param value: value in the line if the command succeeded ('' = without value), else None.
     """
 
     request: DashboardRequest
@@ -181,7 +181,7 @@ class DashboardReply:
 
     @property
     def ok(self) -> bool:
-        """Tell whether the command succeeded."""
+        """Return whether the command succeeded."""
         return self.value is not None
 
 
@@ -193,7 +193,7 @@ class DashboardGreeting:
 
 
 def parse_reply(request: DashboardRequest, line: str) -> DashboardReply:
-    """Return the meaning of a reply."""
+    """Return a reply with its value, if it reports success."""
     match = COMMAND_SPECS[request.name].reply_pattern().fullmatch(line.rstrip())
     value = None if match is None else ''.join(match.groups())
     value_pattern = _VALUE_PATTERNS.get(request.name)
@@ -215,7 +215,7 @@ class DashboardClientCodec:
         """
         Return the line of a command and remember that its reply is due.
 
-        :raises LocalProtocolError: there is no such command, or too many wait for a reply.
+        :raises LocalProtocolError: command or argument is invalid, or too many commands wait.
         """
         request = DashboardRequest(name=name, argument=argument)
         if len(self._pending) >= MAX_PENDING_REQUESTS:
@@ -227,10 +227,10 @@ class DashboardClientCodec:
 
     def feed(self, data: bytes) -> list[DashboardGreeting | DashboardReply]:
         """
-        Take bytes from the server (none at all = its end) and return the replies in them.
+        Take bytes from the server (``b''`` = end of stream) and return the replies in them.
 
-        :raises RemoteProtocolError: a reply without a command, a line that is too long or
-            truncated, or the end while a command waits.
+        :raises RemoteProtocolError: a reply has no command, a line is too long or truncated, or
+            the stream ended while a command waited.
         """
         events: list[DashboardGreeting | DashboardReply] = []
         lines = self._lines.feed(data)
@@ -253,13 +253,13 @@ class DashboardClientCodec:
 
 
 class DashboardServerCodec:
-    """The server: decodes commands; reply with :func:`success` or any text."""
+    """The server: decodes commands; a reply is made by :func:`success`, or is any other line."""
 
     def __init__(self, version: tuple[int, int] | None = None) -> None:
         """
         Start empty.
 
-        :param version: the software, which has not all commands; None = has them all.
+        :param version: software version, whose commands are accepted; None = all commands.
         """
         self._lines = LineBuffer(MAX_LINE_LENGTH)
         # Longest first, so that ``load installation`` is not taken for ``load``.
@@ -275,9 +275,9 @@ class DashboardServerCodec:
 
     def feed(self, data: bytes) -> list[DashboardRequest | str]:
         """
-        Take bytes from a client (none at all = its end) and return its commands.
+        Take bytes from a client (``b''`` = end of stream) and return its commands.
 
-        A line that is not a command is returned as it is; it needs a reply, too
+        A line that is not a command is returned as text; it also needs a reply
         (:func:`not_understood`).
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.

@@ -7,7 +7,7 @@ Every number on the robot program's sockets is a big-endian int32, usually a val
 A value that does not fit raises an error before a byte is sent; otherwise the robot would read a
 wrapped number and move there.
 
-A stream is cut into records (of one size), frames (that begin with their size) or lines. Each
+A stream is cut into records (of a fixed size), frames (which begin with their size) or lines. Each
 buffer holds at most one incomplete unit, of a bounded size, so a peer that sends nonsense cannot
 exhaust the memory. A stream that ends inside a unit is an error, because something was lost.
 """
@@ -20,7 +20,7 @@ from typing import Generic, TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 
-#: Factor of a value before it is rounded to an integer.
+#: Factor by which a value is multiplied before it is rounded to an integer.
 FIXED_POINT = 1_000_000
 
 INT32_MIN = -(2**31)
@@ -37,11 +37,11 @@ def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
     """
     Return the int32 of a value, ties rounded away from zero.
 
-    :param field: its name, for the error text.
+    :param field: name of the value, for the error text.
     :raises LocalProtocolError: the value is not finite or does not fit.
     """
     scaled = value * scale
-    # NaN fails this comparison. The rounding below moves a number by at most half a unit.
+    # NaN fails this comparison, too. The bounds include what rounds to the outermost integers.
     if not INT32_MIN - 0.5 < scaled < INT32_MAX + 0.5:
         raise range_error(value, field, scale)
     whole = int(scaled)
@@ -67,7 +67,7 @@ def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProt
 
 def checked_int32(value: int, field: str) -> int:
     """
-    Return an integer that is sent unscaled.
+    Return an integer that is sent unscaled, if it fits.
 
     :raises LocalProtocolError: the value does not fit.
     """
@@ -80,16 +80,16 @@ def checked_int32(value: int, field: str) -> int:
 
 
 def hex_text(data: bytes) -> str:
-    """Return bytes as hexadecimal digits for an error text, truncated if they are many."""
+    """Return bytes as hexadecimal digits for an error text, truncated if there are many."""
     text = data[:_MAX_QUOTED].hex()
     return f'{text}... ({len(data)} bytes)' if len(data) > _MAX_QUOTED else text or 'no bytes'
 
 
 def checked_size(data: bytes, size: int, what: str) -> bytes:
     """
-    Return a record whose size was checked.
+    Return a record after checking its size.
 
-    :raises RemoteProtocolError: the record has another size.
+    :raises RemoteProtocolError: the record has a different size.
     """
     if len(data) != size:
         raise RemoteProtocolError(
@@ -99,14 +99,14 @@ def checked_size(data: bytes, size: int, what: str) -> bytes:
 
 
 class RecordDecoder(Generic[T]):
-    """Decodes a stream of records of one size."""
+    """Decodes a stream of records of a fixed size."""
 
     def __init__(self, size: int, what: str, decode: Callable[[bytes], T]) -> None:
         """
         Start empty.
 
         :param size: bytes in a record.
-        :param what: what a record is, for error texts.
+        :param what: the name of a record, for error texts.
         :param decode: turns one record into a message.
         """
         self._size = size
@@ -116,7 +116,7 @@ class RecordDecoder(Generic[T]):
 
     def feed(self, data: bytes) -> list[T]:
         """
-        Take bytes from the stream (none at all = its end) and return the messages in them.
+        Take bytes from the stream (``b''`` = end of stream) and return the messages in them.
 
         :raises RemoteProtocolError: a message is wrong, or the stream ended inside one.
         """
@@ -137,7 +137,7 @@ class ResultDecoder(RecordDecoder[E]):
         """
         Start empty.
 
-        :param what: what a result is, for error texts.
+        :param what: the name of a result, for error texts.
         """
 
         def decode(record: bytes) -> E:
@@ -178,7 +178,7 @@ class FrameBuffer:
         :param size_width: bytes of the size field.
         :param min_size: smallest size of a frame [bytes].
         :param max_size: largest size that is accepted [bytes]; it bounds the memory.
-        :param what: what a frame is, for error texts.
+        :param what: the name of a frame, for error texts.
         """
         self._width = size_width
         self._bounds = (min_size, max_size)
@@ -187,12 +187,12 @@ class FrameBuffer:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether the stream is between two frames."""
+        """Return whether the stream is between two frames."""
         return not self._buffer
 
     def feed(self, data: bytes) -> list[bytes]:
         """
-        Take bytes from the stream (none at all = its end) and return the complete frames.
+        Take bytes from the stream (``b''`` = end of stream) and return the complete frames.
 
         :raises RemoteProtocolError: a size is impossible, or the stream ended inside a frame.
         """
@@ -228,8 +228,8 @@ class LineBuffer:
     """
     Cuts a stream into lines of text; a carriage return before the line feed is dropped.
 
-    Bytes that are not UTF-8 appear as backslash escapes: an odd character in a text for people
-    does not end a connection.
+    Bytes that are not UTF-8 become backslash escapes, so that an odd character in a text for
+    people does not end a connection.
     """
 
     def __init__(self, limit: int = 65536) -> None:
@@ -243,7 +243,7 @@ class LineBuffer:
 
     def feed(self, data: bytes) -> list[str]:
         """
-        Take bytes from the stream (none at all = its end) and return the complete lines.
+        Take bytes from the stream (``b''`` = end of stream) and return the complete lines.
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside a line.
         """
@@ -266,15 +266,15 @@ def decode_text(data: bytes) -> str:
     return data.decode('utf-8', 'backslashreplace')
 
 
-#: Longest text of a robot that people get to see.
+#: Longest text from a robot that is shown to people [characters].
 _MAX_SHOWN = 400
 
 
 def to_single_line(text: str) -> str:
     """
-    Return a text of a robot for a log or a message: one line of bounded length.
+    Return a text from a robot, for a log or a message, as one line of bounded length.
 
-    Control characters are removed: they could forge lines or control the terminal.
+    Unprintable characters become spaces: they could forge lines or control the terminal.
     """
     shown = ''.join(c if c.isprintable() else ' ' for c in text[:_MAX_SHOWN]).strip()
     return f'{shown}...' if len(text) > _MAX_SHOWN else shown

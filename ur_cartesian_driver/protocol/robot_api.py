@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The Robot API of PolyScope X, in place of other robots' dashboard: HTTP requests with JSON.
+The Robot API of PolyScope X, which replaces the dashboard of other robots: HTTP with JSON.
 
 Commands keep the names that they have on the dashboard, so one call serves every generation;
-:data:`API_COMMANDS` has the request of each. The robot describes its own version of the API at
-``/docs`` and ``/openapi.json`` below :data:`BASE_PATH`, on port 80.
+:data:`API_COMMANDS` has the requests for each name. The robot describes its own version of the API
+at ``/docs`` and ``/openapi.json`` below :data:`BASE_PATH`, on port 80.
 
-A request that changes the robot is answered when the robot has done it. Its status is 403 unless
-the robot is in remote control, 409 if the robot cannot do it in its present state, 504 if it takes
-too long. An error has the fields ``message`` and ``details``; one in the request ``detail``.
+A request that changes the robot is answered after the change. The status is 403 unless the robot
+is in remote control, 409 if its present state does not allow the change, 504 if the change takes
+too long. An error has the fields ``message`` and ``details``; an invalid request, ``detail``.
 
 Paths, bodies and first versions come from Universal Robots' client library 2.14
 (``dashboard_client_implementation_x.cpp``); it and other clients list the statuses.
@@ -27,11 +27,11 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.protocol.dashboard import DashboardReply, DashboardRequest
 
 BASE_PATH = '/universal-robots/robot-api'
-#: The first software with a Robot API; PolyScope X before it has neither that nor a dashboard.
+#: The first software with a Robot API; older PolyScope X has neither this API nor a dashboard.
 FIRST_VERSION = (10, 11)
-#: Begins the text of a refusal because the robot is in local control.
+#: Beginning of the text of a refusal because the robot is in local control.
 FORBIDDEN = 'HTTP 403'
-#: Begins the text of a refusal because of the robot's state.
+#: Beginning of the text of a refusal because of the robot's state.
 CONFLICT = 'HTTP 409'
 
 _STATE, _PROGRAM = '/robotstate/v1/state', '/program/v1/state'
@@ -43,10 +43,10 @@ class ApiCommand:
     """
     The request of one command.
 
-    :param body: the JSON of the request; ``{}`` stands for the argument. Empty = nothing is sent.
-    :param value: the field of the answer that holds the value; empty = there is none.
-    :param words: the dashboard's words for some values.
-    :param since: the first software that has it.
+    :param body: the JSON of the request; ``{}`` stands for the argument. Empty = without a body.
+    :param value: the field of the answer that holds the value; empty = without a value.
+    :param words: maps some values to the words of the dashboard.
+    :param since: the first software that has the request.
     """
 
     method: str
@@ -127,15 +127,15 @@ API_COMMANDS: Mapping[str, tuple[ApiCommand, ...]] = MappingProxyType(
         ),
     }
 )
-#: ``play`` of a paused program: the dashboard has one command for both.
+#: The request for ``play`` if the program is paused: the dashboard has one command for both cases.
 RESUME = _action(_PROGRAM, 'resume')
 
 
 def find_command(name: str, version: tuple[int, int]) -> ApiCommand:
     """
-    Return the request that a version has for a command.
+    Return the request for a command in a software version.
 
-    :raises LocalProtocolError: it has none.
+    :raises LocalProtocolError: the version has no such request.
     """
     for command in API_COMMANDS.get(name, ()):
         if version >= command.since:
@@ -146,7 +146,7 @@ def find_command(name: str, version: tuple[int, int]) -> ApiCommand:
 
 
 def encode_body(command: ApiCommand, argument: str) -> bytes:
-    """Return the body of a request; empty = it has none."""
+    """Return the body of a request; empty = without a body."""
     if not command.body:
         return b''
     return json.dumps(
@@ -158,9 +158,9 @@ def parse_answer(
     request: DashboardRequest, command: ApiCommand, status: int, body: bytes
 ) -> DashboardReply:
     """
-    Return the meaning of an answer.
+    Return an answer in the form of a dashboard reply.
 
-    :raises RemoteProtocolError: a success without the value that was asked for.
+    :raises RemoteProtocolError: the request succeeded, but the answer lacks the requested value.
     """
     fields = _fields(body)
     if not 200 <= status < 300:
@@ -181,7 +181,7 @@ def parse_answer(
 
 
 def _fields(body: bytes) -> Mapping[str, Any]:
-    """Return the JSON object of an answer; empty if it is none, as a proxy's page of an error."""
+    """Return the JSON object in an answer; empty for others, such as the error page of a proxy."""
     try:
         fields = json.loads(body)
     except ValueError:

@@ -23,30 +23,30 @@ class ConnectionStatus:
     """Progress of the connection, and the next step towards running a goal."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED
-    #: The next step, a sentence; empty when a goal can run.
+    #: The next step, as a sentence; empty when a goal can run.
     message: str = ''
     #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
-    #: As the robot reports them; empty until it has.
+    #: Model, software and serial number as the robot reports them; empty until then.
     robot_model: str = ''
     polyscope_version: str = ''
     serial_number: str = ''
     #: A robot program is connected to us.
     program_running: bool = False
-    #: It has shown that we rendered it.
+    #: The connected program has proved that this driver rendered it.
     program_is_own: bool = False
     calibration_known: bool = False
-    #: The ports that are open, by the name of the parameter.
+    #: The open ports, by the names of their parameters.
     ports: Mapping[str, int] = field(default_factory=dict)
 
     def not_ready(self) -> str:
-        """Return the sentence that says why no goal can run now; empty when one can."""
+        """Return a sentence that says why no goal can run now; empty when a goal can run."""
         if self.state is ConnectionState.READY:
             return ''
         return self.message or f'The connection is {self.state.name}.'
 
     def software(self) -> tuple[int, int, int]:
-        """Return major, minor and bugfix of ``5.21.0.1``; zeros while it is unknown."""
+        """Return major, minor and bugfix of, for example, ``5.21.0.1``; zeros while unknown."""
         numbers = [int(part) for part in self.polyscope_version.split('.') if part.isdigit()][:3]
         major, minor, bugfix = numbers + [0] * (3 - len(numbers))
         return major, minor, bugfix
@@ -55,11 +55,11 @@ class ConnectionStatus:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkGaps:
     """
-    The longest pauses since the last report [s].
+    The longest gaps since the last heartbeat of the robot loop [s].
 
     :param reports: between two states of the robot.
     :param keepalives: between two keepalives for the robot program.
-    :param state_age: the age of the oldest state of the robot.
+    :param state_age: the largest age of a state of the robot when it was read.
     """
 
     reports: float = nan
@@ -69,9 +69,9 @@ class LinkGaps:
 
 def timestamped(text: str, before: str = '') -> str:
     """
-    Return a text after the present time; an unchanged text keeps its time.
+    Return a text preceded by the present time; an unchanged text keeps its previous time.
 
-    :param before: the timestamped text that is replaced.
+    :param before: the timestamped text that the result replaces.
     """
     if before.endswith(f' UTC: {text}'):
         return before
@@ -79,17 +79,17 @@ def timestamped(text: str, before: str = '') -> str:
 
 
 def is_stopped(robot: RobotState) -> bool:
-    """Tell whether the safety system keeps the arm from moving."""
+    """Return whether the safety system keeps the arm from moving."""
     return robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
 def is_paused(robot: RobotState) -> bool:
-    """Tell whether the program is paused: it reads nothing until it is resumed."""
+    """Return whether the program is paused: it reads nothing until it is resumed."""
     return robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
 
 
 def has_ended(robot: RobotState) -> bool:
-    """Tell whether no program runs, whatever its sockets say."""
+    """Return whether no program runs, whatever its sockets say."""
     return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
 
 
@@ -105,13 +105,13 @@ def required_action(
     foreign_program: bool = False,
 ) -> str:
     """
-    Return the next step towards running a goal, a sentence; empty when one can run.
+    Return the next step towards running a goal, as a sentence; empty when a goal can run.
 
-    :param robot: its newest state; None = none yet.
-    :param stale: that the states of the robot are too old, as a sentence; empty = they are not.
+    :param robot: newest state of the robot; None = none yet.
+    :param stale: a sentence if the states of the robot are too old; empty = they are fresh.
     :param tcp_restore_pending: the TCP of the last goal has to be restored.
     :param program_is_ending: our program was told to end but is still connected.
-    :param foreign_program: a program runs on the robot that has not connected to us.
+    :param foreign_program: the robot runs a program that has not connected to us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
         return (
@@ -147,7 +147,7 @@ def required_action(
 
 
 def _needed_to_start(headless_mode: bool, foreign_program: bool) -> str:
-    """Return the sentence that says how our program gets to run."""
+    """Return the sentence that says how to start our program."""
     if foreign_program:
         remedy = (
             'call resend_robot_program'

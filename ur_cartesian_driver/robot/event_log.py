@@ -3,11 +3,11 @@
 """
 The recent events at one robot, to explain why a goal or a connection ended.
 
-"The connection dropped" helps nobody: it drops because a program has ended, which ended because of
-a stop, which has a code. Each of these arrives on another connection at another moment. So they
-are noted as they come, and read together when something has ended.
+"The connection dropped" explains little: it dropped because a program ended, which ended because
+of a stop, which has a code. Each of these facts arrives on a different connection at a different
+time. So events are noted as they come, and read together when a goal or a connection has ended.
 
-Pure: no socket; the clock comes in.
+Pure: no socket; the clock is a parameter.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from typing import Protocol
 
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: Older entries do not explain what has just ended [s].
+#: Age of entries that may explain an end [s]; older entries are left out.
 MAX_AGE = 3.0
-#: Bounds the memory, and what a person has to read.
+#: Largest number of entries; it bounds the memory, and the text that a person has to read.
 MAX_ENTRIES = 12
 
 
 class KeepaliveTimes(Protocol):
-    """When keepalives were sent to the robot program."""
+    """The times of keepalives to the robot program."""
 
-    #: When the last one was sent [s].
+    #: Time of the last keepalive [s].
     last_keepalive: float
-    #: The longest pause between two since this was reset [s].
+    #: The longest pause between two keepalives since the last reset of this number [s].
     max_keepalive_gap: float
 
 
@@ -57,14 +57,14 @@ class EventLog:
         """
         self._clock, self._keepalives, self._timeout = clock, keepalives, timeout
         self._entries: deque[EventLogEntry] = deque(maxlen=MAX_ENTRIES)
-        #: The robot's last report, also after the robot is lost, and its time [s].
+        #: The robot's last report, kept after the robot is lost, and its time [s].
         self._last_state: RobotState | None = None
         self._last_report = inf
-        #: The longest pause between keepalives in the period before this one [s].
+        #: The longest pause between keepalives in the previous period [s].
         self._last_gap = 0.0
 
     def note(self, text: str, *, is_robot_error: bool = False) -> None:
-        """Note what happens now; ``is_robot_error`` marks errors that the robot reports."""
+        """Note an event of this moment; ``is_robot_error``: the robot reports it as an error."""
         self._entries.append(EventLogEntry(self._clock(), text, is_robot_error))
 
     def note_report(self, robot: RobotState) -> None:
@@ -78,9 +78,9 @@ class EventLog:
 
     def robot_error(self, since: float = -inf) -> str:
         """
-        Return the newest error that the robot reported lately; empty if none.
+        Return the newest error that the robot reported recently; empty if none.
 
-        :param since: older ones do not count [s].
+        :param since: errors before this time are left out [s].
         """
         entries = (entry for entry in reversed(self._recent()) if entry.time >= since)
         return next((entry.text for entry in entries if entry.is_robot_error), '')
@@ -96,7 +96,7 @@ class EventLog:
         return self._clock() - self._keepalives.last_keepalive
 
     def event_chain(self) -> tuple[str, ...]:
-        """Return what led to an end, the first event first; then modes and keepalives."""
+        """Return the events that led to an end, oldest first, then modes and keepalives."""
         now = self._clock()
         return (
             *(f'{now - entry.time:.3f} s before: {entry.text}' for entry in self._recent()),
@@ -130,7 +130,7 @@ class EventLog:
 
 
 def mode_changes(before: RobotState, after: RobotState) -> tuple[str, ...]:
-    """Return which modes differ between two reports."""
+    """Return the changes of modes between two reports, as texts."""
     return tuple(
         f'{what} {old.name} -> {new.name}'
         for what, old, new in (

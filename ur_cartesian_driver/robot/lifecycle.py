@@ -5,14 +5,14 @@ The connection to the robot as a table of states and events.
 
 * **DISCONNECTED**: the robot does not answer; the link keeps trying.
 * **CONNECTING**: RTDE answers; the configuration of the robot (primary interface) is missing.
-* **CONNECTED**: the robot reports its state and is the configured model, but takes no goal: the
+* **CONNECTED**: the robot reports its state and is the configured model, but accepts no goal: the
   robot program is not connected, has ended or is paused (it would run the goal at some later
-  time), or the TCP of the last goal has to be restored.
-* **READY**: the robot program is connected and takes goals.
+  time), the states are too old, or the TCP of the last goal has to be restored.
+* **READY**: the robot program is connected and accepts goals.
 * **EXECUTING**: a goal runs; it may be paused and resumed.
-* **STOPPED**: a person, another client or the safety system stopped the robot. Nothing starts by
-  itself from here; a robot program that connects again leads out.
-* **REFUSED**: this driver must not move this robot, until its parameters are changed.
+* **STOPPED**: the safety system keeps the arm from moving. Nothing starts by itself from here;
+  when the stop is cleared, the state is CONNECTED until a robot program accepts goals.
+* **REFUSED**: this driver must not move this robot until the driver's parameters are changed.
 
 Pure: no socket, no clock.
 """
@@ -54,7 +54,7 @@ class ConnectionEvent(Enum):
 
 S, E = ConnectionState, ConnectionEvent
 
-#: An event that a state does not name leaves it unchanged.
+#: State -> event -> next state. An event that is not in the row of a state does not change it.
 TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = {
     S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
     S.CONNECTING: {

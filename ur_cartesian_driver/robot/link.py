@@ -3,16 +3,16 @@
 """
 The link to one robot: joins its interfaces into one connection that reconnects by itself.
 
-The link connects to RTDE first (which reports the version of the software and streams the state),
+The link first connects to RTDE (which reports the version of the software and streams the state),
 opens its own ports, connects to the primary interface (which reports model, geometry and errors,
-and takes the robot program), and then waits for the robot program to connect.
+and accepts the robot program), and then waits for the robot program to connect.
 
-Commands go through :mod:`~.program.program_control`. Power, brakes and programs are started on the
-first connection only (:mod:`~.program.auto_start`).
+Commands go through :mod:`~.program.program_control`. The arm is powered and the program is started
+automatically on the first connection only (:mod:`~.program.auto_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
-happened, on the event loop. A status that follows from an event is reported before it, so that
-the end of a goal never arrives while a lost robot still seems ready.
+happened, on the event loop. A status that follows from an event is reported before that event, so
+that the end of a goal never arrives while a lost robot still seems ready.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
 
-#: How long the link waits, after a loss, for its causes [s]: each comes on another connection.
+#: How long the link waits after a loss for its cause [s]: other connections report the cause.
 CAUSE_TIMEOUT = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkCallbacks:
-    """The ears of a link's owner; each is called on the event loop."""
+    """Callbacks of a link's owner; all are called on the event loop."""
 
-    #: The robot's newest state, before any status or event that follows from it: at READY the
-    #: state is known.
+    #: The robot's newest state, before any status or event that follows from it: when READY is
+    #: reported, the owner has a state.
     state: Callable[[RobotState], None]
     #: An event for the running goal.
     event: Callable[[Event], None]
@@ -69,9 +69,9 @@ class LinkCallbacks:
     status: Callable[[ConnectionStatus], None]
     #: The robot reported its calibrated geometry.
     geometry: Callable[[DhTable], None]
-    #: The robot reported the limits of its joints, before it is accepted.
+    #: The robot reported the limits of its joints; called before the robot is accepted.
     limits: Callable[[JointLimits], None]
-    #: A line for the log, with its level.
+    #: A log level and a line for the log.
     log: Callable[[int, str], None]
     #: Inputs, outputs or tool changed.
     signals: Callable[[Signals], None] = lambda _: None
@@ -86,7 +86,8 @@ class RobotLink:
         """
         Prepare; :meth:`run` connects.
 
-        :param may_upload: whether the first connection to the robot is the owner's first.
+        :param may_upload: whether the first connection may start the robot program: in the owner's
+            first robot loop, and in a later one if the program ran when the last loop was lost.
         """
         self._settings, self._callbacks = settings, callbacks
         self._status = LinkStatus(
@@ -95,16 +96,16 @@ class RobotLink:
             callbacks.status,
             callbacks.log,
         )
-        #: The software of the robot; None = it never answered.
+        #: Software version of the robot; None = the robot has never answered.
         self.version: ControllerVersion | None = None
-        #: The robot's newest state; None = it is not connected.
+        #: The robot's newest state; None = the robot is not connected.
         self.robot: RobotState | None = None
-        #: When that was true [s], and whether it is too old to go by.
+        #: Time of the newest state [s], and the check whether it is too old.
         self._state_time = inf
         self._stale = StaleStates(settings.max_state_age)
-        #: Its inputs, outputs and tool; None = not reported yet.
+        #: The robot's inputs, outputs and tool; None = not reported yet.
         self.signals: Signals | None = None
-        #: Whether it was in remote control when it was asked last; None = never asked.
+        #: Whether the robot was in remote control when last asked; None = never asked.
         self._remote_control: bool | None = None
         self._explain_timer: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(
@@ -152,7 +153,7 @@ class RobotLink:
             tasks.create_task(self._stay_connected())
 
     def close(self) -> None:
-        """Close everything; the robot program stops the arm, at the latest when we hang up."""
+        """Close all ports; the robot program stops the arm, at the latest when we hang up."""
         if self._explain_timer is not None:
             self._explain_timer.cancel()
         self.program.close()
@@ -167,23 +168,23 @@ class RobotLink:
         )
 
     def report_error(self, text: str) -> None:
-        """Take a sentence as the last error of the status, and log it."""
+        """Set the last error of the status to a sentence, and log it."""
         self._status.error(text)
 
     def set_serial_number(self, serial_number: str) -> None:
         """Set the serial number of the robot."""
         self._status.update(serial_number=serial_number)
 
-    # ---- news from the owner ------------------------------------------------------------------
+    # ---- calls of the owner -------------------------------------------------------------------
 
     def note_remote_control(self, remote: bool) -> None:
-        """Take note of whether clients may control the robot: a change needs new connections."""
+        """Note whether clients may control the robot; after a change, connect again."""
         if self._remote_control not in (None, remote):
             self._primary.reconnect()
         self._remote_control = remote
 
     def set_executing(self, busy: bool) -> None:
-        """Set whether a goal runs: that changes the status and the kind of keepalive."""
+        """Set whether a goal runs, which determines the status and the kind of keepalive."""
         self.program.is_executing = busy
         if busy:
             self._status.apply(ConnectionEvent.GOAL_STARTED)
@@ -193,7 +194,7 @@ class RobotLink:
             )
 
     def set_tcp_restore_pending(self, pending: bool) -> None:
-        """Set whether the TCP has to be restored: until it is, no goal starts."""
+        """Set whether the TCP still has to be restored; no goal starts before that."""
         if pending == self.control.tcp_restore_pending:
             return
         self.control.tcp_restore_pending = pending
@@ -218,7 +219,7 @@ class RobotLink:
 
     async def _serve_connection(self) -> str:
         """
-        Serve one RTDE connection from its first to its last byte and return why it ended.
+        Serve one RTDE connection from its first to its last byte; return the reason of its end.
 
         :raises OSError: the robot cannot be reached, or one of our ports is taken.
         :raises DriverError: the robot program cannot be made from the settings.
@@ -239,7 +240,7 @@ class RobotLink:
             stream.close()
 
     def _other_connections(self) -> list[Coroutine[None, None, NoReturn]]:
-        """Return the connections that last as long as the one to RTDE: primary, and signals."""
+        """Return the connections to keep while RTDE is connected: primary, and signals."""
         s = self._settings
         connections = [self._primary.stay_connected(s.robot_ip, s.primary_port)]
         if s.io_publish_rate > 0.0:
@@ -264,8 +265,8 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
-        # Unless a mode changes, no status follows from the packet: then the reaction of the goal,
-        # maybe a CANCEL, goes first.
+        # Unless a mode changes, the packet cannot change the status: then the goal reacts first,
+        # perhaps by a CANCEL.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
             self._callbacks.event(StateReceived(state=robot))
@@ -282,7 +283,7 @@ class RobotLink:
             self._callbacks.event(StateReceived(state=robot))
 
     def check_age(self) -> None:
-        """Take goals again, or no more, as the newest state ages; called often."""
+        """Accept goals only while the newest state is young enough; called often."""
         now = asyncio.get_running_loop().time()
         if self._stale.update(now - self._state_time, now):
             self._review_state()
@@ -326,7 +327,7 @@ class RobotLink:
             self._status.update(calibration_known=True)
 
     def _on_robot_error(self, text: str) -> None:
-        """Log an error that the robot reports."""
+        """Log an error that the robot reports, and set it as the last error of the status."""
         self.event_log.note(text, is_robot_error=True)
         self._status.error(text)
 
@@ -361,8 +362,8 @@ class RobotLink:
         """
         Handle the loss of the robot, or a failed attempt to connect.
 
-        :param reason: of the loss, for the outcome of the running goal.
-        :param status_text: the reason with the interface, for the status.
+        :param reason: reason of the loss, for the outcome of the running goal.
+        :param status_text: the reason with the name of the interface, for the status.
         """
         self.event_log.note(status_text)
         last_error = (
@@ -385,7 +386,7 @@ class RobotLink:
     # ---- status -------------------------------------------------------------------------------
 
     def _review_state(self) -> None:
-        """Derive the state of the connection from what robot and program report."""
+        """Derive the state of the connection from the robot's state and its program."""
         robot = self.robot
         if robot is None:
             return
@@ -404,7 +405,7 @@ class RobotLink:
                 self._status.apply(ConnectionEvent.GOAL_STARTED)
 
     def _takes_goals(self) -> bool:
-        """Tell whether the robot program reads messages, and its states are fresh."""
+        """Return whether the robot program reads messages, and the robot's states are fresh."""
         return self.control.tracker.reads(self.robot) and not self._stale.age
 
     def _required_action(self, state: ConnectionState) -> str:

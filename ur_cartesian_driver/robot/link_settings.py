@@ -19,7 +19,7 @@ Port: TypeAlias = Annotated[int, Range(0, 65535)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
-    """The connections to one robot; the defaults fit a real one."""
+    """The connections to one robot; the defaults are for a real robot."""
 
     #: Address of the robot.
     robot_ip: str = '127.0.0.1'
@@ -30,7 +30,7 @@ class LinkSettings:
     #: Port of the primary interface of the robot.
     primary_port: Port = 30001
     #: Port on this computer to which the robot program connects for control messages; 0: any free
-    #: port. Two drivers on one computer need different ones, also of the next three.
+    #: port. Two drivers on one computer need different numbers for this and the next three ports.
     reverse_port: Port = 50001
     #: Port that serves the robot program to the External Control URCap; 0: any free port.
     script_sender_port: Port = 50002
@@ -41,65 +41,64 @@ class LinkSettings:
     #: Address at which the ports on this computer listen; empty: the local address of the
     #: connection to the robot.
     bind_address: str = ''
-    #: Address to which the robot program connects, where that is another one (NAT, containers);
-    #: empty: the same.
+    #: Address to which the robot program connects, if it is not the address of these ports (NAT,
+    #: containers); empty: the same address.
     reverse_ip: str = ''
     #: Addresses that may connect to the ports on this computer; ['']: robot_ip.
     allowed_peers: tuple[str, ...] = ()
-    #: true: the driver sends its program to the robot, which must be in remote control (no pendant
-    #: needed; the simulator always is): once, on the first connection, if the arm is ready and no
-    #: other program runs; later when ~/resend_robot_program is called. false: the robot fetches
-    #: the program when a person plays one with the External Control URCap on the pendant.
+    #: true: the driver sends its program to the robot: once on the first connection, if the arm is
+    #: ready and no other program runs, and later when ~/resend_robot_program is called. No pendant
+    #: is needed, but the robot must be in remote control (the simulator always is). false: the
+    #: robot fetches the program when a person plays one with External Control on the pendant.
     headless_mode: bool = False
     #: Message version of the robot program: 2.14 for ours. For a robot that runs a saved, older
     #: External Control program: the version of its client library, rounded down to 2.0, 2.10 or
     #: 2.12 (in quotes). What such a program cannot do is refused, or done in another way that the
-    #: report explains. Not with headless_mode.
+    #: report explains. Not possible with headless_mode.
     wire_dialect: Annotated[str, OneOf(tuple(DIALECTS))] = NEWEST_DIALECT.name
     #: Time without a keepalive after which the robot program stops the arm [s].
     robot_receive_timeout: Annotated[float, Range(0.02, 10.0)] = 0.2
-    #: Largest age of the newest state of the robot [s]. Where the states are older, because the
-    #: network or this computer is overloaded, a violated tolerance is seen that much later: a
-    #: motion is stopped with CONNECTION_LOST, and no goal is taken until they have been younger
-    #: than half of it for 1 s. At least two periods of rtde_frequency; 0.0: any age.
+    #: Largest age of the newest state of the robot [s]; 0.0: any age. With older states, which
+    #: come from an overloaded network or computer, the driver would detect a violated tolerance
+    #: that much later. So it stops a motion with CONNECTION_LOST, and accepts no goal until the
+    #: states have been younger than half this age for 1 s. At least two periods of rtde_frequency.
     max_state_age: Annotated[float, Range(0.0, 10.0)] = 0.2
     #: true: with headless_mode, power on the arm and release its brakes on the first connection of
     #: this driver, and never again. Releasing the brakes moves the arm a little. false: a person
-    #: does it, or the services ~/dashboard/power_on and ~/dashboard/brake_release, or ~/recover.
+    #: does so, or the services ~/dashboard/power_on and ~/dashboard/brake_release, or ~/recover.
     auto_power: bool = False
-    #: true: ~/recover unlocks a protective stop also where its request does not say
-    #: unlock_protective_stop. Whoever sets it answers for that: the manufacturer forbids to reset
-    #: protective stops automatically, because the cause has to be looked for each time.
+    #: true: ~/recover unlocks a protective stop even if its request does not set
+    #: unlock_protective_stop. You are then responsible: the manufacturer forbids resetting
+    #: protective stops automatically, because a person has to look for the cause each time.
     unlock_protective_stops: bool = False
     #: Period of the keepalive to the robot program [s].
     keepalive_period: Annotated[float, Range(0.002, 1.0)] = 0.02
-    # A robot that reports less often than at the least rate cannot be monitored, nor be told from
-    # a lost one.
+    # A robot that reports at less than the smallest rate cannot be monitored, nor be distinguished
+    # from a lost one.
     #: Rate of the robot's RTDE reports [Hz]; 0.0: the largest that it supports (500, CB3: 125).
     rtde_frequency: Annotated[float, Range(10.0, 500.0, zero='as often as the robot can')] = 0.0
     #: Rate at which ~/io_states and ~/tool_data are checked for changes [Hz]; 0.0: never.
     io_publish_rate: Annotated[float, Range(0.0, 125.0)] = 25.0
     #: Deceleration of the leading axis when a goal is stopped [rad/s^2].
     stop_deceleration: Annotated[float, Range(0.1, 100.0)] = 4.0
-    #: SERVO: proportional gain of servoj. 1000 is what the manufacturer's guide uses. Higher
-    #: follows more closely; where the arm hums or shakes, lower it, or raise
+    #: SERVO: proportional gain of servoj. The manufacturer's guide uses 1000. With a higher gain
+    #: the arm follows more closely; if it hums or shakes, lower the gain, or raise
     #: servoj_lookahead_time.
     servoj_gain: Annotated[float, Range(100.0, 2000.0)] = 1000.0
-    #: SERVO: time that servoj looks ahead, and by which the arm lags behind [s]. 0.06 is the
-    #: guide's. Lower it, step by step and with the tool that is mounted, where corners have to
-    #: be sharper.
+    #: SERVO: time by which servoj looks ahead and the arm lags behind [s]. The guide uses 0.06.
+    #: For sharper corners, lower it step by step, with the tool mounted.
     servoj_lookahead_time: Annotated[float, Range(0.03, 0.2)] = 0.06
     #: SERVO: set-points in the robot program's buffer; servo_target_lag has to fit in at 500 Hz.
     servo_buffer_depth: Annotated[int, Range(20, 1000)] = 250
-    #: true: ~/run_script runs URScript of others on the robot, and script_prelude may name a file.
-    #: What it does is outside all checks of the driver, and whoever can call the service can move
-    #: the arm.
+    #: true: ~/run_script runs the caller's URScript on the robot, and script_prelude may name a
+    #: file. The driver checks nothing that this URScript does, and everyone who can call the
+    #: service can move the arm.
     allow_scripts: bool = False
-    #: File of URScript functions (def) that goals may call at points, script_calls: a gripper. It
-    #: becomes part of the robot program, and needs allow_scripts. A relative path begins where the
-    #: driver was started. Empty: none.
+    #: File of URScript functions (def) that goals may call at points (script_calls), for example
+    #: for a gripper. The file becomes part of the robot program, and needs allow_scripts. A
+    #: relative path begins at the folder in which the driver was started. Empty: no file.
     script_prelude: str = ''
-    #: Its functions, read once, so that planner and robot have the same.
+    #: The functions of script_prelude, read once, so that planner and robot use the same.
     prelude: Detected[Prelude] = field(init=False, default=NO_PRELUDE)
     #: true: offer ~/freedrive_mode, in which a person guides the arm by hand.
     allow_freedrive: bool = False
@@ -108,7 +107,7 @@ class LinkSettings:
         """
         Refuse values that cannot work together.
 
-        :raises ValueError: names the field, its value and the bound.
+        :raises ValueError: a value is invalid; the text names the field, its value and the bound.
         """
         check_parameters(self)
         self._check_dialect()
@@ -119,7 +118,7 @@ class LinkSettings:
                 'leave script_prelude out.'
             )
         if self.script_prelude:
-            # Here, because most drivers do without the parser of URScript.
+            # Imported here, because most drivers do not need the parser of URScript.
             from ur_cartesian_driver.robot.prelude_file import read_prelude
 
             object.__setattr__(self, 'prelude', read_prelude(self.script_prelude))
@@ -164,9 +163,9 @@ class LinkSettings:
 
 def _require_address(name: str, text: str) -> None:
     """
-    Refuse a host name or a network: it is compared with the addresses of clients.
+    Refuse a text that is not an IP address: it is compared with the addresses of clients.
 
-    :raises ValueError: names the field and the text.
+    :raises ValueError: the text is a host name or a network, for example.
     """
     try:
         ipaddress.ip_address(text)

@@ -14,13 +14,13 @@ from ur_cartesian_driver.robot.connection_status import ConnectionStatus, timest
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
 from ur_cartesian_driver.robot.transport import AttemptLog
 
-#: In these states nothing is known of the robot, or it is the wrong one: the reason is the
-#: message.
+#: States in which the robot is out of reach or the wrong one; then the message is the reason, not
+#: the next step.
 OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
-#: Through these each attempt to connect passes.
+#: The states through which each attempt to connect passes.
 ATTEMPTING = frozenset({*OUT_OF_REACH, ConnectionState.CONNECTING})
-#: How long a robot waits for its program before the log says so [s]: a program that is about to
-#: connect needs no help.
+#: How long a next step at CONNECTED must persist before it is logged [s]: a program that is about
+#: to connect needs no help.
 LOG_DELAY = 1.0
 
 
@@ -37,7 +37,7 @@ class LinkStatus:
         """
         Begin disconnected.
 
-        :param required_action: returns the next step in a state, a sentence.
+        :param required_action: returns the next step in a state, as a sentence.
         """
         self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
         self._attempts = AttemptLog(self._log_info, self._log_info)
@@ -49,7 +49,7 @@ class LinkStatus:
         return self.current.state
 
     def apply(self, event: ConnectionEvent, **changes: Any) -> None:
-        """Go to the state that the table of the life cycle names, with other changes."""
+        """Apply an event to the table of the life cycle, and change other fields as well."""
         self.update(state=next_state(self.state, event), **changes)
 
     def update(self, **changes: Any) -> None:
@@ -59,11 +59,11 @@ class LinkStatus:
             status = replace(status, message=self._required_action(status.state))
         if status != self.current:
             before, self.current = self.current, status
-            self._log_change(before, status)  # first: who waits for a state goes on at once
+            self._log_change(before, status)  # first: on_status resumes waiting code at once
             self._on_status(status)
 
     def error(self, text: str) -> None:
-        """Take a text as the last error, and log it."""
+        """Set the last error to a text, and log it."""
         self.update(last_error=timestamped(text))
         self._on_log(logging.ERROR, text)
 

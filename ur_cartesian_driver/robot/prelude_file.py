@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Read the URScript of the parameter ``script_prelude``, and refuse anything but functions."""
+"""Read the file of the parameter ``script_prelude``: functions, threads and assignments only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.urscript.parsing.syntax_tree import (
 )
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Longer files are mistakes [characters].
+#: Size above which a file must be a mistake [characters].
 MAX_SIZE = 200_000
 
 
@@ -28,7 +28,7 @@ def read_prelude(path: str) -> Prelude:
     """
     Return the functions of a file.
 
-    :raises ValueError: the file cannot be read or compiled; the sentence names file and line.
+    :raises ValueError: the file cannot be read or is no prelude; the text names file and line.
     """
     file = Path(path).expanduser()
     try:
@@ -46,8 +46,8 @@ def compile_prelude(text: str, name: str) -> Prelude:
     """
     Return the functions of a text.
 
-    :param name: of the file, for sentences.
-    :raises ValueError: it is no prelude; the sentence names file and line.
+    :param name: name of the file, for error texts.
+    :raises ValueError: the text is no prelude; the error text names file and line.
     """
     try:
         statements = parse_line(text).body
@@ -97,9 +97,9 @@ def compile_prelude(text: str, name: str) -> Prelude:
 
 def _code_lines(text: str, name: str) -> Iterator[str]:
     """
-    Yield the lines without comments: the External Control node divides the program by some.
+    Yield the lines that are not comments: the External Control node splits a program at markers.
 
-    :raises ValueError: a line with code contains one of these.
+    :raises ValueError: a line of code contains a marker.
     """
     for number, line in enumerate(text.split('\n'), start=1):
         if line.lstrip()[:1] in ('', '#'):
@@ -114,7 +114,7 @@ def _code_lines(text: str, name: str) -> Iterator[str]:
 
 
 def _defined_name(statement: Statement) -> str | None:
-    """Return the name that a statement on the first level defines; None = it defines none."""
+    """Return the name that a top-level statement defines; None = it defines none."""
     if isinstance(statement, FunctionDefinition):
         return statement.name
     if isinstance(statement, AssignStatement) and isinstance(statement.target, NameExpression):
@@ -132,7 +132,7 @@ def _function(definition: FunctionDefinition) -> PreludeFunction:
 
 
 def _names(node: SyntaxNode) -> Iterator[tuple[SyntaxNode, str]]:
-    """Yield all names below a node, with the nodes that have them."""
+    """Yield the names in a node and below it, each with the node that has it."""
     for field in ('identifier', 'name', 'function', 'thread'):
         if isinstance(word := getattr(node, field, None), str):
             yield node, word

@@ -1,14 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The primary interface: the robot reports its model and errors, and takes programs.
+The primary interface: the robot reports its model and errors, and accepts programs.
 
-A goal goes on while this connection is lost and made again.
+A goal continues while this connection is lost and established again.
 
-The robot decides when a client connects whether it may send: a connection that was made in local
-control stays read-only after the switch to remote control, and every request on it is refused with
-C210. Nothing else shows that, so a refusal makes a new connection, on which the refused request is
-sent once more, if it is still wanted. The robot drops connections when it is switched back.
+The robot decides when a client connects whether the client may send: a connection that was made in
+local control stays read-only after the switch to remote control, and every request on it is
+refused with C210. Nothing else reveals this, so after a refusal the client connects again, and
+sends the refused request once more if it is still wanted. The robot drops connections when it is
+switched back to local control.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ from ur_cartesian_driver.robot.transport import AttemptLog, Backoff, dial, TcpCo
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
-#: The robot reports its state ten times a second. A connection that is silent for so long [s] is
-#: dead, and a command to stop the program would be lost on it.
+#: Silence after which a connection is dead [s]; a command to stop the program would be lost on it.
+#: The robot reports its state ten times a second.
 SILENCE_TIMEOUT = 1.5
-#: Error code of a request on a connection that is read-only.
+#: Error code of a request on a read-only connection.
 READ_ONLY_CODE = 210
-#: How the title of the message begins that a secondary program failed, which stops no other.
+#: Beginning of a message's title if a secondary program failed, which stops no other program.
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
-#: A request that is older is not repeated [s]: whoever turns the key meanwhile starts nothing.
+#: Largest age of a request that is repeated [s]: switching to remote control later starts nothing.
 REPEAT_TIMEOUT = 1.0
 
 
@@ -48,15 +49,15 @@ class PrimaryCallbacks:
 
     #: The robot's configuration, at least once for each connection.
     configuration: Callable[[ConfigurationData], None]
-    #: Its calibrated geometry, as often as it is reported.
+    #: The robot's calibrated geometry, each time it is reported.
     geometry: Callable[[DhTable], None]
     #: The robot reports an error of its own or of its program.
     error: Callable[[str], None]
-    #: This connection failed, and why.
+    #: This connection failed; the text is the reason.
     connection_error: Callable[[str], None]
     #: A text that the robot program wrote.
     text: Callable[[str], None]
-    #: How often this connection failed for a reason.
+    #: This connection failed repeatedly for one reason; the text gives the reason and the count.
     failures: Callable[[str], None] = lambda _: None
 
 
@@ -68,7 +69,7 @@ class _Request:
 
 
 class PrimaryClient:
-    """One connection at a time, made again when it breaks."""
+    """One connection at a time, established again when it breaks."""
 
     def __init__(self, listener: PrimaryCallbacks) -> None:
         """Prepare; :meth:`stay_connected` connects."""
@@ -77,18 +78,18 @@ class PrimaryClient:
         self._decoder = primary.PrimaryDecoder()
         self._connection: TcpConnection | None = None
         self._has_configuration = self._has_received = False
-        #: Requests that a refusal may be about, and those to send on the next connection.
+        #: Requests that a refusal may concern, and requests to send on the next connection.
         self._sent: list[_Request] = []
         self._to_send: list[_Request] = []
-        #: The connection is closed to make another one.
+        #: The connection is being closed in order to connect again.
         self._is_reconnecting = False
 
     def send(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
         """
         Send a program or command; False while there is no connection.
 
-        :param is_wanted: asked before it is sent again, because the connection was read-only:
-            whether it is still to be carried out, and no other program would suffer.
+        :param is_wanted: called before the request is sent again on a new connection, because the
+            first was read-only; returns whether it is still wanted and disturbs no other program.
         """
         request = _Request(data, is_wanted, asyncio.get_running_loop().time())
         if self._is_reconnecting:
@@ -110,7 +111,7 @@ class PrimaryClient:
         return [request for request in requests if now - request.time < REPEAT_TIMEOUT]
 
     def _send_again(self) -> None:
-        """Send on a new connection what was refused on the one before, or came since."""
+        """Send the requests that the previous connection refused, and those that came since."""
         self._is_reconnecting = False
         requests, self._sent, self._to_send = self._recent(self._to_send), [], []
         for request in requests:
@@ -118,7 +119,7 @@ class PrimaryClient:
                 self._connection.send(request.data)
 
     def _repeats_refused(self) -> bool:
-        """Handle a refusal by a read-only connection; False = it is final."""
+        """Connect again after a refusal; False = no recent request, so the refusal is final."""
         if not (refused := self._recent(self._sent)):
             return False
         self._to_send += refused
@@ -143,15 +144,15 @@ class PrimaryClient:
 
     async def _serve_connection(self, host: str, port: int) -> str:
         """
-        Serve one connection and return why it ended.
+        Serve one connection and return the reason of its end.
 
-        :raises OSError: nobody answers, or not as a robot.
+        :raises OSError: nothing answers, or something that is not a robot.
         """
         closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._decoder = primary.PrimaryDecoder()
         self._has_configuration = False
         self._connection = TcpConnection(
-            # Cancelled, where the link is closed while it waits here.
+            # ``closed`` is cancelled if the link is closed while this method waits.
             self._on_data,
             lambda reason: None if closed.done() else closed.set_result(reason),
         )
@@ -173,8 +174,8 @@ class PrimaryClient:
         """
         Check that the connection is alive.
 
-        :param age: how long it has been there [s].
-        :raises OSError: it is dead, or the other side is no robot.
+        :param age: age of the connection [s].
+        :raises OSError: the connection is dead, or the other side is not a robot.
         """
         if not self._has_configuration and age > REPORT_TIMEOUT:
             raise OSError(f'{where}: the robot does not report its configuration')
@@ -229,9 +230,9 @@ class PrimaryClient:
 
 def _geometry(package: KinematicsInfo) -> DhTable:
     """
-    Return the arm's own geometry.
+    Return the calibrated geometry of the arm.
 
-    :raises RemoteProtocolError: there cannot be such an arm.
+    :raises RemoteProtocolError: no arm can have this geometry.
     """
     try:
         return DhTable(a=package.a, d=package.d, alpha=package.alpha, theta=package.theta)

@@ -3,9 +3,9 @@
 """
 TCP endpoints: one that connects, one that listens for the robot program.
 
-Both call back on the event loop and never block it. The reason of an end is a clause for a
-sentence ("the other side closed the connection", ...): a user who reads that a goal ended wants
-to know which side closed the connection.
+Both call back on the event loop and never block it. The reason for the end of a connection is a
+clause ("the other side closed the connection", ...): a user who reads that a goal ended wants to
+know which side closed the connection.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ import socket
 OnData = Callable[[bytes], None]
 OnClosed = Callable[[str], None]
 
-#: Pauses between two attempts to connect [s]; the last one repeats.
+#: Pauses between attempts to connect [s]; the last pause repeats.
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
 
-#: How much may wait for a side that does not read [bytes]; more than a window of points, and a
-#: bound on the memory.
+#: Most data that waits for the other side to read it [bytes]: more than a send window of points,
+#: and a bound on the memory.
 MAX_UNSENT = 1 << 20
-#: How much is read at once [bytes].
+#: Most data that is read at once [bytes].
 MAX_READ = 1 << 16
 #: How long a closed connection may take to send the rest [s].
 LINGER_TIMEOUT = 1.0
-#: So many rejected clients are logged in each period [s].
+#: Largest number of log lines about clients in a period, and this period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
-#: So many failures of attempts to connect are told apart.
+#: Largest number of different failures to connect that are counted separately.
 MAX_FAILURES = 20
 
 #: What to do when a port cannot be opened.
@@ -46,10 +46,10 @@ REMEDIES = {
 
 class TcpConnection(asyncio.BufferedProtocol):
     """
-    One TCP connection, either way.
+    One TCP connection, dialled or accepted.
 
-    It reads into a buffer of its own. For other protocols asyncio asks the system for 256 KiB of
-    fresh memory at each read, which takes longer than to read a packet.
+    The connection reads into its own buffer. For protocols without a buffer, asyncio asks the
+    system for 256 KiB of fresh memory at each read, which takes longer than reading a packet.
     """
 
     def __init__(
@@ -61,9 +61,9 @@ class TcpConnection(asyncio.BufferedProtocol):
         """
         Set the callbacks; all of them run on the event loop.
 
-        :param on_data: bytes came in.
-        :param on_closed: the connection is gone, and why; called once.
-        :param on_open: the connection is there.
+        :param on_data: called with bytes that came in.
+        :param on_closed: called once, with the reason, when the connection is gone.
+        :param on_open: called when the connection is made.
         """
         self._on_data, self._on_closed, self._on_open = on_data, on_closed, on_open
         self._transport: asyncio.Transport | None = None
@@ -80,7 +80,7 @@ class TcpConnection(asyncio.BufferedProtocol):
             self._on_open(self)
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return where to read to."""
+        """Return the buffer for the next read."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
@@ -89,16 +89,16 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     def eof_received(self) -> bool:
         """
-        Let the transport close: half-open connections are not used.
+        Have the transport close: half-open connections are not used.
 
         The end is reported now and not when the transport is gone: a robot program that is
-        started again connects at the same moment, and must find its predecessor gone.
+        started again connects at the same moment, and must find the previous program gone.
         """
         self._end('the other side closed the connection')
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Report why."""
+        """Report the reason."""
         self._end(f'{exc}' if exc is not None else 'we closed the connection')
 
     def _end(self, reason: str) -> None:
@@ -109,7 +109,7 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     @property
     def is_open(self) -> bool:
-        """Tell whether bytes can be sent."""
+        """Return whether bytes can be sent."""
         return self._transport is not None and not self._transport.is_closing()
 
     @property
@@ -120,13 +120,13 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     @property
     def peer_address(self) -> str:
-        """Return the other side's address on this connection; empty when it hung up at once."""
+        """Return the other side's address on this connection; empty if it hung up at once."""
         assert self._transport is not None
         peer = self._transport.get_extra_info('peername')
         return str(peer[0]) if peer else ''
 
     def send(self, data: bytes) -> bool:
-        """Send bytes; False if the connection is gone, or fails now."""
+        """Send bytes; return False if the connection is gone, or fails now."""
         if self._transport is None or self._transport.is_closing():
             return False
         if self._transport.get_write_buffer_size() > MAX_UNSENT:
@@ -136,18 +136,18 @@ class TcpConnection(asyncio.BufferedProtocol):
         return True
 
     def send_at_once(self, data: bytes) -> bool:
-        """Send bytes in one call of the system, for a reader that stops at the first pause."""
+        """Send bytes in one system call, for a reader that stops at the first pause."""
         if self._transport is not None:
-            # Twice as much: the system counts the memory of its packets, not their bytes.
+            # Twice the size: the system counts the memory of its packets, not their content.
             sock = self._transport.get_extra_info('socket')
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * len(data))
         return self.send(data)
 
     def close(self, reason: str = '') -> None:
         """
-        Close after what was sent has gone out, if it does within :data:`LINGER_TIMEOUT`.
+        Close when the data sent so far has gone out, or after :data:`LINGER_TIMEOUT`.
 
-        :param reason: passed to ``on_closed``.
+        :param reason: reason that is passed to ``on_closed``.
         """
         self._reason = self._reason or reason
         if self._transport is not None:
@@ -166,10 +166,10 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
     """
     Connect once.
 
-    The caller makes the connection object, so that it has it before the first bytes arrive: some
+    The caller makes the connection object, and so has it before the first bytes arrive: some
     servers send first.
 
-    :raises OSError: no answer; the text names host and port.
+    :raises OSError: nothing answers; the text names host and port.
     """
     loop = asyncio.get_running_loop()
     try:
@@ -182,14 +182,14 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's own words: asyncio's repeat the address, or count attempts."""
+    """Return the system's text for an error: asyncio's repeats the address, or counts attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
-    return error.strerror or str(error)  # a name that is not known
+    return error.strerror or str(error)  # such as an unknown host name
 
 
 class Backoff:
-    """The pauses between attempts to connect, which grow until one of them succeeds."""
+    """The pauses between attempts to connect, which grow until an attempt succeeds."""
 
     def __init__(self) -> None:
         """Start with the shortest pause."""
@@ -207,20 +207,20 @@ class Backoff:
 
 class AttemptLog:
     """
-    Logs the failures of repeated attempts once each.
+    Logs each different failure of repeated attempts once.
 
-    How often each came is logged when a new one comes, and when an attempt succeeds.
+    The counts of the failures are logged when a different failure occurs, or an attempt succeeds.
     """
 
     def __init__(self, log: Callable[[str], None], log_count: Callable[[str], None]) -> None:
         """
         Begin with no failure.
 
-        :param log: a failure that is new.
-        :param log_count: how often one has come.
+        :param log: logs a new failure.
+        :param log_count: logs the count of a repeated failure.
         """
         self._log, self._log_count = log, log_count
-        #: How often each came since its count was logged last.
+        #: Occurrences of each failure since its count was last logged.
         self._counts: dict[str, int] = {}
 
     def failed(self, text: str) -> None:
@@ -229,7 +229,7 @@ class AttemptLog:
             self._counts[text] += 1
             return
         self._log_counts()
-        if len(self._counts) >= MAX_FAILURES:  # they hardly repeat
+        if len(self._counts) >= MAX_FAILURES:  # so many texts hardly repeat
             self._counts.clear()
         self._counts[text] = 1
         self._log(text)
@@ -271,9 +271,9 @@ class TcpListener:
     """
     A TCP port for the robot program; one client at a time.
 
-    Clients with other addresses are rejected, and so are all while a program is fully connected.
-    Else the newest client counts: the one before may have died without closing its connection, or
-    be no robot program at all.
+    Clients without an allowed address are rejected, and so are all clients while a program is
+    fully connected. Otherwise the newest client replaces the previous one, which may have died
+    without closing its connection, or may not be a robot program.
     """
 
     def __init__(
@@ -289,9 +289,9 @@ class TcpListener:
         """
         Describe the port.
 
-        :param name: of the parameter of the port, for texts.
-        :param on_refused: a client was rejected, and why.
-        :param is_taken: tells whether the connected client must not be replaced.
+        :param name: name of the port's parameter, for texts.
+        :param on_refused: called with the reason when a client was rejected.
+        :param is_taken: returns whether the connected client must not be replaced.
         """
         self.name = name
         self.port = 0
@@ -304,20 +304,20 @@ class TcpListener:
 
     @property
     def is_open(self) -> bool:
-        """Tell whether we listen."""
+        """Return whether the port is open."""
         return self._server is not None
 
     async def open(self, host: str, port: int, allowed: frozenset[str]) -> None:
         """
         Listen.
 
-        :param port: 0 = any free one; :attr:`port` tells which.
+        :param port: port number; 0 = any free port, which :attr:`port` then gives.
         :param allowed: addresses that may connect; empty = all.
         :raises OSError: the port is taken; the text names the parameter to change.
         """
         self._allowed = frozenset(map(plain_address, allowed))
         try:
-            # In two steps, so that there is something to close when we are cancelled between.
+            # In two steps, so that close() finds the server if we are cancelled between them.
             self._server = await asyncio.get_running_loop().create_server(
                 self._accept, host, port, backlog=4, reuse_address=True, start_serving=False
             )
@@ -376,13 +376,13 @@ class TcpListener:
         self.warn_limited(text)
 
     def _ended(self, connection: TcpConnection, reason: str) -> None:
-        if connection is self.connection:  # not one that was rejected or closed
+        if connection is self.connection:  # not a connection that was rejected or closed
             self.connection = None
             self._on_closed(reason)
 
 
 def plain_address(text: str) -> str:
-    """Return an address in its plain form: an IPv4 peer of an IPv6 port has two forms."""
+    """Return an address in its plain form: the IPv4 client of an IPv6 port has two forms."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

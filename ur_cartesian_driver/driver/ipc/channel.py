@@ -3,10 +3,10 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-A message is its length, then two pickles: the notification that refuses it (None = it needs no
-answer), for a receiver that cannot read the rest, and one of the dataclasses below. Both ends are
-this package and no other process can open the pipe, a pair of sockets; so pickle is safe here, and
-it moves the arrays of a large plan as they are.
+A message is its length, then two pickles. The first, for a receiver that cannot read the second,
+is the notification that refuses the message (None = nobody waits for an answer); the second is one
+of the dataclasses below. Both ends are this package, and no other process can open the pipe, a
+pair of sockets; so pickle is safe here, and it moves the arrays of a large plan as they are.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ur_cartesian_driver.robot.connection_status import ConnectionStatus, LinkGa
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 LENGTH = struct.Struct('>I')
-#: The reason of a refusal by a receiver that cannot read the message.
+#: The reason of the refusal that is sent when the receiver cannot read the message.
 UNREADABLE = (
     'The robot process cannot read the request, because it contains objects of classes that only '
     'your program has; use those of this package.'
@@ -50,7 +50,7 @@ class Unreadable(DriverError):
         """
         Build the error.
 
-        :param refusal: what answers the message, if somebody waits for an answer.
+        :param refusal: the notification that refuses the message; None = nobody waits for it.
         """
         super().__init__(reason)
         self.refusal = refusal
@@ -58,7 +58,7 @@ class Unreadable(DriverError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemporaryTcpSet:
-    """A goal has set a temporary TCP."""
+    """A goal sets a temporary TCP."""
 
     T_flange_original: Pose
     T_flange_temporary: Pose
@@ -66,7 +66,7 @@ class TemporaryTcpSet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemporaryTcpRestored:
-    """The temporary TCP is no longer active: restored, or another one was set."""
+    """The temporary TCP is not active: it was restored, replaced, or never set on the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,16 +90,16 @@ class ArmSetup:
 
     @classmethod
     def of(cls, arm: Arm) -> ArmSetup:
-        """Return what an arm is made of: it takes long to send an arm itself."""
+        """Return the model and geometry of an arm; sending the arm itself would take long."""
         return cls(model=arm.model, geometry=arm.geometry)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSetup:
-    """The settings of a live session, beside its job."""
+    """The settings of a live session, in addition to its job."""
 
     settings: LiveSettings
-    #: Where the arm stands [rad].
+    #: Joint positions of the arm at rest [rad].
     start: Joints
 
 
@@ -112,9 +112,9 @@ class StartMotion:
     points: bytes
     #: Metadata of the plan for the recording, as JSON; empty = none.
     plan_metadata: str = ''
-    #: Where set-points are displaced, or lead to live targets: the arm.
+    #: The arm, if path offsets may displace the motion or it follows live targets; else None.
     arm: ArmSetup | None = None
-    #: A session of live targets; None = a goal.
+    #: The settings of a live session; None = the motion is no live session.
     live: LiveSetup | None = None
     #: Whether a person guides the arm by hand.
     freedrive: bool = False
@@ -126,18 +126,18 @@ class SetLiveTarget:
 
     motion: int
     T_base_tcp: Pose
-    #: How old it is [s].
+    #: How old the target is [s].
     age: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPathOffset:
-    """Give a motion whose path may give way another offset."""
+    """Give a new offset to a motion that accepts path offsets."""
 
     motion: int
-    #: Along, across, normal [m].
+    #: The offset along, across and normal to the path [m].
     offset: Vector3
-    #: How old it is [s].
+    #: How old the offset is [s].
     age: float
 
 
@@ -152,7 +152,7 @@ class AppendToMotion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelMotion:
-    """Stop the motion, if it is the one that runs."""
+    """Stop the motion, if it is still running."""
 
     motion: int
     #: The motion that preempts it, as part of a sentence; empty = it is cancelled.
@@ -213,7 +213,7 @@ class MotionProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppendAnswered:
-    """Whether a motion has taken appended records."""
+    """The answer to an append: the records were accepted or refused."""
 
     motion: int
     answer: AnswerAppend
@@ -252,7 +252,7 @@ class SignalsChanged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopHeartbeat:
-    """The robot loop is alive; with the longest pauses since the last heartbeat."""
+    """The robot loop is alive; carries the longest gaps since the last heartbeat."""
 
     gaps: LinkGaps = field(default_factory=LinkGaps)
 
@@ -296,9 +296,9 @@ Notification: TypeAlias = (
 
 def refusal_of(message: Request | Notification, reason: str) -> Notification | None:
     """
-    Return what answers a request that was not carried out; None if nobody waits for an answer.
+    Return the answer to a request that was not carried out; None = nobody waits for an answer.
 
-    :param reason: a sentence.
+    :param reason: the reason, as a sentence.
     """
     match message:
         case StartMotion(motion=motion):
@@ -316,9 +316,9 @@ def pack(message: Request | Notification) -> bytes:
     """
     Return a message as bytes, its length first.
 
-    :raises LocalProtocolError: it contains something that cannot be sent to another process.
+    :raises LocalProtocolError: a part of the message cannot be sent to another process.
     """
-    stream = io.BytesIO()  # written once: a long goal has 50 MB, and each copy would count
+    stream = io.BytesIO()  # written once: a long goal has 50 MB, so each copy would take long
     stream.write(bytes(LENGTH.size))
     try:
         pickle.dump(refusal_of(message, UNREADABLE), stream)
@@ -327,7 +327,7 @@ def pack(message: Request | Notification) -> bytes:
         stream.seek(0)
         stream.write(LENGTH.pack(size))
         return stream.getvalue()
-    except Exception as error:  # pickling calls methods of all that it finds
+    except Exception as error:  # pickling calls methods of every object in the message
         raise LocalProtocolError(
             f'{type(message).__name__} cannot be sent to the robot process: {error}.'
         ) from error
@@ -335,15 +335,15 @@ def pack(message: Request | Notification) -> bytes:
 
 def unpack(body: bytes) -> Request | Notification:
     """
-    Return the message of the bytes behind a length.
+    Return the message in the bytes that follow the length.
 
-    :raises Unreadable: it is none, or contains what this process does not have.
+    :raises Unreadable: the bytes are no message, or name objects that this process does not have.
     """
     stream, refusal = io.BytesIO(body), None
     try:
         refusal = pickle.load(stream)
         message: Request | Notification = pickle.load(stream)
-    except Exception as error:  # unpickling calls whatever the bytes name
+    except Exception as error:  # unpickling calls the functions that the bytes name
         raise Unreadable(f'{type(error).__name__}: {error}', refusal) from error
     return message
 

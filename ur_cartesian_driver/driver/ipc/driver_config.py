@@ -20,18 +20,18 @@ class DriverConfig(LinkSettings):
     dashboard_port: Port = 29999
     #: Port of the Robot API (HTTP) of the robot, which PolyScope X has instead of a dashboard.
     robot_api_port: Port = 80
-    #: Largest distance of the controller's own target from the plan [m]; 0.0: no limit. More means
-    #: that the robot executes another motion than planned, and ends the goal. In blends the
-    #: robot's own tolerance is added.
+    #: Largest distance of the controller's own target from the plan [m]; 0.0: no limit. A larger
+    #: distance means that the robot executes another motion than planned, and ends the goal. In
+    #: blends the robot's own tolerance is added.
     max_plan_deviation: Annotated[float, Range(0.0, 1.0)] = MAX_PLAN_DEVIATION[0]
     #: Largest angle of the controller's own target from the plan [rad]; 0.0: no limit.
     max_plan_deviation_angle: Annotated[float, Range(0.0, 3.2)] = MAX_PLAN_DEVIATION[1]
     #: The driver plans with the robot's own calibration. Warn if it moves the flange farther than
-    #: this from its nominal pose [m]: the arm was repaired badly, or is another one. 0.0: never.
+    #: this from its nominal pose [m]: the arm was repaired badly, or is another arm. 0.0: never.
     max_calibration_difference: Annotated[float, Range(0.0, 1.0)] = 0.01
-    #: The robot makes a protective or safeguard stop during a goal. abort: the goal ends, and its
-    #: motion never resumes, whoever unlocks the robot. continue: the goal continues when a person
-    #: unlocks the robot and plays its program.
+    #: Effect of a protective or safeguard stop during a goal. abort: the goal ends, and its motion
+    #: never resumes, whoever unlocks the robot. continue: the goal continues when a person unlocks
+    #: the robot and plays its program.
     on_robot_stop: Literal['abort', 'continue'] = 'abort'
     #: Goals with keep_open: planned motion time that the robot is given ahead [s]; at least twice
     #: keep_open_margin.
@@ -50,8 +50,8 @@ class DriverConfig(LinkSettings):
     servo_max_divergence: Annotated[float, Range(0.01, 3.0)] = 0.3
     #: Rate of a goal's feedback [Hz].
     feedback_rate: Annotated[float, Range(0.5, 500.0)] = 25.0
-    #: Time without a heartbeat of this node after which its arm is stopped [s]. Longer than the
-    #: largest goal takes to arrive.
+    #: Time without a heartbeat of this node after which its arm is stopped [s]. It must be longer
+    #: than the largest goal takes to arrive.
     node_timeout: Annotated[float, Range(0.2, 60.0)] = 5.0
     #: Each motion is recorded as a file in this directory, which `ur-cartesian plot FILE` draws:
     #: planned and executed path, joints, speeds, lag, outputs, events. Empty: no recordings.

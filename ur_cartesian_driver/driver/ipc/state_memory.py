@@ -4,8 +4,8 @@
 The newest robot state in memory that two processes share.
 
 The robot loop writes at the rate of RTDE; readers read at any time and never wait. A counter is
-odd during a write, and a reader that sees it odd or changed reads again. The memory belongs to a
-file without a name, so nothing is left behind, however the processes end.
+odd during a write, and a reader that sees an odd or changed counter reads again. The memory
+belongs to a file without a name, so nothing is left over, however the processes end.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.state.robot_state import RobotState, STATE_TABLE
 
 _COUNTER = struct.Struct('<Q')
-#: How many numbers the types of fields hold that hold more than one.
+#: The number of values in the field types with more than one value.
 _SIZES = {Vector6: 6, Pose: 7}
-#: Whether there is a state, then all fields of the table.
+#: The flag that there is a state, then all fields of the table.
 _DATA = struct.Struct(
     '<?'
     + ''.join(
@@ -34,12 +34,12 @@ _DATA = struct.Struct(
     )
 )
 _SIZE = mmap.PAGESIZE
-#: Stands for None.
+#: Represents None.
 _UNKNOWN = (nan,) * 6
 
 
 def _compile_pack() -> Callable[[RobotState], bytes]:
-    """Return a function that packs a state; as source, because it runs at 500 Hz."""
+    """Return a function that packs a state, compiled from source because it runs at 500 Hz."""
     forms = {Vector6: '*state.{0}', Pose: '*state.{0}.position, *state.{0}.quaternion'}
     parts = (
         f'*(state.{row.name} or unknown)'
@@ -55,7 +55,7 @@ def _compile_pack() -> Callable[[RobotState], bytes]:
 
 
 def _readers() -> Iterator[tuple[int | slice, Callable[[Any], Any]]]:
-    """Yield, for each field, where its numbers are and what makes a value of them."""
+    """Yield, for each field, the place of its numbers and the function that converts them."""
     start = 1
     for row in STATE_TABLE:
         size = _SIZES.get(row.type, 1)
@@ -74,7 +74,7 @@ _READERS = tuple(_readers())
 
 
 def create() -> int:
-    """Return the descriptor of memory to share; the caller closes it."""
+    """Return the descriptor of new memory to share; the caller closes it."""
     if hasattr(os, 'memfd_create'):
         descriptor = os.memfd_create('ur_cartesian_driver')
     else:
@@ -93,7 +93,7 @@ class StateMemory:
         self._count = 0
 
     def close(self) -> None:
-        """Unmap."""
+        """Unmap the memory."""
         self._memory.close()
 
     def clear(self) -> None:
@@ -105,7 +105,7 @@ class StateMemory:
         self._write(_pack(state))
 
     def read(self) -> RobotState | None:
-        """Return the newest state, None when there is none."""
+        """Return the newest state; None = there is none."""
         while True:
             (before,) = _COUNTER.unpack_from(self._memory, 0)
             data = self._memory[_COUNTER.size : _COUNTER.size + _DATA.size]

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Service calls of the owner, carried out beside the motion that runs."""
+"""Service calls of the owner, carried out while a motion may be running."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.robot.services.service_calls import failed
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
-#: How many calls are carried out at a time.
+#: At most this many calls are carried out at a time.
 MAX_CALLS = 32
 
 
 class CallRunner:
-    """Answers every call, whatever happens to it."""
+    """Answers every call, even if carrying it out fails."""
 
     def __init__(
         self,
@@ -28,13 +28,13 @@ class CallRunner:
         """
         Prepare.
 
-        :param spawn: runs a coroutine beside everything else.
+        :param spawn: runs a coroutine concurrently.
         """
         self._dispatcher, self._pipe, self._spawn = dispatcher, pipe, spawn
         self._running = 0
 
     def start(self, request: CallRobot) -> None:
-        """Carry out a call, or refuse it when too many are being carried out."""
+        """Carry out a call, or refuse it if too many are being carried out."""
         if self._running < MAX_CALLS:
             self._running += 1
             self._spawn(self._answer(request))

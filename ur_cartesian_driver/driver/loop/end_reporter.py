@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Reports how a motion ended, with what led to it."""
+"""Report how and why a motion ended."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.driver.recordings.recorder import Recorder
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.robot.link import RobotLink
 
-#: Outcomes whose sentence does not say what led to them: the event log does.
+#: Outcomes whose sentence does not say why they happened; the event log does.
 CODES_WITH_CAUSE = frozenset(
     {
         ErrorCode.PROTECTIVE_STOP,
@@ -25,17 +25,17 @@ CODES_WITH_CAUSE = frozenset(
         ErrorCode.EXECUTION_FAILED,
     }
 )
-#: For these the robot sends the cause on another connection, in the same cycle or soon after it.
-#: The end waits that long for it [s].
+#: Outcomes whose cause the robot sends on another connection, in the same cycle or soon after; and
+#: how long the report of the end waits for that cause [s].
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 CAUSE_TIMEOUT = 0.05
-#: Reports from so long before the begin of a motion can explain its end [s]: a program
-#: fails some cycles before its sockets close.
+#: Reports up to this long before the start of a motion can explain its end [s]: a program fails
+#: some cycles before its sockets close.
 CAUSE_LEAD = 0.1
 
 
 class EndReporter:
-    """Tells the owner, the recording and the status of the link."""
+    """Reports the end to the owner, the recording and the status of the link."""
 
     def __init__(
         self, link: RobotLink, pipe: OwnerPipe, recorder: Recorder, outputs: OutputSecurer
@@ -43,22 +43,22 @@ class EndReporter:
         """Begin with nothing to report."""
         self._link, self._pipe, self._recorder = link, pipe, recorder
         self._outputs = outputs
-        #: An end that waits for its cause, or for its outputs.
+        #: The end that waits for its cause, or for its outputs; None = there is none.
         self._pending: MotionEnded | None = None
-        #: Earlier reports do not explain the end [s].
+        #: Only reports since this time can explain the end [s].
         self._since = -inf
 
     def begin(self) -> None:
-        """Take note that a motion begins."""
+        """Note that a motion begins."""
         self._since = self._link.event_log.now - CAUSE_LEAD
 
     @property
     def is_pending(self) -> bool:
-        """Tell whether the end of a motion waits for its cause, or for its outputs."""
+        """Return whether the end of a motion waits for its cause, or for its outputs."""
         return self._pending is not None
 
     def report(self, ended: MotionEnded) -> None:
-        """Report an end, as soon as its cause is known, and whether its outputs are safe."""
+        """Report an end once its cause, and whether its outputs are safe, is known."""
         self._pending = ended
         self._outputs.when_done(self._report_with_cause)
 
@@ -74,7 +74,7 @@ class EndReporter:
             self.report_pending()
 
     def report_pending(self) -> None:
-        """Report the end that waits for its cause, with the causes known by now."""
+        """Report the waiting end now, with the causes known so far."""
         ended, self._pending = self._pending, None
         if ended is not None:
             self._report_now(ended)

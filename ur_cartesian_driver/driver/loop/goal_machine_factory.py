@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Makes the machine of a motion, with the feeder of its execution mode.
+Make the machine of a motion, with the feeder of its execution mode.
 
-:data:`FEEDERS` has the row of each mode. Live targets and freedrive are motions of the mode SERVO.
+:data:`FEEDERS` has a row for each mode. Live targets and freedrive are motions of the mode SERVO.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
 
 
 def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return the feeder of points that are all known, or are appended, or are displaced."""
+    """Return the feeder of points: all known, appended, or displaced by offsets."""
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
     if not request.job.keep_open:
         return PointFeeder(monitor)
     # The last piece on the wire begins within the horizon of the feeder, and ends within the
-    # horizon of the goal. Where nothing can come in time any more, the ending is sent.
+    # horizon of the goal. Once nothing more can come in time, the ending is sent.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
@@ -70,7 +70,7 @@ def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
 
 
 def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return the feeder for freedrive, or for set-points of a spline or to live targets."""
+    """Return the feeder for freedrive, for live targets, or for the set-points of a spline."""
     job = request.job
     settings = ServoSettings(
         target_lag=config.servo_target_lag,
@@ -113,7 +113,7 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 
 
 def is_slow_to_make(request: StartMotion) -> bool:
-    """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
+    """Return whether making the machine takes long: it does for a calibrated arm's kinematics."""
     arm = request.arm
     return arm is not None and arm.geometry != arm.model.geometry
 
@@ -127,7 +127,7 @@ def _live_targets(live: LiveSetup, arm: ArmSetup, job: MotionJob) -> LiveTargets
 
 @lru_cache(maxsize=4)
 def _arm(setup: ArmSetup) -> Arm:
-    """Return the arm of a robot; the slow computations of a calibrated one are done once."""
+    """Return the arm of a robot; the slow computations for a calibrated arm are done once."""
     arm = Arm(setup.model, setup.geometry)
     ideal_arm_of(arm)
     return arm

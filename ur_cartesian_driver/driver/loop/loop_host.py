@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Runs the robot loop in a process of its own, or in a thread. Nothing else knows which.
+Run the robot loop in its own process, or in a thread; no other module depends on which.
 
 The process is not forked, because the owner may be a ROS node with many threads. It gets two open
-descriptors, the pipe and the shared memory. When it dies its sockets close and the robot program
-stops the arm; when the owner dies the pipe ends and the loop stops the arm.
+descriptors, of the pipe and of the shared memory. If the process dies, its sockets close and the
+robot program stops the arm; if the owner dies, the pipe ends and the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 
 #: The module that the process runs.
 MODULE = 'ur_cartesian_driver.driver'
-#: A robot loop without a message for that long hangs [s]; it sends a heartbeat every 0.5 s.
+#: A robot loop that sends nothing for this long hangs [s]; it sends a heartbeat every 0.5 s.
 SILENCE_TIMEOUT = 5.0
-#: How long it may take to the first message [s]: a process imports all it needs before.
+#: How long the first message may take [s]: a process first imports all that it needs.
 START_TIMEOUT = 20.0
 #: How long the robot loop may take to stop the arm and end, before it is killed [s].
 JOIN_TIMEOUT = 2.0
@@ -51,7 +51,7 @@ def start(robot_loop: str) -> LoopHost:
 
 
 class ProcessHost:
-    """The loop in a process of its own."""
+    """The loop in its own process."""
 
     def __init__(self) -> None:
         """Start the process."""
@@ -110,7 +110,7 @@ class ThreadHost:
             os.close(descriptor)
 
     def join(self) -> None:
-        """End the thread; one that hangs ends later, because the pipe is closed."""
+        """End the thread; a hanging thread ends later, because the pipe is closed."""
         self.pipe.close()
         self._thread.join(JOIN_TIMEOUT)
         self.memory.close()
@@ -124,7 +124,7 @@ def _environment() -> dict[str, str]:
 
 def main() -> None:
     """Run the loop in this process; the arguments are the two descriptors."""
-    gc.freeze()  # imported objects stay: the collector would scan them in mid-motion
+    gc.freeze()  # imported objects stay: the collector would scan them in the middle of a motion
     pipe, descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=pipe) as connection:
         asyncio.run(serve(connection, descriptor))

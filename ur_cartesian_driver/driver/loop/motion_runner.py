@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The motion that runs in a robot loop: its machine, points, recording and end."""
+"""The running motion of a robot loop: its machine, points, recording and end."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ from ur_cartesian_driver.robot.rtde.register_connection import (
     servo_exchange,
 )
 
-#: More than this takes longer than a few milliseconds to unpack or prepare [bytes].
+#: Data of this size or more takes longer than a few milliseconds to unpack or prepare [bytes].
 MIN_THREAD_SIZE = 1 << 18
 #: How long the end of the loop waits until the recording of the last motion is a file [s].
 RECORD_TIMEOUT = 1.0
@@ -106,8 +106,8 @@ class MotionRunner:
         """
         Prepare.
 
-        :param spawn: runs a coroutine beside everything else.
-        :param is_changing_settings: tells whether TCP or payload are being set.
+        :param spawn: runs a coroutine concurrently.
+        :param is_changing_settings: returns whether TCP or payload are being set.
         """
         self._config, self._link, self._newest, self._pipe = config, link, newest, pipe
         self._tcp_restorer, self._spawn = tcp_restorer, spawn
@@ -115,9 +115,9 @@ class MotionRunner:
         self._machine: GoalMachine | None = None
         self._number = 0
         self._points = PointBuffer()
-        #: The inputs of a motion that gets set-points, or offsets of its path.
+        #: The RTDE inputs of a motion with set-points or path offsets; None = not claimed.
         self._inputs: RegisterConnection | None = None
-        #: Points that the machine considers at this moment.
+        #: The append that the machine is deciding on at this moment.
         self._pending_append: AppendToMotion | None = None
         self._recorder = Recorder(
             config.record_directory,
@@ -131,7 +131,7 @@ class MotionRunner:
 
     @property
     def is_running(self) -> bool:
-        """Tell whether a motion runs."""
+        """Return whether a motion runs."""
         return self._machine is not None
 
     # ---- requests -----------------------------------------------------------------------------
@@ -175,7 +175,7 @@ class MotionRunner:
         return 'The TCP of the robot changed after the goal was planned; send the goal again.'
 
     async def _foreign_program(self, job: MotionJob | None) -> str:
-        """Return what of a motion the program on the robot cannot do; empty if nothing."""
+        """Return why the program on the robot cannot run the motion; empty if it can."""
         needs = '' if job is None else job.own_program_needs
         if not needs or await self._link.control.tracker.wait_for_identity():
             return ''
@@ -186,7 +186,7 @@ class MotionRunner:
         )
 
     async def append(self, request: AppendToMotion) -> None:
-        """Offer points to the motion that runs, if they are for it."""
+        """Offer points to the running motion, if they are meant for it."""
         foreign = await self._foreign_program(request.append_job.job)
         if request.motion != self._number or self._machine is None:
             self._refuse_append(request, 'The goal has ended.')
@@ -201,30 +201,30 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
 
     def set_live_target(self, request: SetLiveTarget) -> None:
-        """Give the session that runs another target, if it is for it."""
+        """Give the running session another target, if the target is meant for it."""
         if request.motion == self._number and self._machine is not None:
             self._machine.can.steering.set_target(request.T_base_tcp, request.age, _now())
 
     def set_path_offset(self, request: SetPathOffset) -> None:
-        """Give the motion that runs another path offset, if it is for it."""
+        """Give the running motion another path offset, if the offset is meant for it."""
         if request.motion == self._number and self._machine is not None:
             self._machine.can.displacing.set_offset(request.offset, request.age, _now())
 
     def cancel(self, request: CancelMotion) -> None:
-        """Stop the motion, if it is the one that runs."""
+        """Stop the requested motion, if it is running."""
         by = request.preempted_by
         if request.motion == self._number:
             self._recorder.add_event('cancel', by and f'preempted by {by}')
             self.handle_event(PreemptRequested(by=by) if by else CancelRequested())
 
     def close(self) -> None:
-        """End the motion that runs, because the loop ends."""
+        """End the running motion, because the loop ends."""
         if self.is_running:
             self._finish(Outcome(code=ErrorCode.CANCELLED, text='The driver was shut down.'))
         self._ends.report_pending()
 
     def close_recorder(self) -> None:
-        """Finish the recording of the last motion; a disk may make this take a while."""
+        """Finish the recording of the last motion; with a slow disk this may take a while."""
         self._recorder.close(RECORD_TIMEOUT)
 
     # ---- events and commands ------------------------------------------------------------------
@@ -238,7 +238,7 @@ class MotionRunner:
         self._newest.publish()
 
     def _step(self, machine: GoalMachine, event: Event | AppendJob) -> None:
-        """Give an event to the machine; stop the arm if it fails at what its owner sent."""
+        """Give an event to the machine; if the machine raises an error, stop the arm."""
         try:
             self._execute(machine.step(event, _now()))
         except Exception as error:
@@ -299,7 +299,7 @@ class MotionRunner:
                     self._finish(outcome)
 
     def _answer_append(self, answer: AnswerAppend) -> None:
-        """Keep the points that the machine has taken, and tell their owner."""
+        """Keep the points that the machine has accepted, and send its answer to the owner."""
         pending, self._pending_append = self._pending_append, None
         assert pending is not None
         job, before = pending.append_job.job, pending.append_job.records_before
@@ -311,7 +311,7 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
 
     def _open_inputs(self, exchange: RegisterExchange) -> None:
-        """Take the RTDE inputs of the motion that runs."""
+        """Claim the RTDE inputs of the running motion."""
         self._inputs = RegisterConnection(exchange)
         self._spawn(
             self._inputs.run(
@@ -322,7 +322,7 @@ class MotionRunner:
         )
 
     def _leave_servo(self) -> None:
-        """Have the robot program leave the servo, and give the inputs back."""
+        """Have the robot program leave the servo, and release the inputs."""
         if self._inputs is not None:
             self._link.control.send_servo(False)
             self._close_inputs()
@@ -363,7 +363,7 @@ class MotionRunner:
     # ---- recording ----------------------------------------------------------------------------
 
     def _record(self, request: StartMotion, state: RobotState) -> None:
-        """Begin the recording of a motion, where motions are recorded."""
+        """Begin the recording of a motion, if motions are recorded."""
         if not self._config.record_directory:
             return
         status = self._link.status
@@ -382,12 +382,12 @@ class MotionRunner:
         self._recorder.start(request.job, metadata, state)
 
     def record_state(self, state: RobotState) -> None:
-        """Record a state of the motion that runs."""
+        """Record a state of the running motion."""
         if self._recorder.is_recording and self._machine is not None:
             self._recorder.add_state(state, *self._machine.motion_status())
 
     def record_signals(self, signals: Signals) -> None:
-        """Record inputs and outputs of the motion that runs."""
+        """Record the outputs of the running motion."""
         self._recorder.add_signals(signals)
 
 
@@ -398,16 +398,16 @@ def _now() -> float:
 def _call_soon(
     loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: object
 ) -> None:
-    """Have the loop call a function, from another thread; nothing, if the loop has ended."""
+    """Have the loop call a function, from another thread; ignored if the loop has ended."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(function, *arguments)
 
 
 async def run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
     """
-    Call a function; in a thread when it has much to do, because keepalives cannot wait.
+    Call a function, in a thread if it has much to do, because keepalives cannot wait.
 
-    :param size: how much it has to do [bytes].
+    :param size: amount of data that the function handles [bytes].
     """
     if size < MIN_THREAD_SIZE:
         return function(*arguments)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The newest robot state in the robot loop, and when it goes into the shared memory."""
+"""The newest robot state in the robot loop, and its publication in the shared memory."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class NewestState:
     Keeps the newest state, and publishes it later.
 
     A packet may lead to a CANCEL, which must not wait for the shared memory. So a state is
-    published after the packet was handled, but before any notification: an owner that hears of
-    something finds the state that belongs to it.
+    published after the packet was handled, but before any notification: an owner that gets a
+    notification finds the state that belongs to it.
     """
 
     def __init__(self, memory: StateMemory, on_publish: Callable[[RobotState], None]) -> None:
@@ -34,11 +34,11 @@ class NewestState:
         self._longest_gap = self._oldest = 0.0
 
     def keep(self, state: RobotState) -> None:
-        """Take a state; :meth:`publish` publishes it."""
+        """Keep a state, which :meth:`publish` will publish."""
         self.latest, self._is_published = state, False
 
     def publish(self) -> None:
-        """Write the newest state into the shared memory, unless it is there."""
+        """Write the newest state into the shared memory, unless it is there already."""
         if self._is_published or self.latest is None:
             return
         self._is_published = True
@@ -50,7 +50,7 @@ class NewestState:
         self._oldest = max(self._oldest, self.latest.state_age)
 
     def clear(self) -> None:
-        """Take note that the robot is lost."""
+        """Note that the robot is lost."""
         self._memory.clear()
         self._last_report = inf
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Has the outputs of a motion written that its robot program cannot set, and says where not."""
+"""Write the outputs of a motion that its robot program cannot set, and report failures."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.output_writer import write_outputs
 
-#: How often and how long a write that failed is repeated [s]; much later nobody expects it.
+#: Period and total time of the retries of a failed write [s]; a later write would be unexpected.
 RETRY_PERIOD, RETRY_TIMEOUT = 0.25, 5.0
 
 
 class OutputSecurer:
-    """Writes one thing after the other: to secure outputs replaces whatever was to be written."""
+    """Carries out one order after the other; a new order replaces those still to be written."""
 
     def __init__(
         self,
@@ -33,17 +33,17 @@ class OutputSecurer:
         """
         Begin with nothing to write.
 
-        :param spawn: runs a coroutine beside everything else.
-        :param on_event: the outputs were secured, or not, for the motion that runs.
+        :param spawn: runs a coroutine concurrently.
+        :param on_event: called with the result of securing the running motion's outputs.
         """
         self._config, self._link, self._pipe = config, link, pipe
         self._spawn, self._on_event = spawn, on_event
-        #: Which write is the newest; the others end.
+        #: The number of the newest order; older orders end.
         self._newest = 0
         self._is_pending = False
         #: Values are written one after the other: a late restore must not undo a safe value.
         self._lock = asyncio.Lock()
-        #: Why outputs of the motion are not safe.
+        #: Why outputs of the motion are not safe; empty = no failure is known.
         self.failure = ''
         self._on_done: Callable[[], None] | None = None
 
@@ -59,12 +59,12 @@ class OutputSecurer:
         self._spawn(self._restore(outputs, self._newest))
 
     def forget(self) -> None:
-        """Another motion begins: nothing of the one before is written any more."""
+        """Drop the orders of the previous motion, because another motion begins."""
         self._newest += 1
         self._is_pending, self.failure = False, ''
 
     def when_done(self, callback: Callable[[], None]) -> None:
-        """Call when the first attempt to secure outputs has ended; at once if none is made."""
+        """Call back after the first attempt to secure outputs; at once if none is under way."""
         if self._is_pending:
             self._on_done = callback
         else:

@@ -17,8 +17,8 @@ from ur_cartesian_driver.driver.ipc.channel import (
     SignalsChanged,
 )
 
-#: These are out of date soon: they are dropped while more than :data:`MAX_UNREAD` bytes wait for
-#: an owner that does not read. It may hang for days.
+#: Notifications that are soon out of date: they are dropped while more than :data:`MAX_UNREAD`
+#: bytes wait for an owner that does not read, because the owner may hang for days.
 DROPPABLE = (LoopHeartbeat, LogMessage, MotionProgress, ServoProgress, SignalsChanged)
 MAX_UNREAD = 1 << 20
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Encoded records of a motion until they are sent, however many come behind them."""
+"""Encoded records of a motion, kept until they are sent."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class PointBuffer:
         self._first = 0
 
     def __len__(self) -> int:
-        """Return how many are kept."""
+        """Return how many records are kept."""
         return len(self._data) // POINT_SIZE
 
     def put(self, behind: int, data: bytes) -> None:
-        """Replace all records behind the first so many."""
+        """Replace all records after the first ``behind`` records."""
         del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 
     def take(self, first: int, end: int) -> bytes:
-        """Return records to be sent, and forget them and those before."""
+        """Return the records to send, and forget them and all earlier ones."""
         begin, stop = ((number - self._first) * POINT_SIZE for number in (first, end))
         taken = bytes(self._data[begin:stop])
         del self._data[:stop]

@@ -3,13 +3,13 @@
 """
 The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
 
-It never imports ROS. In a process of its own the owner cannot delay a message that the robot
-waits for: receiving a goal of 100,000 points holds Python's interpreter lock for seconds. It can
-also run in a thread. One pipe for messages and shared memory for the newest robot state join it
-to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
+The loop never imports ROS. If it runs in its own process, the owner cannot delay a message that
+the robot waits for: receiving a goal of 100,000 points holds Python's interpreter lock for
+seconds. The loop can also run in a thread. A pipe for messages and shared memory for the newest
+robot state connect it to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
 
-When the pipe ends the loop closes its sockets, and the robot program stops the arm and ends. When
-the owner is silent the loop stops the arm.
+When the pipe ends, the loop closes its sockets, and the robot program stops the arm and ends. When
+the owner is silent for too long, the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ from ur_cartesian_driver.robot.services.dashboard_service import DashboardPorts
 from ur_cartesian_driver.robot.services.service_calls import DashboardCall
 from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
 
-#: How often the machine hears that time has passed [s].
+#: Period of the ticks that tell the machine that time has passed [s].
 TICK_PERIOD = 0.02
-#: How often the owner hears that the loop lives [s].
+#: Period of the heartbeats to the owner [s].
 HEARTBEAT_PERIOD = 0.5
 
 
 class RobotLoop:
-    """Joins the link to the robot, the motion that runs, and the pipe to the owner."""
+    """Connects the link to the robot, the running motion, and the pipe to the owner."""
 
     def __init__(
         self, configure: Configure, memory: StateMemory, notify: asyncio.StreamWriter
@@ -123,7 +123,7 @@ class RobotLoop:
                     task.cancel()
         finally:
             self._motion.close()
-            # Our robot program restores the TCP by itself, but this may be another one.
+            # Our robot program restores the TCP by itself, but another program may be running.
             self._tcp_restorer.restore_if_due(self._newest.latest)
             self._link.close()
             self._newest.clear()
@@ -148,7 +148,7 @@ class RobotLoop:
                 return
             try:
                 await self._handle_request(request)
-            except Exception as error:  # nothing that an owner sends ends the loop
+            except Exception as error:  # no request of the owner must end the loop
                 reason = f'{type(error).__name__}: {error}'
                 text = f'The request cannot be carried out ({reason.rstrip(".")}).'
                 self._refuse(refusal_of(request, text), f'{type(request).__name__}: {text}')
@@ -185,7 +185,7 @@ class RobotLoop:
                 )
 
     async def _tick(self) -> None:
-        """Let time pass where nothing else happens, and monitor the owner."""
+        """Send ticks to the machine and heartbeats to the owner, and monitor the owner."""
         last_heartbeat = self._now()
         while True:
             await asyncio.sleep(TICK_PERIOD)
@@ -233,7 +233,7 @@ class RobotLoop:
         self._pipe.send(StatusChanged(status=status))
 
     async def _ask_serial_number(self) -> None:
-        """Ask the dashboard for the serial number; a robot without one does not tell it."""
+        """Ask the dashboard for the serial number, which not every robot reports."""
         answer = await self._dispatcher.dispatch(DashboardCall(command='get serial number'))
         if answer.ok:
             self._link.set_serial_number(answer.text)

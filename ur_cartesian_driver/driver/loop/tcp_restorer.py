@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Restores the TCP that a goal had replaced, when the goal ended before it could."""
+"""Restore the TCP that a goal had replaced, if the goal ended before it could do so itself."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.robot.link import RobotLink
 
 
 class TcpRestorer:
-    """Tries again until the robot reports the TCP; no goal starts before."""
+    """Tries until the robot no longer reports the temporary TCP; no goal starts before that."""
 
     def __init__(self, link: RobotLink, pipe: OwnerPipe) -> None:
         """Begin with nothing to restore."""
@@ -28,12 +28,12 @@ class TcpRestorer:
         self._link.set_tcp_restore_pending(True)
 
     def retry_now(self) -> None:
-        """Do not wait for the next attempt: the robot program has connected or gone."""
+        """Make the next attempt at once, because the robot program has connected or gone."""
         if self._pending is not None:
             self._pending.retry_now()
 
     def observe(self, state: RobotState) -> None:
-        """Take note of a robot state: restore the TCP if that is due, or be done with it."""
+        """Process a robot state: restore the TCP if that is due, or finish if it is restored."""
         if self._pending is None:
             return
         self._pending.observe(state, asyncio.get_running_loop().time())
@@ -46,7 +46,7 @@ class TcpRestorer:
             self.restore_if_due(state)
 
     def restore_if_due(self, state: RobotState | None) -> None:
-        """Have the robot restore the TCP, if there is one to restore and it can be done now."""
+        """Have the robot restore the TCP, if that is pending and the robot can do it now."""
         now = asyncio.get_running_loop().time()
         if (
             self._pending is not None

@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYP
 _POSE = ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')
 _TWIST = ('x [m/s]', 'y [m/s]', 'z [m/s]', 'rx [rad/s]', 'ry [rad/s]', 'rz [rad/s]')
 _WRENCH = ('fx [N]', 'fy [N]', 'fz [N]', 'tx [Nm]', 'ty [Nm]', 'tz [Nm]')
-#: Suffixes of the titles of columns with several numbers, by the end of the name.
+#: Suffixes of the titles of columns with several numbers, by the end of the column's name.
 _PARTS = {
     'pose': _POSE,
     'twist': _TWIST,
@@ -55,4 +55,4 @@ def write_csv(recording: Recording, file: BinaryIO, options: ExportOptions) -> N
     for row in zip(*(column.tolist() for column in columns.values()), strict=True):
         writer.writerow(row)
         options.progress()
-    text.detach()  # else the file would be closed with it
+    text.detach()  # else the file would be closed with the wrapper

@@ -15,12 +15,12 @@ from ur_cartesian_driver.driver.recordings.recording import Recording
 class ExportOptions:
     """The options of an export, the same for all formats."""
 
-    #: Of the names of frames and joints.
+    #: Prefix of the names of frames and joints.
     tf_prefix: str = ''
     #: To be called after each packet.
     progress: Callable[[], object] = lambda: None
 
 
-#: Writes a recording; raises ValueError where it is damaged, ImportError where a package is
-#: missing, or OSError.
+#: Writes a recording; raises ValueError if it is damaged, ImportError if a package is missing, or
+#: OSError.
 Exporter: TypeAlias = Callable[[Recording, BinaryIO, ExportOptions], None]

@@ -3,8 +3,8 @@
 """
 A recording as MCAP with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others.
 
-Topics that the node publishes too have its names and types, so one layout serves both. Messages
-carry the times of their packets, counted from the moment at which the recording began.
+Topics that the node publishes too have the same names and types here, so one layout serves both.
+Messages carry the times of their packets, counted from the moment at which the recording began.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import conjugate, rotate
 from ur_cartesian_driver.motion.goal.known_frames import BASE, TCP
 
-#: Topics of the node are below its name.
+#: Name of the node, and prefix of its topics.
 NODE = '/ur_cartesian_driver'
-#: Topics of single numbers that no node publishes.
+#: Prefix of the topics of single numbers, which no node publishes.
 NUMBERS = f'{NODE}/recording'
 _NUMBER_COLUMNS = (
     'speed_scaling',
@@ -93,7 +93,7 @@ def _log_time(record: _Record) -> int:
 
 
 class _Messages:
-    """The records of a recording, each kind of them in the order of time."""
+    """The messages of a recording, each kind of them in the order of time."""
 
     def __init__(self, recording: Recording, tf_prefix: str) -> None:
         self._recording = recording
@@ -159,7 +159,7 @@ class _Messages:
         )
 
     def packets(self, progress: Callable[[], object]) -> Iterator[_Record]:
-        """Yield what each packet has of joints and TCP."""
+        """Yield the messages about joints and TCP for each packet."""
         found = self._recording
         columns = (
             found.actual_q,
@@ -239,9 +239,10 @@ class _Messages:
 
 def _number_records(topic: str, values: NDArray[Any], times: list[int]) -> Iterator[_Record]:
     """
-    Yield the known numbers of a column where they change.
+    Yield the known numbers of a column when they change.
 
-    The last one before a change is there too, so that a plot with straight lines has the steps.
+    The last number before each change is yielded too, so that a plot with straight lines shows
+    steps.
     """
     if not len(values):
         return

@@ -3,8 +3,8 @@
 """
 Definitions of ROS 2 messages as text, as MCAP files carry them (``ros2msg``).
 
-They are read from the installed interface packages, as rosbag2 does it: a definition, followed by
-the definitions of the messages that it contains.
+The definitions are read from the installed interface packages, as in rosbag2: a definition is
+followed by the definitions of the messages that it contains.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 
 from ur_cartesian_driver.resources import installed_share
 
-#: Messages of packages that the driver does not need, and PyPI does not have; without comments.
+#: Messages of packages that the driver does not need and PyPI does not have; without comments.
 _SHORT_DEFINITIONS = {
     'nav_msgs/Path': 'std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n',
     'tf2_msgs/TFMessage': 'geometry_msgs/TransformStamped[] transforms\n',

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Records every motion: a file each, written while it runs.
+Record every motion in its own file, written while the motion runs.
 
 Packets are 2 ms apart, and a disk may take longer than that at any time. So a packet is copied
-into a preallocated buffer (a few microseconds), and a thread of its own writes full buffers.
-Their number is fixed: a disk that is too slow costs rows, which the recording counts, but no time
-of the motion and no memory. A recording that cannot be written ends with a warning; the motion
-goes on.
+into a preallocated buffer (a few microseconds), and a separate thread writes full buffers. The
+number of buffers is fixed: if the disk is too slow, rows are lost, which the recording counts, but
+the motion is not delayed and memory does not grow. A recording that cannot be written ends with a
+warning; the motion goes on.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 if TYPE_CHECKING:
     from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: Rows of a buffer, number of buffers, and the longest time until one is written [s]: a killed
-#: process loses as much.
+#: Rows of a buffer, number of buffers, and the longest time until a buffer is written [s]: a
+#: killed process loses the rows of this time.
 BUFFER_ROWS, BUFFER_COUNT, FLUSH_PERIOD = 256, 8, 0.5
-#: So many jobs may wait for the disk; more events and pieces of the plan are dropped.
+#: At most this many jobs wait for the disk; further events and pieces of the plan are dropped.
 MAX_PENDING_JOBS = 1000
-#: Pause of the finisher after each small part of a file [s]: other threads wait 5 ms and more for
-#: the interpreter of a thread that never pauses.
+#: Pause of the finisher after each small part of a file [s]: while a thread never pauses, other
+#: threads wait 5 ms and more for the interpreter.
 YIELD_PAUSE = 0.0002
 #: Lines of a plan's report that are kept.
 MAX_REPORT_LINES = 1000
@@ -77,7 +77,7 @@ def motion_metadata(
     """
     Return the metadata of a motion that begins now.
 
-    :param robot: its model, software and calibration.
+    :param robot: its model, PolyScope version and serial number.
     :param parameters: the configuration of the driver, a dataclass.
     :param plan_metadata_json: the result of :func:`plan_metadata`.
     :param mode: the kind of a motion without a plan.
@@ -107,37 +107,37 @@ def motion_metadata(
 
 
 class Recorder:
-    """Takes states and events on one thread, and writes them on another."""
+    """Collects states and events on one thread, and writes them on another."""
 
     def __init__(self, directory: str, max_size: float, warn: Callable[[str], None]) -> None:
         """
         Prepare; nothing happens before :meth:`start`.
 
-        :param directory: where the files go; empty = nothing is recorded.
-        :param max_size: of all of them together [MB]; the oldest ones are removed.
-        :param warn: takes a sentence, on the writer's thread.
+        :param directory: directory of the files; empty = nothing is recorded.
+        :param max_size: largest size of all files together [MB]; the oldest files are removed.
+        :param warn: called with a sentence, on a thread of the recorder.
         """
         self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
         self._last_warning = ''
-        #: One writes while a motion runs, the other makes a file of it afterwards, slowly.
+        #: The writer writes while a motion runs; the finisher then makes one file, slowly.
         self._writer: _Worker | None = None
         self._finisher: _Worker | None = None
         self._is_closing = False
-        #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
+        #: The folder of the running motion; only the writer uses it, except ``lost_rows``.
         self._folder: RecordingFolder | None = None
-        # Buffers for rows: the one that is being filled, how far, and the free ones.
+        # Buffers for rows: the buffer being filled, the bytes used in it, and the free buffers.
         self._buffer, self._used = bytearray(), 0
         self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
-        #: Start of the motion by the controller's clock, time of the newest packet since then, and
-        #: when the buffer has to be written [s].
+        #: Start of the motion by the controller's clock; since then, the time of the newest packet
+        #: and the time at which the buffer has to be written [s].
         self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
-        #: The points begun of the goal before, as long as the robot reports them.
+        #: The previous goal's count of begun points, while the robot still reports it.
         self._stale_points_begun: int | None = None
 
     @property
     def is_recording(self) -> bool:
-        """Tell whether a motion is being recorded."""
+        """Return whether a motion is being recorded."""
         return self._folder is not None
 
     # ---- states and events ---------------------------------------------------------------------
@@ -147,7 +147,7 @@ class Recorder:
         Begin the recording of a motion.
 
         :param metadata: the metadata, see :func:`motion_metadata`.
-        :param state: the newest packet: time 0 is its time.
+        :param state: the newest packet, whose time becomes time 0.
         """
         if not self._directory:
             return
@@ -169,7 +169,7 @@ class Recorder:
 
     def add_plan(self, reference: ReferencePath, since: float) -> None:
         """
-        Take the planned path, or a piece that replaces its end.
+        Record the planned path, or a piece that replaces its end.
 
         :param since: start of the piece [s].
         """
@@ -184,11 +184,11 @@ class Recorder:
         self, state: RobotState, waypoint: int = -1, buffered: float = nan, lag: float = nan
     ) -> None:
         """
-        Take a packet.
+        Record a packet.
 
-        :param waypoint: the point of the goal that the arm moves to.
-        :param buffered: motion that the robot holds and has not begun [s].
-        :param lag: of the arm behind the set-points sent [s]; NaN = unknown.
+        :param waypoint: the point of the goal to which the arm moves.
+        :param buffered: motion time that the robot has received and not yet run [s].
+        :param lag: the time by which the arm lags the newest set-point [s]; NaN = unknown.
         """
         if (folder := self._folder) is None:
             return
@@ -228,20 +228,20 @@ class Recorder:
             self._flush(folder)
 
     def add_signals(self, signals: Signals) -> None:
-        """Take the newest outputs."""
+        """Note the newest outputs, for the packets that follow."""
         out = signals.outputs
         flags = (*out.standard, *out.configurable, *out.tool)
         self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
         self._analog = (signals.analog_outputs[0].value, signals.analog_outputs[1].value)
 
     def add_event(self, kind: str, text: str) -> None:
-        """Take an event that no column shows."""
+        """Record an event that no column shows."""
         if (folder := self._folder) is not None:
             event = self._time, kind, text
             self._submit(folder, lambda: folder.write_event(event))
 
     def end(self, outcome: Outcome) -> None:
-        """End the recording; its file is there soon after."""
+        """End the recording; its file follows soon after."""
         if (folder := self._folder) is None:
             return
         self._flush(folder)
@@ -276,12 +276,12 @@ class Recorder:
     # ---- inside -------------------------------------------------------------------------------
 
     def _flush(self, folder: RecordingFolder) -> None:
-        """Have the rows written, and go on in another buffer."""
+        """Have the filled rows written, and go on in another buffer."""
         buffer, used = self._buffer, self._used
         self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
         try:
             self._buffer = self._free_buffers.get_nowait()
-        except Empty:  # all wait for the disk: these rows are lost
+        except Empty:  # all buffers wait for the disk: these rows are lost
             folder.lost_rows += used // disk.EXECUTED_STRUCT.size
             return
 
@@ -290,12 +290,12 @@ class Recorder:
             self._free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.submit(write)  # at most as many as buffers
+            self._writer.submit(write)  # at most as many jobs as buffers
 
     def _submit(
         self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
     ) -> None:
-        """Have the writer do something, unless too many jobs wait."""
+        """Give the writer a job, unless too many jobs wait."""
         writer = self._writer
         if writer is not None and (is_last or writer.jobs.qsize() < MAX_PENDING_JOBS):
             writer.submit(lambda: folder.run_guarded(work))
@@ -309,7 +309,7 @@ class Recorder:
         self._writer, self._finisher = _Worker('recorder'), _Worker('recorder, finishing')
 
     def _yield_cpu(self) -> None:
-        """Let the robot loop have the interpreter, if it waits for it."""
+        """Yield the interpreter to the robot loop, which may be waiting for it."""
         if not self._is_closing:
             sleep(YIELD_PAUSE)
 
@@ -329,11 +329,11 @@ class _Worker:
         self._thread.start()
 
     def submit(self, job: Callable[[], None]) -> None:
-        """Have something done."""
+        """Queue a job."""
         self.jobs.put(job)
 
     def end(self, timeout: float) -> None:
-        """Wait until all is done, at most for ``timeout`` [s]."""
+        """Wait until all jobs are done, at most for ``timeout`` [s]."""
         self.jobs.put(None)
         self._thread.join(timeout)
 

@@ -5,7 +5,7 @@ A recorded motion, for analysis.
 
 ``numpy.load`` opens the same files without this package; here the arrays have names and types, a
 recording that was cut off by the end of its process can be read too, and the executed path is
-compared with the planned one as the driver itself does it.
+compared with the planned one in the same way as in the driver.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ class _NoRecording(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordedDeviation:
-    """Distance of the tool from the planned path; n rows, as the recording has."""
+    """Distance of the tool from the planned path, one row for each of the n packets."""
 
-    #: (n,) of the measured pose, [m] and [rad].
+    #: (n,) distance of the measured pose [m], [rad].
     position: Floats
     angle: Floats
-    #: (n,) of the controller's own target, [m] and [rad].
+    #: (n,) distance of the controller's own target [m], [rad].
     target_position: Floats
     target_angle: Floats
-    #: (n,) when the plan, at full speed, is where the target is [s].
+    #: (n,) planned time, at full speed, of the place that the target has reached [s].
     planned_time: Floats
-    #: (n,) the goal's point that this place leads to.
+    #: (n,) the next point of the goal at that place; -1 = no plan.
     waypoint: Int32s
 
 
@@ -63,7 +63,7 @@ class Recording:
     events: list[Event] = field(repr=False)
     #: (n,) controller's clock from the start of the motion [s].
     time: Floats = field(repr=False)
-    #: (n, 7), measured and the controller's target.
+    #: (n, 7) measured pose, and the controller's target.
     actual_pose: Floats = field(repr=False)
     target_pose: Floats = field(repr=False)
     #: (n, 6)
@@ -76,25 +76,26 @@ class Recording:
     target_qd: Floats = field(repr=False)
     #: (n, 6) [N], [Nm] at the TCP in base axes; NaN = unknown.
     wrench: Floats = field(repr=False)
-    #: (n,) [s] lag behind the set-points sent, and motion that the robot holds; NaN = unknown.
+    #: (n,) lag behind the newest set-point, and motion time that the robot has received and not
+    #: yet run [s]; NaN = unknown.
     lag: Floats = field(repr=False)
     buffered: Floats = field(repr=False)
-    #: (n,) 0 to 1: what slows the arm beside the slider, and the slider.
+    #: (n,) 0 to 1: speed scaling by causes other than the slider, and the slider.
     speed_scaling: Floats = field(repr=False)
     slider: Floats = field(repr=False)
     #: (n, 2) [A] or [V]; NaN = unknown.
     analog_output: Floats = field(repr=False)
     #: (n,) bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
     digital_output: Int32s = field(repr=False)
-    #: (n,) motions that the robot program has begun, and the goal's point that the last one leads
-    #: to; -1 = it has not said.
+    #: (n,) number of motions that the robot program has begun, and the goal's point to which the
+    #: arm moves; -1 = unknown.
     points_begun: Int32s = field(repr=False)
     waypoint: Int32s = field(repr=False)
-    #: (n,) numbers of the controller.
+    #: (n,) mode numbers of the controller.
     robot_mode: Int32s = field(repr=False)
     safety_mode: Int32s = field(repr=False)
     runtime_state: Int32s = field(repr=False)
-    #: (m,) [s], (m, 7), (m,) index of the goal's point that the sample leads to.
+    #: The plan's samples: (m,) times [s], (m, 7) poses, (m,) the goal's point that each leads to.
     planned_time: Floats = field(repr=False)
     planned_pose: Floats = field(repr=False)
     planned_point: Int32s = field(repr=False)
@@ -104,11 +105,12 @@ class Recording:
         """
         Read a recording.
 
-        :param path: a file ``.npz``, or the folder ``.part`` of a motion that runs, or whose
+        :param path: a file ``.npz``, or the folder ``.part`` of a motion that is running or whose
             process was killed.
-        :param max_rows: read every second, third, ... packet of a longer one; 0 = all.
-        :raises OSError: it is not there.
-        :raises ValueError: it is no recording.
+        :param max_rows: most packets to read: of a longer recording only every second, third, ...
+            packet is read; 0 = all.
+        :raises OSError: the file does not exist, or cannot be read.
+        :raises ValueError: the file is not a recording, or is damaged.
         """
         path = Path(path)
         try:
@@ -121,7 +123,7 @@ class Recording:
         return found
 
     def _check_columns(self, path: Path) -> None:
-        """Refuse columns of different lengths, or of other numbers: the file was changed."""
+        """Refuse columns of different lengths or wrong types: the file was changed."""
         for names, rows in (
             (_EXECUTED_COLUMNS, len(self.time)),
             (_PLANNED_COLUMNS, len(self.planned_time)),
@@ -161,7 +163,7 @@ class Recording:
 
     @property
     def points(self) -> Floats:
-        """(k, 7) the planned poses at the goal's points, in the middle of a corner's blend."""
+        """(k, 7) the planned poses at the goal's points; at a blended corner, its middle."""
         last = np.flatnonzero(np.diff(self.planned_point, append=-1))
         return np.asarray(self.planned_pose[last])
 
@@ -169,10 +171,10 @@ class Recording:
         """
         Compare with the plan, packet by packet.
 
-        The target is followed along the path, only ever forwards; the measured pose is compared
-        with the place nearest to it around there. So a path that crosses itself is followed in
-        the right order, and a robot that is slowed down is not off it. Where there was no plan,
-        as for live targets, the numbers are NaN.
+        The target is followed along the path, only forwards; the measured pose is compared with
+        the nearest place on the path around the target. So a path that crosses itself is followed
+        in the right order, and a robot that is slowed down is not off the path. Without a plan, as
+        for live targets, the numbers are NaN.
         """
         rows = np.full((len(self.time), 6), np.nan)
         if len(self.planned_time) > 1:
@@ -253,7 +255,7 @@ def _from_folder(path: Path, max_rows: int) -> Recording:
 
 
 def _complete(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return the columns with those that an older recording does not have."""
+    """Return all columns, with NaN in those that an older recording does not have."""
     unknown = {
         name: np.full((len(columns['time']), *disk.EXECUTED_DTYPE[name].shape), np.nan)
         for name in disk.ADDED_COLUMNS

@@ -3,7 +3,7 @@
 """
 The folder into which a running motion is recorded, and the quota of all recordings.
 
-All of this may wait for the disk, so the robot loop itself calls none of it.
+All functions here may wait for the disk, so the robot loop itself calls none of them.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ class RecordingFolder:
         """
         Prepare; nothing is written before :meth:`open`.
 
-        :param max_size: of all recordings together [bytes]; a motion may take half of it.
-        :param warn: takes a sentence when something is wrong.
+        :param max_size: largest size of all recordings together [bytes]; a motion may use half.
+        :param warn: called with a sentence when something is wrong.
         """
         self._directory, self._metadata = directory, metadata
         self._max_size, self._warn = max_size, warn
         self._is_broken = False
-        #: When the samples of the plan that came last are due.
+        #: The planned times of the samples that were written last [s].
         self._last_times: Floats = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.lost_rows = 0
@@ -66,7 +66,7 @@ class RecordingFolder:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
-        # The lock shows that this process writes; it ends with the process.
+        # The lock shows that this process writes the folder; it ends with the process.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
@@ -87,9 +87,9 @@ class RecordingFolder:
 
     def write_plan(self, rows: NDArray[np.void], since: float) -> None:
         """
-        Append samples of the planned path, in the place of those after a time [s].
+        Append samples of the planned path, which replace all samples after a time [s].
 
-        These are among the samples that came last: a goal with an open end gives up its ending.
+        Only samples of the last call can be replaced: a goal with keep_open drops its ending.
         """
         kept_samples = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
         rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
@@ -111,7 +111,7 @@ class RecordingFolder:
         """
         Make one file of the folder, and remove the oldest recordings.
 
-        :param yield_cpu: called often, to let others work.
+        :param yield_cpu: called often, so that other threads can run.
         """
         disk.finish(self._path, yield_cpu)
         self._close_files()  # last: the lock marks the folder as ours
@@ -122,7 +122,7 @@ class RecordingFolder:
         self._close_files()
 
     def run_guarded(self, work: Callable[[], None]) -> None:
-        """Do one of the above, and warn if it fails."""
+        """Run one of the methods above, and warn if it fails."""
         if self._is_broken:
             return
         try:
@@ -146,7 +146,7 @@ class RecordingFolder:
 
 
 def _new(path: Path) -> Path:
-    """Make a folder; one of that name may be there, of another arm for example."""
+    """Make a folder; if its name is taken, for example by another arm, add a number."""
     for number in range(1, 100):
         found = path if number == 1 else path.with_stem(f'{path.stem}_{number}')
         if found.with_suffix('.npz').exists():
@@ -166,8 +166,8 @@ def enforce_quota(
     """
     Finish the folders of killed processes, then remove the oldest recordings.
 
-    :param max_size: what they may take together [bytes].
-    :param yield_cpu: called often, to let others work.
+    :param max_size: largest size of all recordings together [bytes].
+    :param yield_cpu: called often, so that other threads can run.
     """
     recordings = sorted(
         path for path in directory.iterdir() if _RECORDING_NAME.fullmatch(path.name)
@@ -186,7 +186,7 @@ def enforce_quota(
 
 
 def _is_written(folder: Path) -> bool:
-    """Tell whether a process writes the folder; also if that cannot be known."""
+    """Return whether a process writes the folder; True if that cannot be known."""
     try:
         with open(folder / disk.EXECUTED_FILE, 'rb') as rows:
             fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)

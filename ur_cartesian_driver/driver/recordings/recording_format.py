@@ -4,8 +4,8 @@
 The format of a recording on disk: columns and files.
 
 While a motion runs there is a folder ``NAME.part``, whose files are complete at every moment: rows
-in ``.npy`` files that grow, events in JSON lines. So they can be read after the process was
-killed. When the motion has ended the folder becomes one file ``NAME.npz``, with an array for each
+in growing ``.npy`` files, events in JSON lines. So the files can be read even if the process was
+killed. When the motion has ended, the folder becomes one file ``NAME.npz``, with an array for each
 column. Memory does not grow with the length of the motion.
 """
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
 
-#: Version of the format; counts up when a member of the file changes its meaning.
+#: Version of the format; increased when a member of the file changes its meaning.
 FORMAT = 1
 
 #: One packet of the robot: names, shapes and order of the columns. Units and frames:
@@ -63,24 +63,24 @@ EXECUTED_STRUCT = struct.Struct(
         for name in EXECUTED_DTYPE.names or ()
     )
 )
-#: Columns that recordings from before they were added do not have: they are read as NaN.
+#: Columns that older recordings do not have: they are read as NaN.
 ADDED_COLUMNS = ('wrench',)
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 
-#: Files of a folder, and the end of its name.
+#: End of a folder's name, and the files in it.
 PART_SUFFIX = '.part'
 METADATA_FILE, EVENTS_FILE = 'metadata.json', 'events.jsonl'
 EXECUTED_FILE, PLANNED_FILE = 'executed.npy', 'planned.npy'
-#: Rows that are processed together, which holds the interpreter for 0.1 ms.
+#: How many rows are processed together, which holds the interpreter for 0.1 ms.
 CHUNK = 512
-#: Events that are kept; a path of a million points has a million. The column ``waypoint`` has
-#: them all.
+#: How many events are kept; a path of a million points has a million, all of which are in the
+#: column ``waypoint``.
 MAX_EVENTS = 10_000
 #: Longest text of an event; whole sentences are in the metadata.
 MAX_EVENT_TEXT = 120
 
-#: Time since the start [s], what kind of event, and a few words.
+#: Time since the start [s], kind of event, and a few words.
 Event: TypeAlias = tuple[float, str, str]
 
 #: The digital outputs by bit.
@@ -98,11 +98,11 @@ class GrowingArray:
         """
         Make the file, with no rows.
 
-        :raises OSError: it cannot be written, or exists.
+        :raises OSError: the file cannot be written, or exists.
         """
         self._dtype = dtype
         self.count = 0
-        # Unbuffered: what could not be written must not be tried again when it is closed.
+        # Unbuffered: closing the file must not retry a write that has failed.
         self.file = open(path, 'xb', buffering=0)  # noqa: SIM115  # open until close()
         self._write(_npy_header(dtype, (0,)))
 
@@ -110,7 +110,7 @@ class GrowingArray:
         """
         Append rows.
 
-        They count only when all of them are there: a write that fails leaves what was before.
+        They become part of the array only when all are written: a failed write changes nothing.
 
         :raises OSError: the disk is full, for example.
         """
@@ -132,7 +132,7 @@ class GrowingArray:
 
 
 def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
-    """Return the head of a ``.npy`` file (version 1.0), as long for every number of rows."""
+    """Return the head of a ``.npy`` file (version 1.0), of equal length for any number of rows."""
     sizes = ''.join(f'{size:>12},' for size in shape)
     descr = dtype.descr if dtype.names else dtype.str
     text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': ({sizes}), }}"
@@ -150,8 +150,8 @@ def detect_events(
     """
     Return the changes from packet to packet: points begun, outputs, slider, program, modes.
 
-    :param rows: of the type :data:`EXECUTED_DTYPE`, may be a file in memory.
-    :param yield_cpu: called often, to let others work.
+    :param rows: rows of the type :data:`EXECUTED_DTYPE`, which may be a memory-mapped file.
+    :param yield_cpu: called often, so that other threads can run.
     """
     found: list[Event] = []
     for first in range(0, len(rows), CHUNK):
@@ -238,9 +238,9 @@ def finish(folder: Path, yield_cpu: Callable[[], None] = lambda: None) -> Path:
     """
     Make one file out of a folder, and remove the folder.
 
-    :param yield_cpu: called often, to let others work.
+    :param yield_cpu: called often, so that other threads can run.
     :returns: the file.
-    :raises OSError: it cannot be written; the folder stays as it was.
+    :raises OSError: the file cannot be written; the folder stays as it was.
     """
     file = folder.with_suffix('.npz')
     unfinished = folder / file.name

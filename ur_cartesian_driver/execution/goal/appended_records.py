@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The records of a goal to which points are appended (keep_open): taken, replaced, refused."""
+"""Accept, replace or refuse the records that are appended to an open goal (keep_open)."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 #: The answer to points that come after a request with ``last: true``.
 CLOSED_BY_CLIENT = 'The goal was closed by an earlier request with last: true.'
 
-#: In these a goal takes more points.
+#: The states in which a goal accepts more points.
 _ACCEPTS_POINTS = frozenset(
     {GoalState.ARMING, GoalState.MOVING, GoalState.RUNNING_OUT, GoalState.AWAITING_POINTS}
 )
 
 
 class AppendedRecords(Phrasing, Reporting):
-    """Keeps count of the records that will be run, and of the rests because there were none."""
+    """Counts the records that are sure to run, and the rests for lack of more records."""
 
     def __init__(self, monitor: GoalMonitor) -> None:
         """Begin with the first points of a goal."""
         self._monitor = monitor
         #: Whether more points may come.
         self.is_open = True
-        #: How many records are run whatever comes: all but the ending.
+        #: How many records run no matter what is appended: all but the ending.
         self.committed = monitor.job.points - monitor.job.ending_records
-        #: How often the motion was brought to rest, and behind which point the last time.
+        #: How often the motion was brought to rest, and the point after which it last rested.
         self._stop_count = self._last_stop_point = 0
         self._is_resting = False
 
@@ -42,7 +42,7 @@ class AppendedRecords(Phrasing, Reporting):
         self, append_job: AppendJob, state: GoalState, *, sent: int = 0, sent_until: float
     ) -> AnswerAppend:
         """
-        Take all points of a request, or none.
+        Accept all points of a request, or none.
 
         :param sent: how many records can no longer be replaced.
         :param sent_until: the time until which the motion can no longer be replaced [s].
@@ -72,7 +72,7 @@ class AppendedRecords(Phrasing, Reporting):
         Return the signal for running out of points, or for points that came at rest.
 
         :param runs_out: nothing but the ending is left to send.
-        :param has_more: there is a motion behind the ending.
+        :param has_more: there is a motion after the ending.
         """
         if state is GoalState.MOVING and runs_out:
             return GoalSignal.STARVING, ''
@@ -81,26 +81,26 @@ class AppendedRecords(Phrasing, Reporting):
         if not has_more:
             return NO_MEANING if self.is_open else (GoalSignal.NO_MORE_POINTS, '')
         packet = self._monitor.latest
-        # Packets may be late: the next motion begins where one of them shows the arm at rest.
+        # Packets may be late: the next motion begins only when one reports the arm at rest.
         if packet is None or not is_at_rest(packet):
             return NO_MEANING
         moved = self._monitor.rest_offset(packet)
         return (GoalSignal.APPENDED, '') if moved is None else (GoalSignal.DEVIATION, moved)
 
     def run_out(self) -> int:
-        """Commit the ending, because nothing came in time; return how many records there are."""
+        """Commit the ending, because nothing came in time; return the number of records."""
         self._stop_count += 1
         self._last_stop_point = self._monitor.records.points - 1
         self.committed = self._monitor.records.total
         return self.committed
 
     def rest(self, time: float = inf) -> None:
-        """Take note that the arm rests behind the ending, at a planned time [s]."""
+        """Note that the arm rests after the ending, at a planned time [s]."""
         self._is_resting = True
         self._monitor.finish(time)
 
     def go_on(self) -> None:
-        """Take note that the arm moves again."""
+        """Note that the arm moves again."""
         self._is_resting = False
 
     def location(self, *, started: bool) -> str:

@@ -6,14 +6,14 @@ The feeder of a goal, which sends its motion to the robot, and the capabilities 
 A :class:`~.goal_machine.GoalMachine` knows the state of a goal. It asks its :class:`Feeder` for
 commands, and the feeder never changes the state.
 
-Motions differ much: points on a socket, set-points through registers, a person who guides the arm.
-A hook for each difference in one class would be empty in most feeders. So whatever only some
-motions can do is a *capability*: a small class, from which a feeder inherits, or one of its
-:attr:`~Feeder.parts` does. The machine looks all of them up once (:class:`Capabilities`). The
-methods of the classes below are right for a motion without the capability.
+Motions differ greatly: points on a socket, set-points through registers, a person who guides the
+arm. One base class with a hook for each difference would leave most hooks empty in most feeders.
+So a feature of only some motions is a *capability*: a small class from which the feeder, or one of
+its :attr:`~Feeder.parts`, inherits. The machine looks all of them up once (:class:`Capabilities`).
+The methods of the classes below are right for a motion without the capability.
 
-A new capability is a class here, its line in :class:`Capabilities`, the place in the machine where
-it counts, and the feeder or part that has it. The other feeders stay as they are.
+To add a capability, write its class here and its line in :class:`Capabilities`, use it in the
+machine, and inherit it in the feeder or part that has it. The other feeders stay as they are.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Feeder(ABC):
         """
         Return the next piece of the motion, in answer to a packet of the robot.
 
-        A packet of its state comes in MOVING only, and after all conclusions from it; a packet of
-        its registers comes in every state, and before any conclusion.
+        Packets of the robot's state come in MOVING only, after the machine has acted on them;
+        packets of its registers come in every state, before the machine acts on them.
 
         :param now: time of a steady clock [s].
         """
@@ -74,7 +74,7 @@ class Feeder(ABC):
 class Prepared:
     """The robot has to be prepared before the motion."""
 
-    #: The name of the motion in the sentence that another client has the robot's inputs.
+    #: The name of the motion, for the refusal when another client has the robot's inputs.
     motion = ''
 
     def prepare(self) -> list[GoalCommand]:
@@ -97,7 +97,7 @@ class Appendable:
     append_timeout = 0.0
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Take all points or none; return the answer, and the commands that follow at once."""
+        """Accept all points or none; return the answer, and the commands that follow at once."""
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
@@ -110,9 +110,9 @@ class Steerable:
 
     def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
         """
-        Take a live target.
+        Accept a live target.
 
-        :param age: how long ago it was true [s].
+        :param age: how old the target is on arrival [s].
         :param now: time of a steady clock [s].
         """
 
@@ -122,19 +122,19 @@ class Displaceable:
 
     def set_offset(self, offset: Vector3, age: float, now: float) -> None:
         """
-        Take an offset.
+        Accept an offset.
 
         :param offset: along the path, across it and normal to both [m].
-        :param age: how long ago it was true [s].
+        :param age: how old the offset is on arrival [s].
         :param now: time of a steady clock [s].
         """
 
 
 class Displaced:
-    """The tool is beside the path of the goal, because offsets displace it."""
+    """The tool is off the path of the goal because offsets displace it."""
 
     def applied_offset(self, packet: RobotState) -> AppliedOffset:
-        """Return the offset at the place of the controller's target."""
+        """Return the offset that the controller's target has now."""
         return NO_OFFSET
 
 
@@ -143,7 +143,7 @@ class Ageing:
 
     def age(self, now: float) -> list[GoalCommand]:
         """
-        Let time pass, and return the warnings that are due.
+        Drop what has grown too old, and return the warnings that are due.
 
         :param now: time of a steady clock [s].
         """
@@ -154,46 +154,46 @@ class Stallable:
     """The motion waits for an arm that is off its path (on_path_tolerance: STALL)."""
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
-        """Return the fault of a motion, unless the motion waits until it goes away."""
+        """Return the fault, or None while the motion waits for the fault to go away."""
         return fault
 
 
 class Interpreting:
-    """The robot answers with events that motions of points do not have."""
+    """The robot answers with events that do not occur in motions sent as points."""
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
-        """Return the meaning of an event; None leaves that to the machine."""
+        """Return the meaning of an event; None = the machine interprets the event."""
         return None
 
 
 class Streaming:
-    """The driver streams set-points, and itself knows how far the robot is."""
+    """The driver streams set-points, and so knows the robot's progress itself."""
 
     @property
     def lag(self) -> float:
-        """The time by which the arm is behind the newest set-point [s]; NaN = there are none."""
+        """The time by which the arm lags the newest set-point [s]; NaN = no set-points."""
         return nan
 
     @property
     def has_progress(self) -> bool:
-        """Whether progress reports have anything to report yet."""
+        """Whether there is any progress to report yet."""
         return True
 
     def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
         """
         Return the number of motions that the robot has begun, and the lag of its target.
 
-        :returns: the count since START (None = unknown), and the most motions by which the
-            controller's target is behind it.
+        :returns: the count since START (None = unknown), and the largest number of motions by
+            which the controller's target lags behind that count.
         """
         return packet.points_begun, 0
 
     def is_read(self, now: float) -> bool:
-        """Tell whether the robot program has read a set-point lately: then the arm may stand."""
+        """Return whether the program has read a set-point lately: a still arm is then no fault."""
         return False
 
     def has_arrived(self, packet: RobotState) -> bool:
-        """Tell whether an arm that stands after the last point will stay there."""
+        """Return whether an arm that stands still after the last point will stay there."""
         return True
 
     def reports(self) -> list[GoalCommand]:
@@ -202,14 +202,14 @@ class Streaming:
 
 
 class Phrasing:
-    """The outcome has sentences of its own."""
+    """The outcome is worded differently than for points."""
 
     def success_text(self) -> str:
-        """Return the sentence of a success; '' = the one of points."""
+        """Return the sentence for a success; '' = the sentence about points."""
         return ''
 
     def location(self, *, started: bool) -> str:
-        """Return the place or time of the end, as a clause; '' = the place among the points."""
+        """Return when or where the motion ended, as a clause; '' = name the point."""
         return ''
 
 
@@ -218,7 +218,7 @@ class Reporting:
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The lines."""
+        """The further lines."""
         return ()
 
 
@@ -226,7 +226,7 @@ class Capabilities:
     """The capabilities of a feeder; the ones that it lacks do nothing."""
 
     def __init__(self, feeder: Feeder) -> None:
-        """Look them up in the feeder and its parts."""
+        """Look up the capabilities of the feeder and its parts."""
 
         def all_of(kind: type[T]) -> tuple[T, ...]:
             return tuple(each for each in (feeder, *feeder.parts) if isinstance(each, kind))

@@ -26,7 +26,7 @@ class SendControl(GoalCommand):
 
     action: TrajectoryAction
     count: int = 0
-    #: START: offsets that come through registers displace the path.
+    #: For START: offsets that arrive through registers displace the path.
     takes_offsets: bool = False
 
 
@@ -40,7 +40,7 @@ class SendPoints(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetTemporaryTcp(GoalCommand):
-    """Set the robot's TCP for the time of a goal."""
+    """Set the robot's TCP for the duration of a goal."""
 
     T_flange_tcp: Pose
 
@@ -70,14 +70,14 @@ class SecureOutputs(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestoreOutputs(GoalCommand):
-    """Write the values to the robot that its outputs had before a pause."""
+    """Write back the values that the robot's outputs had before a pause."""
 
     outputs: tuple[SafeOutput, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopProgram(GoalCommand):
-    """End the robot program, whatever it does: the arm must not go on by itself."""
+    """End the robot program, whatever it is doing: the arm must not go on by itself."""
 
     reason: str
 
@@ -91,25 +91,25 @@ class ReportProgress(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerAppend(GoalCommand):
-    """Answer an append: all points are taken, or none."""
+    """Answer an append: all points are accepted, or none."""
 
     number: int
-    #: Why they are refused, as a sentence; '' = they are taken.
+    #: Why the points are refused, as a sentence; '' = they are accepted.
     refusal: str = ''
-    #: Points planned from rest would be taken: the ending has been sent.
+    #: Points planned from rest would be accepted: the ending has been sent.
     replan_from_rest: bool = False
-    #: A new tail that begins at this time or later would be taken [s].
+    #: If a new tail begins too early: the earliest time at which it would be accepted [s].
     earliest_cut: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenServo(GoalCommand):
-    """Take the RTDE inputs of the buffered servo, and report the robot's outputs for it."""
+    """Claim the RTDE inputs of the buffered servo, and have the robot report its outputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenOffsets(GoalCommand):
-    """Take the RTDE inputs of path offsets, and report the robot's outputs for them."""
+    """Claim the RTDE inputs of path offsets, and have the robot report its outputs for them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +124,7 @@ class EnterServo(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WriteInputs(GoalCommand):
-    """Write the taken RTDE inputs, in the order of their recipe in ``registers``."""
+    """Write the claimed RTDE inputs, in the order of their recipe in ``registers``."""
 
     values: tuple[float, ...]
 

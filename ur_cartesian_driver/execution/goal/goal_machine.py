@@ -7,8 +7,8 @@ It sends nothing and reads no clock. The owner of the sockets calls :meth:`GoalM
 and then :meth:`GoalMachine.step` with every event, and carries out the commands that they return,
 until one of them is :class:`~.goal_commands.Finish`.
 
-Each event becomes a signal, the signal chooses a transition in the table of
-:mod:`~.goal_transitions`, and the state that is entered gives commands. :mod:`~.goal_monitor`
+Each event becomes a signal, the signal selects a transition in the table of
+:mod:`~.goal_transitions`, and entering the new state yields commands. :mod:`~.goal_monitor`
 compares the packets of the robot with the plan; a :class:`~.feeder.Feeder` sends the motion.
 """
 
@@ -68,7 +68,7 @@ class MotionStatus(NamedTuple):
     waypoint: int
     #: The motion time that the robot has received and not yet run [s].
     buffered: float
-    #: How far the arm is behind the newest set-point [s].
+    #: The time by which the arm lags the newest set-point [s].
     lag: float
 
 
@@ -88,10 +88,10 @@ class GoalMachine:
 
         :param feeder: sends the motion of this goal.
         :param feedback_period: time between two progress reports [s].
-        :param resume_after_stop: a protective or safeguard stop pauses the goal, until somebody
-            unlocks the robot and plays its program; otherwise it ends the goal.
-        :param max_state_age: the goal ends when the newest state of the robot is older [s]; 0 =
-            it may have any age.
+        :param resume_after_stop: a protective or safeguard stop pauses the goal until somebody
+            unlocks the robot and plays its program; if False, it ends the goal.
+        :param max_state_age: the goal ends when the newest state of the robot is older than this
+            [s]; 0 = no limit.
         """
         self.state = INITIAL_STATE
         self.feeder = feeder
@@ -103,12 +103,12 @@ class GoalMachine:
         self._monitor = feeder.monitor
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self._max_state_age = max_state_age or inf
-        #: When the newest packet was true [s]; None = not known yet.
+        #: The time of the robot's state in the newest packet [s]; None = not known yet.
         self._packet_time: float | None = None
         self._feedback_period = feedback_period
         self._next_report = -inf
         self._deadline = inf
-        #: In SETTLING: when the controller's target has to be at the last point [s].
+        #: In SETTLING: the time by which the controller's target must be at the last point [s].
         self._arrival_due = inf
         #: The outcome, as far as it is decided.
         self._code: ErrorCode | None = None
@@ -135,7 +135,7 @@ class GoalMachine:
             self.temporary_tcp = TemporaryTcp(job.T_flange_active, job.T_flange_tcp)
             commands.append(SetTemporaryTcp(T_flange_tcp=job.T_flange_tcp))
         elif not self._guard and not self.can.preparation.explain_not_ready(packet):
-            # No time is needed: MOVING has no deadline.
+            # Any time will do here: MOVING has no deadline.
             commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
 
@@ -181,7 +181,7 @@ class GoalMachine:
         return self._monitor.records.end_time(records)
 
     def _observe(self, packet: RobotState, now: float) -> list[GoalCommand]:
-        """Take a packet, and return the commands that secure or restore the outputs."""
+        """Process a packet, and return the commands that secure or restore the outputs."""
         self._packet, self._packet_time = packet, now - packet.state_age
         if self.temporary_tcp is not None:
             self.temporary_tcp.observe(packet, now)
@@ -193,14 +193,14 @@ class GoalMachine:
             moving=self.state in RUNNING_STATES,
             applied_offset=self.can.displacement.applied_offset(packet),
         )
-        if self.state is GoalState.SETTLING:  # whose time runs with the controller's clock
+        if self.state is GoalState.SETTLING:  # its deadlines run on the controller's clock
             self._deadline += self._monitor.held_time
             self._arrival_due += self._monitor.held_time
         return self._guard.observe(packet, goes_on=self.state in INTERRUPTIBLE_STATES)
 
     def _append(self, append_job: AppendJob, now: float) -> list[GoalCommand]:
         commands = self.can.appending.append(append_job, self.state)
-        if self.state is GoalState.MOVING:  # the next packet tells whether points run out
+        if self.state is GoalState.MOVING:  # whether points run out is checked at the next packet
             return commands
         return commands + self._apply_supply(now)
 
@@ -265,7 +265,7 @@ class GoalMachine:
         return GoalSignal.DEVIATION, fault
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return the signal of a packet in the present state, when nothing stops the robot."""
+        """Return the signal of a packet in the present state if nothing has stopped the robot."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(
                 packet, may_stand_still=self.can.streaming.is_read(now)
@@ -285,7 +285,7 @@ class GoalMachine:
         return (signal, text) if signal is not None else self.can.appending.supply(self.state)
 
     def _is_armed(self, packet: RobotState) -> bool:
-        """Tell whether the robot is ready, with the TCP of the goal where the plan begins."""
+        """Return whether the robot is ready and has the goal's TCP, at the start of the plan."""
         tcp = self.temporary_tcp
         return (
             (tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None))
@@ -294,7 +294,7 @@ class GoalMachine:
         )
 
     def _is_restored(self) -> bool:
-        """Tell whether the robot has its own TCP, and has confirmed the outputs."""
+        """Return whether the robot has its own TCP back and has confirmed the outputs."""
         tcp = self.temporary_tcp
         return (tcp is None or tcp.is_restored) and self._guard.is_confirmed(self._packet)
 
@@ -309,10 +309,10 @@ class GoalMachine:
 
     def _has_not_begun(self) -> bool:
         """
-        Tell whether the program runs the goal, but has not reported a point of it yet.
+        Return whether the program runs the goal, but has not reported a point of it yet.
 
-        A CANCELED names no goal. One that comes so early most likely answers an earlier goal,
-        whose end was never seen because RTDE was lost. So it counts only if no point begins
+        A CANCELED names no goal. If it comes this early, it most likely answers an earlier goal
+        whose end was never seen because RTDE was lost. So it takes effect only if no point begins
         within ``EARLY_CANCELED_TIMEOUT``.
         """
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
@@ -325,7 +325,7 @@ class GoalMachine:
             return missed_deadline(
                 self.state, self._monitor, self.can, self.temporary_tcp, self._guard
             )
-        # Only an early CANCELED sets a deadline in these states; it counts if nothing has begun.
+        # Only an early CANCELED sets a deadline here; it takes effect if nothing has begun.
         self._deadline = inf
         return (
             RESULT_SIGNALS[events.TrajectoryResult.CANCELED]
@@ -336,7 +336,7 @@ class GoalMachine:
     # ---- from signals to commands -------------------------------------------------------------
 
     def _apply(self, signal: GoalSignal, text: str, now: float) -> list[GoalCommand]:
-        """Take the transition of the table; nothing else changes the state."""
+        """Make the transition that the table gives; nothing else changes the state."""
         transition = TRANSITIONS[self.state][signal]
         before, self.state = self.state, transition.state
         if transition.code is not None:
@@ -348,7 +348,7 @@ class GoalMachine:
                 self._code, self._text = transition.code, text
         if self.state is before:
             return []
-        # A motion that left its mode before the outputs are disarmed would set them.
+        # A program that leaves the motion's mode with its outputs still armed would set them.
         disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
@@ -361,7 +361,7 @@ class GoalMachine:
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
-        """Set the deadline of a state, and return the commands of the machine itself."""
+        """Set the deadline of a state, and return the machine's own commands."""
         match state:
             case GoalState.MOVING:
                 self._deadline, self._has_moved = inf, True
@@ -421,15 +421,15 @@ class GoalMachine:
         return commands
 
     def _secure_unconfirmed(self) -> list[GoalCommand]:
-        """Write the safe outputs, unless the robot program has confirmed that they are."""
+        """Write the safe outputs of a failed goal, unless the program has confirmed them."""
         if self._succeeds() or (self._is_decided and self._guard.is_safe(self._packet)):
             return []
-        # RESTORING has told the program already.
+        # In RESTORING the program has been told already.
         release = [] if self._is_decided else self._guard.release(succeeded=False)
         return [*release, *self._guard.secure()]
 
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
-        # In RESTORING no motion is left that could resume.
+        # After RESTORING no motion is left that could go on.
         if signal in STOP_PROGRAM_AFTER and not self._is_decided:
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
@@ -447,7 +447,7 @@ class GoalMachine:
         return commands
 
     def _progress(self) -> list[GoalCommand]:
-        """Return a report, if the newest packet shows the motion with the TCP of the goal."""
+        """Return a report, if the newest packet is about the TCP of the goal."""
         packet, tcp = self._monitor.latest, self.temporary_tcp
         if packet is None or not self.can.streaming.has_progress:
             return []

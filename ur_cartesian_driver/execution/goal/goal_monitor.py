@@ -3,8 +3,8 @@
 """
 Compare each packet of the robot with the plan of a goal: progress, and faults.
 
-The monitor finds faults and decides nothing: the table of :mod:`~.goal_transitions` has the
-consequence of each in each state.
+The monitor finds faults and decides nothing: the table of :mod:`~.goal_transitions` gives the
+consequence of each fault in each state.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
-#: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
+#: How far the arm may be from the start of the plan when the robot is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
@@ -43,7 +43,7 @@ class GoalMonitor:
         Prepare.
 
         :param max_plan_deviation: how far the controller's own target may be from the plan [m],
-            [rad]; 0 = any distance, any angle.
+            [rad]; 0 = no limit.
         """
         #: The motion, with the part that was appended last, and all its records.
         self.job, self.records = job, WireRecords(job)
@@ -59,35 +59,35 @@ class GoalMonitor:
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
         #: Whether the robot program has read START: it has begun a point, or the target moves.
         self._has_begun = False
-        #: How many motions of the goal the robot has begun, and how many of them in trajectories
-        #: before this one.
+        #: How many motions of the goal the robot has begun: in total, and in trajectories before
+        #: the present one.
         self._motions_begun = self._motions_before = 0
-        #: The reported count of the goal before (None = no trajectory was started), and whether
-        #: the robot may still report it.
+        #: The count reported for the previous goal (None = no trajectory was started), and whether
+        #: the robot may still report that count.
         self._stale_begun: int | None = None
         self._awaits_count = False
-        #: How long the program has run the motion that it began last [s], and its number.
+        #: How long the program has been running its newest motion [s], and that motion's number.
         self._running_time, self._running = 0.0, 0
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
         self._applied_offset = NO_OFFSET
-        #: Scaled time: time since the start, as the controller's clock ran [s]; and how much of it
-        #: passed before the motion began.
+        #: Scaled time: time since the start, as the controller's clock ran [s]; and the part of it
+        #: before the motion began.
         self.scaled_time = self.start_delay = 0.0
-        #: By how much the slider or a pause delayed the controller's clock in the newest packet,
-        #: whether the arm moved or not [s].
+        #: How long the slider or a pause held up the controller's clock before the newest packet
+        #: [s], whether or not the arm moved.
         self.held_time = 0.0
-        #: How fast the time of the motion ran in the newest packet, 0 to 1.
+        #: How fast the time of the motion ran before the newest packet, 0 to 1.
         self.rate = 0.0
 
     # ---- progress -----------------------------------------------------------------------------
 
     def start(self, stale_begun: int, sent: int = 0) -> None:
         """
-        Take note that a trajectory starts, perhaps from rest in the middle of the goal.
+        Note that a trajectory starts, perhaps from rest in the middle of the goal.
 
-        :param stale_begun: how many motions the robot reports as begun until it has read START:
-            the register keeps the count of the goal before, so it is believed once it changes.
+        :param stale_begun: the count of begun motions that the robot reports until it reads START:
+            the register keeps the previous goal's count, so the count is trusted once it changes.
         :param sent: how many records of the goal were sent before.
         """
         self._stale_begun, self._awaits_count = stale_begun, True
@@ -105,11 +105,11 @@ class GoalMonitor:
         applied_offset: AppliedOffset = NO_OFFSET,
     ) -> None:
         """
-        Take a packet; while the goal moves the arm: also time, and position on the path.
+        Process a packet; while the goal moves the arm, also advance time and path position.
 
-        :param begun: how many motions the robot reports as begun; None = it reports none.
-        :param behind: by how many motions the controller's target may be behind that.
-        :param applied_offset: the offset that displaces the path there.
+        :param begun: how many motions the robot reports as begun; None = it gives no count.
+        :param behind: by how many motions the controller's target may lag behind that count.
+        :param applied_offset: the offset that displaces the path at the controller's target.
         """
         before, self.latest = self.latest, state
         self._applied_offset = applied_offset
@@ -134,7 +134,7 @@ class GoalMonitor:
         self._standstill.update(before, state, passed)
 
     def _count(self, begun: int | None) -> None:
-        """Take the reported count of motions, unless it may belong to the goal before."""
+        """Accept the reported count of motions, unless it may be the previous goal's."""
         if begun is None or self._stale_begun is None or not self.job.reports_points_begun:
             return
         if not self._awaits_count or begun != self._stale_begun:
@@ -147,20 +147,20 @@ class GoalMonitor:
         """Find the position on the path."""
         begun, fastest = self._motions_begun, tracker_speed(state.target_tcp_twist)
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
-        if before is not None:  # it may have braked since
+        if before is not None:  # the tool may have braked since
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
         running = self.records.running_waypoints(begun, behind)
         if running is not None and running[1] < running[0] and self._press() is not None:
-            # However far the tool gives way there, the point behind is passed.
+            # However far the tool gives way in its press, it has passed the previous point.
             self._tracker.pass_stop(running[1])
         self._tracker.update(self._tracked(state.target_tcp_pose), 2.0 * passed * fastest, running)
 
     def finish(self, time: float = inf) -> None:
-        """Move to the end of the path, or to rest at a time [s]: the robot program reports it."""
+        """Move on to the end of the path, or to a rest at a planned time [s], as reported."""
         self._tracker.finish(time)
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Take a job that follows the first so many records."""
+        """Append a job, whose records follow the first ``records_before`` of the goal."""
         self._tracker.append(job.reference, self.records.end_time(records_before))
         self.records.append(job, records_before)
         self.job = job
@@ -169,7 +169,7 @@ class GoalMonitor:
             self.records.forget(self.records_begun() - 2)
 
     def awaits_count(self) -> bool:
-        """Tell whether the program has not reported a point of this goal since START."""
+        """Return whether the program has yet to report a motion of this goal after START."""
         return self._awaits_count
 
     def time(self) -> float:
@@ -181,7 +181,7 @@ class GoalMonitor:
         return self._tracker.waypoint()
 
     def place(self) -> PathPlace | None:
-        """Return how far the arm is on the path of the goal; None = it has not begun."""
+        """Return the arm's place on the path of the goal; None = the motion has not begun."""
         return self._tracker.place() if self._has_begun else None
 
     def buffered(self, sent: int) -> float:
@@ -189,21 +189,21 @@ class GoalMonitor:
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:
-        """Return how many records of this goal the robot has begun, at least."""
+        """Return how many records of this goal the robot is known to have begun."""
         return max(
             self.records.begun_records(self._motions_begun),
             self.records.count_before_waypoint(self.waypoint()),
         )
 
     def script_call(self) -> tuple[float, str]:
-        """Return the longest time of a running script function [s], and the place; 0 s = none."""
+        """Return the timeout of the running script function [s], and its place; 0 s = none."""
         if not self.job.script_calls:
             return 0.0, ''
         record = self.records.begun_records(self._motions_begun) - 1
         return self.job.script_calls.get(record, (0.0, ''))
 
     def _input_wait(self) -> tuple[float, str]:
-        """Return the longest wait for an input [s], and the clause of a vain one; 0 s = none."""
+        """Return the timeout of the wait for an input [s], and its failure clause; 0 s = none."""
         running = None
         if self.job.input_waits:
             running = self.records.running_waypoints(self._motions_begun)
@@ -218,9 +218,9 @@ class GoalMonitor:
         Return a report about the newest packet.
 
         :param buffered: motion time that the robot has received and not yet run [s].
-        :param lag: how far the arm is behind the newest set-point [s].
-        :param at_end: whether the arm should be at the end, and not on its way.
-        :param waits: whether it rests until more points come.
+        :param lag: the time by which the arm lags the newest set-point [s].
+        :param at_end: whether the arm should be at the end, not on its way there.
+        :param waits: whether the arm rests until more points come.
         """
         state, job = self.latest, self.job
         assert state is not None
@@ -252,7 +252,7 @@ class GoalMonitor:
         )
 
     def success_text(self) -> str:
-        """Return the sentence of a goal that has reached its last point."""
+        """Return the sentence for a goal that has reached its last point."""
         points = self.records.points
         subject = 'The point was' if points == 1 else f'All {points} points were'
         return f'{subject} executed in {self.scaled_time:.3f} s.'
@@ -280,7 +280,7 @@ class GoalMonitor:
         """
         Return the fault of a motion, with a clause for the outcome's text, or None.
 
-        :param may_stand_still: the arm may stand still.
+        :param may_stand_still: a still arm is no fault.
         """
         if clause := self._plan_deviation(state) or self._late_call() or self._wrong_speed(state):
             return GoalSignal.DEVIATION, clause
@@ -297,11 +297,11 @@ class GoalMonitor:
         return _offset_clause(self._start, state.actual_tcp_pose)
 
     def rest_offset(self, state: RobotState) -> str | None:
-        """Return how far the target is from the place where the arm waits, or None."""
+        """Return how far the target is from where the arm should wait, as a clause, or None."""
         return _offset_clause(self._tracker.pose(), state.target_tcp_pose)
 
     def missed_end(self, state: RobotState) -> str:
-        """Return that the controller's target is not at the end, as a clause; '' = it is."""
+        """Return a clause if the controller's target is not at the end, else ''."""
         deviation = self._tracker.deviation(self._stiff(state.target_tcp_pose))
         for value, limit in zip(deviation, self._max_plan_deviation, strict=True):
             if 0.0 < limit < value:
@@ -321,7 +321,7 @@ class GoalMonitor:
         )
 
     def _plan_deviation(self, state: RobotState) -> str | None:
-        """Return that the controller's target left the plan, or None."""
+        """Return a clause if the controller's target has left the plan, else None."""
         if not self._has_begun or self._tracker.is_within(*self._clearly_allowed):
             return None
         target, here = self._stiff(state.target_tcp_pose), self._tracker.pose()
@@ -344,20 +344,20 @@ class GoalMonitor:
         return None
 
     def _late_call(self) -> str | None:
-        """Return that a function of the prelude takes too long, or None."""
+        """Return a clause if a function of the prelude takes too long, else None."""
         timeout, where = self.script_call()
         if not timeout or self._running_time <= timeout:
             return None
         return f'the robot program has been {where} for more than its timeout of {timeout:g} s'
 
     def _wrong_speed(self, state: RobotState) -> str | None:
-        """Return that a program without progress reports is much too fast or slow, or None."""
+        """Return a clause if a program without progress reports is far too fast or slow."""
         if self._speed_check is None or not self._awaits_count:
             return None
         return self._speed_check.violation(state.target_tcp_twist, self.scaled_time, self.time())
 
     def _path_violation(self, state: RobotState) -> str | None:
-        """Return how far the arm is outside the path tolerance, or None."""
+        """Return how far the arm is outside the path tolerance, as a clause, or None."""
         press = self._press()
         checked = self._path_check or press or self._joint_check.has_path
         if not (checked and self._has_begun):
@@ -382,7 +382,7 @@ class GoalMonitor:
         return next((press for press in self.job.presses if press.contains(time)), None)
 
     def _desired(self, state: RobotState) -> Pose:
-        """Return the planned pose of the tool, near its progress."""
+        """Return the planned pose of the tool near the present path position."""
         planned = self._tracker.desired(
             self._tracked(state.actual_tcp_pose), state.target_tcp_twist
         )
@@ -390,7 +390,7 @@ class GoalMonitor:
         return Pose(add(planned.position, shift), planned.quaternion) if any(shift) else planned
 
     def _tracked(self, pose: Pose) -> Pose:
-        """Return a pose without displacement and yield, as far as they are no progress."""
+        """Return a pose without offset and yield, except the yield that may be progress."""
         pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
             return pose
@@ -400,7 +400,7 @@ class GoalMonitor:
         )
 
     def _stiff(self, pose: Pose) -> Pose:
-        """Return a pose as if neither the tool nor its path had given way."""
+        """Return a pose as it would be without the offset and the yield."""
         pose, press = self._undisplaced(pose), self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 

@@ -4,47 +4,48 @@
 The states of a goal while the robot program runs it, and the table of transitions.
 
 :data:`TRANSITIONS` gives for each state and signal (:class:`~.outcome_codes.GoalSignal`) the next
-state, and whether the code of the outcome is decided there.
+state, and the code of the outcome if it is decided there.
 
-* **ARMING**: every goal begins here. Where it moves another frame than the robot's TCP, the
-  command that sets the TCP is on the wire: nothing moves before the robot reports that TCP, at the
-  place where the plan begins. Motions through RTDE registers also wait for the robot's inputs, and
-  for the answer of the robot program. Where there is nothing to prepare, ARMED follows at once.
-* **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING. Whatever stops
-  the arm by itself (safety, connection) ends the goal at once, because the robot program would
-  read nothing from us; our own reasons to stop (cancel, preemption, tolerance) lead to CANCELLING.
+* **ARMING**: every goal begins here. If it moves a frame other than the robot's TCP, the command
+  that sets the TCP has been sent: nothing moves until the robot reports that TCP, at the start of
+  the plan. Motions through RTDE registers also wait for the robot's inputs and for the answer of
+  the robot program. If there is nothing to prepare, ARMED follows at once.
+* **MOVING**: the robot program runs points. Its result SUCCESS leads to SETTLING. A cause that
+  stops the arm by itself (safety, connection) ends the goal at once, because the robot program
+  would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance) lead to
+  CANCELLING.
 * **RUNNING_OUT**: no more points came in time for an open goal (keep_open). The ending, which
-  brings the arm to rest at the last known point or behind it, is on the wire, with the number of
-  records. Points that come now wait for SUCCESS of the program, and continue from rest.
-* **AWAITING_POINTS**: the arm rests there, and the program has no trajectory. APPENDED starts the
-  next one; NO_MORE_POINTS, when the client closes the goal, leads to SETTLING. Without either the
-  goal ends after ``keep_open_timeout`` as CANCELLED: it was abandoned, and nothing failed.
+  brings the arm to rest at or after the last known point, has been sent, with the number of
+  records. Points that come now wait for the program's SUCCESS, and continue from rest.
+* **AWAITING_POINTS**: the arm rests after the ending, and the program has no trajectory. APPENDED
+  starts the next trajectory; NO_MORE_POINTS (the client closed the goal) leads to SETTLING. After
+  ``keep_open_timeout`` without either the goal ends as CANCELLED: abandoned, nothing failed.
 * **SETTLING**: the program has reported the last point as reached. The arm has to come to rest
-  inside the goal tolerance, within the goal's time tolerance. Where the controller's target is
+  inside the goal tolerance, within the goal's time tolerance. If the controller's target is
   elsewhere, the program skipped motions (DEVIATION).
-* A goal that ends where the tool touches (CONTACT) succeeds without SETTLING: the program has
+* A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
   moved the arm back to the place of contact.
-* **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not
+* **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
-  the program read CANCEL; it is no answer, CANCELED still follows.
+  the program read CANCEL; it is not the answer: CANCELED still follows.
 * **COMING_TO_REST**: the program has answered; the arm is coming to rest.
-* **RESTORING**: the outcome is decided, and nothing moves; the original TCP is on the wire. The
-  outcome waits until the robot reports that TCP, so that the next goal finds it. Goals that
-  changed no TCP pass through at once.
+* **RESTORING**: the outcome is decided, and nothing moves; the command that restores the original
+  TCP has been sent. The outcome waits until the robot reports that TCP, so that the next goal
+  finds it, and until the program confirms the safe outputs. Without either, the goal ends at once.
 * **PROGRAM_LOST**: the robot program is gone. Often it ends because of the safety system, the
-  power or the whole controller, and any of these may be reported first; so for a moment a deeper
-  reason still replaces this one.
-* **ENDED**: the outcome is out. Later events are ignored.
+  power or the whole controller, and the effects may be reported in any order; so for a moment a
+  deeper reason can still replace this one.
+* **ENDED**: the outcome has been reported. Later events are ignored.
 
 Nearly every state has a deadline (:mod:`~.missed_deadlines`). Without an answer in CANCELLING or
-COMING_TO_REST the robot program is ended. A paused program reads nothing: where the arm rests, the
-goal ends with the code that was decided (UNANSWERED); where it still moves, that is a failure
-(UNCONFIRMED). A TCP that is not set in time ends the goal before it begins; one that is not
-restored, in time or at all, is left to whoever carries out the commands (``temporary_tcp`` of the
-machine). MOVING and RUNNING_OUT have no deadline, because a speed slider at zero is no error; but
-where the arm stands for ``STANDSTILL_TIMEOUT`` and nothing holds it, a command or a result was
-lost (STANDSTILL). RTDE packets that are too old, or stop, no longer show the motion: the goal is
-cancelled (STALE), and ends as one whose connection was lost.
+COMING_TO_REST the robot program is ended. A paused program reads nothing: if the arm is at rest,
+the goal ends with the code already decided (UNANSWERED); if the arm may still move, the goal fails
+(UNCONFIRMED). If the TCP is not set in time, the goal ends before anything moves; if it is not
+restored in time, the owner of the sockets restores it later (``temporary_tcp`` of the machine).
+MOVING and RUNNING_OUT have no deadline, because a speed slider at zero is no error; but if the arm
+stands still for ``STANDSTILL_TIMEOUT`` and nothing holds it, a command or a result was lost
+(STANDSTILL). If RTDE packets are too old or stop coming, the motion cannot be monitored: the goal
+is cancelled (STALE), and ends with the code for a lost connection.
 """
 
 from __future__ import annotations
@@ -78,17 +79,17 @@ class GoalState(Enum):
     ENDED = auto()
 
 
-#: The state in which a goal begins; where nothing has to be armed, ARMED follows at once.
+#: The state in which a goal begins; if nothing has to be armed, ARMED follows at once.
 INITIAL_STATE = GoalState.ARMING
-#: In these the robot program runs points of the goal.
+#: States in which the robot program runs points of the goal.
 RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
-#: In these a goal that must not go on after a pause ends.
+#: States in which a goal ends if it must not go on after a pause.
 INTERRUPTIBLE_STATES = RUNNING_STATES | {GoalState.AWAITING_POINTS, GoalState.SETTLING}
-#: In these a goal ends when the states of the robot are too old to monitor it.
+#: States in which a goal ends when the robot's reports are too old to monitor it.
 MONITORED_STATES = INTERRUPTIBLE_STATES | {GoalState.ARMING}
 
-#: After these the robot program is paused or reads nothing, but has not ended. Unless it is
-#: stopped, the old motion would resume when somebody unlocks the arm and plays the program.
+#: Signals after which the robot program is paused or reads nothing, but has not ended. Unless it
+#: is stopped, the old motion would go on once somebody unlocks the arm and plays the program.
 STOP_PROGRAM_AFTER = frozenset(
     {
         GoalSignal.PROTECTIVE_STOP,
@@ -101,19 +102,19 @@ STOP_PROGRAM_AFTER = frozenset(
 
 
 class Transition(NamedTuple):
-    """The next state, and the code of the outcome where it is decided here."""
+    """The next state, and the code of the outcome if it is decided here."""
 
     state: GoalState
     code: ErrorCode | None = None
 
 
 def _to(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transition]:
-    """Return rows whose signals leave the outcome as it is."""
+    """Return table rows whose signals leave the outcome as it is."""
     return {signal: Transition(state) for signal in signals}
 
 
 def _decide(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transition]:
-    """Return rows whose signals decide the outcome."""
+    """Return table rows whose signals decide the outcome."""
     return {signal: Transition(state, signal.code) for signal in signals}
 
 
@@ -121,7 +122,7 @@ _STOPS = (GoalSignal.PROTECTIVE_STOP, GoalSignal.EMERGENCY_STOP, GoalSignal.CONN
 _RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT)
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
 
-#: The arm stops by itself; a deeper reason than an outcome that waits for the arm to stop.
+#: The arm stops by itself: a deeper reason, which replaces an outcome that waits for the stop.
 _ON_STOP = {
     **_decide(GoalState.ENDED, *_STOPS),
     **_decide(GoalState.PROGRAM_LOST, GoalSignal.PROGRAM_STOPPED),
@@ -135,8 +136,8 @@ _WHILE_RUNNING = {
 }
 
 #: The transition of each signal in each state. Signals that a state does not list cannot happen
-#: there. The first of several requests of users decides; a result that a state ignores belongs to
-#: a goal before this one.
+#: there. Of several user requests the first decides; a result that a state ignores belongs to an
+#: earlier goal, or is not the awaited answer.
 TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
     GoalState.ARMING: {
         **_ON_STOP,
@@ -209,15 +210,15 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
 NO_STOP = SafetyStatus(0)
 #: Stops after which the robot resumes its program once somebody unlocks it and plays it.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
-#: Below this target speed of each joint the arm is at rest [rad/s].
+#: An arm is at rest if the target speed of every joint is below this [rad/s].
 REST_SPEED = 1e-3
-#: Below this measured speed it may ring [rad/s]. Recorded arms ring above 0.001 rad/s for up to
-#: 0.6 s after their target has stopped, above 0.005 rad/s for up to 0.3 s.
+#: An arm at rest may ring with measured joint speeds below this [rad/s]. Recorded arms ring above
+#: 0.001 rad/s for up to 0.6 s after their target has stopped, above 0.005 rad/s for up to 0.3 s.
 RINGING_SPEED = 0.05
 
 
 def is_at_rest(state: RobotState) -> bool:
-    """Tell whether the target of the arm stands; the arm itself may still ring a little."""
+    """Return whether the arm's target stands still; the arm itself may still ring a little."""
     return (
         max(map(abs, state.target_qd)) < REST_SPEED
         and max(map(abs, state.actual_qd)) < RINGING_SPEED
@@ -226,7 +227,7 @@ def is_at_rest(state: RobotState) -> bool:
 
 def detect_stop(state: RobotState, ignored_stops: SafetyStatus = NO_STOP) -> Fault | None:
     """
-    Return why the robot cannot go on by itself, or None when it can.
+    Return the reason why the robot cannot go on by itself; None = it can.
 
     :param ignored_stops: safety stops that do not end the goal.
     """
@@ -242,7 +243,7 @@ def detect_stop(state: RobotState, ignored_stops: SafetyStatus = NO_STOP) -> Fau
 
 
 def _safety_stop(safety: int, state: RobotState) -> Fault:
-    """Return the signal of safety stops, the deepest of which counts."""
+    """Return the signal of the most severe of several safety stops."""
     if safety & _EMERGENCY_STOPS:
         return GoalSignal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
     if safety & SafetyStatus.PROTECTIVE_STOPPED:

@@ -23,7 +23,7 @@ def missed_deadline(
     """
     Return the signal, with a clause for the outcome's text.
 
-    :param state: any that has a deadline, but those in which the robot program runs points.
+    :param state: any state with a deadline, except those in which the program runs points.
     """
     match state:
         case GoalState.ARMING:

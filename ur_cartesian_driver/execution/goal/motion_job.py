@@ -49,23 +49,23 @@ class MotionJob:
     reference: ReferencePath
     #: Expected time at full speed [s].
     duration: float
-    #: When the last point is due [s]; None where the goal names no times.
+    #: When the last point is due [s]; None = the goal gives no times.
     due: float | None = None
     #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
-    #: The TCP of the robot at planning, the one that the plan needs (None = the same), and the
-    #: controlled frame relative to that.
+    #: The robot's TCP at planning, the TCP that the plan needs (None = the same), and the
+    #: controlled frame relative to the latter.
     T_flange_active: Pose = IDENTITY
     T_flange_tcp: Pose | None = None
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
-    #: The tolerances of a joint goal, beside the others.
+    #: The joint tolerances of a joint goal, in addition to the others.
     joint_tolerances: JointTolerances | None = None
-    #: 0 = the default, negative = no limit [s].
+    #: Allowed delay of the end [s]; 0 = the default, negative = no limit.
     goal_time_tolerance: float = 0.0
-    #: Whether the count of points that have begun is known.
+    #: Whether the robot program reports how many motions it has begun.
     reports_points_begun: bool = True
     #: Whether speeds are checked against the plan: not for OPTIMIZED moves, whose speeds the robot
     #: chooses, nor for open goals and set-points.
@@ -76,8 +76,8 @@ class MotionJob:
     waypoint: Int32s = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     #: (records,) mask of the motions, which the robot program counts; empty = all are.
     is_motion: Flags = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
-    #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
-    #: Empty = when the reference path arrives at their waypoints.
+    #: (records,) when each record is planned to end [s]; an output ends with its motion. Empty =
+    #: when the reference path arrives at the waypoint of the record.
     end_times: Floats = field(default_factory=lambda: np.empty(0))
     #: (records,) when the robot program asks for the next record [s]: when this one ends, or when
     #: its blend begins. Empty = at ``end_times``.
@@ -88,24 +88,24 @@ class MotionJob:
     replace_horizon: float = 0.0
     #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
-    #: Whether the robot program does anything at points where the arm stands.
+    #: Whether the robot program does anything at points while the arm stands still.
     has_stops: bool = False
-    #: By waypoint: the time-out of its input [s], and the clause of a vain wait.
+    #: By waypoint: the timeout of its input [s], and the clause for an input that did not come.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
-    #: By the number of the record: the longest time of a function of the prelude [s], and the
-    #: place of the program meanwhile, as a clause.
+    #: By record number: the time allowed for a function of the prelude [s], and a clause that says
+    #: where the program is meanwhile.
     script_calls: Mapping[int, tuple[float, str]] = field(default_factory=dict)
     #: The parts of the path where the tool may give way.
     presses: tuple[PressWindow, ...] = ()
     #: The values that outputs take when the motion does not go on as planned.
     safe_outputs: tuple[SafeOutput, ...] = ()
-    #: How long the motion waits for an arm that is off its path [s]; 0 = not at all.
+    #: How long the motion waits for an arm that is off its path [s]; 0 = it does not wait.
     stall_timeout: float = 0.0
-    #: Analog outputs that the robot program writes again after a pause by itself.
+    #: Analog outputs that the robot program itself writes again after a pause.
     following_outputs: frozenset[int] = frozenset()
-    #: The band in which offsets may displace the path; None = none.
+    #: The band within which offsets may displace the path; None = no offsets.
     offset_band: OffsetBand | None = None
-    #: SERVO: the joints over time.
+    #: For SERVO: the joint positions over time.
     spline: JointSpline | None = None
 
     def __post_init__(self) -> None:
@@ -141,14 +141,15 @@ class MotionJob:
 class AppendJob:
     """Records that are appended to an open goal."""
 
-    #: Identifies the answer.
+    #: The number by which the answer is matched.
     number: int
-    #: How many records stay in front of it; the ending that was planned there is dropped.
+    #: How many records of the goal stay, before the appended ones; planned records after them are
+    #: dropped.
     records_before: int
-    #: Times count from the start of the goal; the reference path follows the records that stay.
-    #: None = the client closes the goal, which ends with the points that it has.
+    #: The appended records, with times since the start of the goal; the reference path continues
+    #: the records that stay. None = the client closes the goal, which gets no more points.
     job: MotionJob | None
-    #: Where it leaves the plan of the records that stay [s]; None = behind their end.
+    #: When the new motion leaves the plan of the records that stay [s]; None = at their end.
     cut_time: float | None = None
 
 
@@ -164,7 +165,7 @@ def job_from_plan(
 
     :param start_time: when its first segment begins [s]; not 0 for appended points.
     :param ending_records: see :class:`MotionJob`.
-    :param spline: the joints of a part that does not begin at rest.
+    :param spline: the joint spline of a part that does not begin at rest.
     """
     goal, rows, streams = plan.goal, plan.rows, plan.execution.traits.streams_setpoints
     stalls = goal.on_path_tolerance is OnPathTolerance.STALL
@@ -231,7 +232,7 @@ def _script_calls(
     """Return ``script_calls`` of the job."""
     return {
         int(first_records[row]): (
-            # The delay of outputs that follow it counts as the same motion.
+            # Its delayed outputs are part of the same motion.
             stop.timeout + _longest_delay(rows, row),
             f'in {stop.text} at point {rows.waypoints[row]}',
         )
@@ -273,7 +274,7 @@ def _longest_delay(rows: PlannedRows, row: int) -> float:
 def _blend_lead_times(rows: PlannedRows) -> Floats:
     """Return upper bounds of the times from the start of a blend to the end of its motion [s]."""
     radii = blend_radii(rows.primitives)
-    # The tool is slower in the segment than in its blend, unless it brakes before that.
+    # The tool is slower in the segment than in its blend, unless it brakes before the blend.
     share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
     times: Floats = np.maximum(rows.durations * share, rows.blend_entries[:, -1])
     return times

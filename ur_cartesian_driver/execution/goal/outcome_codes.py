@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The signals of a goal, and the error code of the action with which each of them ends it.
+The signals of a goal, and the error code with which each of them ends the goal.
 
-Every event is turned into one of these signals, or into none. :mod:`~.goal_transitions` has the
-states in which a signal decides the outcome, and with it the code.
+Every event is turned into one of these signals, or into none. The table of
+:mod:`~.goal_transitions` gives the states in which a signal decides the outcome and its code.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 """
 The outputs of a goal that have to be safe whenever its motion does not go on as planned.
 
-The robot program gets their values before the motion, and sets them in the thread that stops the
-arm. A program that is paused or gone runs no thread: then the driver writes them to the robot.
-Only confirmations count: the program confirms by a token, the write by the outputs that it
-changed.
+The robot program gets the safe values before the motion; its thread that stops the arm also sets
+the outputs. A program that is paused or gone runs no thread: then the driver writes the values to
+the robot. Only confirmed orders are relied on: the program confirms by a token, the driver's write
+by the outputs that it changed.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ class OutputGuard:
         following: frozenset[int] = frozenset(),
     ) -> None:
         """
-        Prepare; without outputs there is nothing to do at any time.
+        Prepare; without outputs the guard does nothing.
 
-        :param packet: the newest of the robot.
-        :param following: analog outputs that the robot program writes again by itself.
+        :param packet: the newest packet of the robot.
+        :param following: analog outputs that the robot program itself writes again after a pause.
         """
         self._outputs, self._following = outputs, following
         self._token = packet.safe_outputs_token
         self._is_held = False
-        #: A write was ordered for this pause, or for the end; its result is not known.
+        #: Whether the write for this pause, or for the end, has been ordered.
         self._is_ordered = False
-        #: The outputs that the write has changed, with the values before.
+        #: The outputs that the write has changed, with their previous values.
         self._changed: tuple[SafeOutput, ...] = ()
-        #: The driver has switched outputs on again: that may happen later than the goal ends.
+        #: Whether the driver has begun to restore outputs, which may end after the goal does.
         self._has_restored = False
 
     def __bool__(self) -> bool:
-        """Tell whether there are such outputs."""
+        """Return whether the goal has safe outputs."""
         return bool(self._outputs)
 
     # ---- the robot program --------------------------------------------------------------------
@@ -62,28 +62,28 @@ class OutputGuard:
         return self._order(SafeOutputsAction.ARM)
 
     def release(self, *, succeeded: bool) -> list[GoalCommand]:
-        """End a goal: the outputs stay as they are, or have to be safe now at the latest."""
+        """End the goal: after a success leave the outputs as they are, else make them safe."""
         return self._order(SafeOutputsAction.DISARM if succeeded else SafeOutputsAction.SET)
 
     def is_confirmed(self, packet: RobotState | None) -> bool:
-        """Tell whether the robot program has carried out the last order."""
+        """Return whether the robot program has carried out the last order."""
         return not self or (packet is not None and packet.safe_outputs_token == self._token)
 
     def is_safe(self, packet: RobotState | None) -> bool:
-        """Tell whether the outputs are safe for good, after :meth:`release`."""
+        """Return whether the outputs are safe for good, after :meth:`release`."""
         return self.is_confirmed(packet) and not self._has_restored
 
     def _order(self, action: SafeOutputsAction) -> list[GoalCommand]:
         if not self:
             return []
-        # The register wraps as the wire does; 0 is the token of a program that begins.
+        # The token wraps around within an int32; 0 is the token of a new program.
         self._token = self._token % (2**31 - 1) + 1
         return [SendSafeOutputs(action=action, token=self._token, outputs=self._outputs)]
 
     # ---- the driver ---------------------------------------------------------------------------
 
     def secure(self) -> list[GoalCommand]:
-        """Write the values to the robot, once in a pause and once at the end."""
+        """Write the values to the robot, once per pause and once at the end."""
         if self._is_ordered or not self:
             return []
         self._is_ordered = True
@@ -91,7 +91,7 @@ class OutputGuard:
 
     def observe(self, packet: RobotState, *, goes_on: bool) -> list[GoalCommand]:
         """
-        Take a packet of the robot: secure the outputs in a pause, restore them after it.
+        Process a packet of the robot: secure the outputs in a pause, restore them after it.
 
         :param goes_on: whether the goal goes on after a pause.
         """
@@ -106,7 +106,7 @@ class OutputGuard:
         return self._restore() if goes_on else []
 
     def take(self, event: OutputsSecured) -> None:
-        """Take the result of the write."""
+        """Note the result of the write."""
         self._changed = event.changed
 
     def fault(self) -> str:
@@ -123,7 +123,7 @@ class OutputGuard:
         )
 
     def _restore(self) -> list[GoalCommand]:
-        """Restore the outputs that a pause has changed, if all of them may be."""
+        """Restore the outputs that a pause has changed, if the goal allows it for all of them."""
         if not self._changed or self.fault():
             return []
         changed, self._changed = self._changed, ()

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The TCP that is set for the time of a goal that moves another frame, until it is restored.
+The TCP that is set for a goal that moves another frame, until the original TCP is restored.
 
-Only the TCP that the robot reports counts, never the one that was sent: a paused program reads
-nothing, one that ended may have restored the TCP by itself, and somebody else may have set another
-one, which must not be overwritten.
+Only the TCP that the robot reports is relied on, never the one that was sent: a paused program
+reads nothing, an ended program may have restored the TCP by itself, and somebody else may have set
+another TCP, which must not be overwritten.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 #: How much a reported TCP may differ from the one that was sent [m], [rad]: the resolution of the
 #: wire on each axis.
 TCP_RESOLUTION = 2e-6
-#: How long the robot may take from a command that sets a TCP to reporting it [s]; after that the
-#: command counts as lost.
+#: How long the robot may take to report a TCP that a command has set [s]; after that the command
+#: is considered lost.
 SET_TIMEOUT = 0.5
-#: Shortest and longest pause before the TCP is restored once more [s].
+#: Shortest and longest pause before the next try to restore the TCP [s].
 MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
 
 def same_tcp(a: Pose, b: Pose) -> bool:
-    """Tell whether two TCPs are the same to the resolution of the wire."""
+    """Return whether two TCPs are the same to the resolution of the wire."""
     return a.distance_to(b) <= TCP_RESOLUTION and a.angle_to(b) <= TCP_RESOLUTION
 
 
 class TemporaryTcp:
-    """Tracks a TCP that was set for a goal, until the one before it is restored."""
+    """Tracks a TCP that was set for a goal, until the original one is restored."""
 
     def __init__(self, T_flange_original: Pose, T_flange_temporary: Pose) -> None:
         """
@@ -44,14 +44,14 @@ class TemporaryTcp:
         self.T_flange_temporary = T_flange_temporary
         #: Whether the robot no longer has the temporary TCP, or never had it.
         self.is_restored = False
-        #: Whether the robot has reported it.
+        #: Whether the robot has reported the temporary TCP.
         self._was_reported = False
         self._first_observed = inf
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def observe(self, state: RobotState, now: float) -> None:
         """
-        Take a packet of the robot.
+        Process a packet of the robot.
 
         :param now: time of a steady clock [s].
         """
@@ -62,12 +62,12 @@ class TemporaryTcp:
             self.is_restored = True
 
     def is_active(self, state: RobotState) -> bool:
-        """Tell whether the robot has the temporary TCP."""
+        """Return whether the robot has the temporary TCP."""
         return same_tcp(state.T_flange_tcp, self.T_flange_temporary)
 
     def is_restore_due(self, state: RobotState, now: float) -> bool:
         """
-        Tell whether to restore the TCP now: at rest only, with ever longer pauses between tries.
+        Return whether to restore the TCP now: at rest only, with ever longer pauses between tries.
 
         :returns: True once for each try.
         """
@@ -83,7 +83,7 @@ class TemporaryTcp:
         return True
 
     def retry_now(self) -> None:
-        """Try again at once, because after a change the next try can succeed."""
+        """Allow the next try at once, because something has changed and it may succeed."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def report(self, packet: RobotState | None) -> str:

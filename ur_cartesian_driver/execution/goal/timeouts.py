@@ -8,19 +8,19 @@ from __future__ import annotations
 #: a second from full speed, and discarding the points in flight takes 0.5 s at most.
 STOP_TIMEOUT = 3.0
 #: How long the robot may take to report a TCP that was set, to confirm the outputs of a goal, or
-#: to get ready for set-points [s]: longer than a silent RTDE connection counts as alive, so that
-#: users hear of the connection where it is the reason.
+#: to get ready for set-points [s]: longer than the time after which a silent RTDE connection is
+#: given up, so that users hear of the connection if it is the reason.
 ARMING_TIMEOUT = 1.2
 #: How long the robot program may take to confirm that the outputs of a goal are safe [s]; after
 #: that the driver writes them itself.
 SAFE_OUTPUTS_TIMEOUT = 0.2
-#: How long a program that answered CANCELED before its first point may take to begin anyway [s].
+#: How long the program may take to begin its first point anyway after an early CANCELED [s].
 EARLY_CANCELED_TIMEOUT = 1.0
 #: How long to wait for a deeper reason after the robot program has ended [s]: connections that
 #: die together are reported some cycles apart.
 CAUSE_TIMEOUT = 0.1
 
-#: The clause of a motion that waits for RTDE inputs in vain.
+#: The clause for a motion that did not get the RTDE inputs.
 NO_INPUTS = (
     f'the robot did not give its RTDE inputs within {ARMING_TIMEOUT:g} s; nothing was moved'
 )

@@ -20,7 +20,7 @@ class WireRecords:
     """Waypoint and times of each record, numbered from the start of the goal."""
 
     def __init__(self, job: MotionJob) -> None:
-        """Take the records of a job."""
+        """Begin with the records of a job."""
         self._waypoints = array('i', job.waypoint.tobytes())
         self._end_times = array('d', job.end_times.tobytes())
         self._request_times = array('d', job.request_times.tobytes())
@@ -45,18 +45,18 @@ class WireRecords:
         return self._waypoints[-1] + 1
 
     def begun_records(self, motions: int) -> int:
-        """Return how many records have begun when so many motions have."""
+        """Return how many records have begun once ``motions`` motions have begun."""
         if motions <= self._first_motion:
             return self._first
         return self._motions[self._index(motions)] + 1
 
     def running_waypoints(self, motions: int, lag_motions: int = 0) -> tuple[int, int] | None:
         """
-        Return to which points the motion that was begun last and the one before it lead.
+        Return the points to which the newest begun motion and the one before it lead.
 
-        :param motions: how many have begun; None is returned for 0.
-        :param lag_motions: how many motions earlier "the one before it" is, because the target
-            may lag by so many.
+        :param motions: how many motions have begun; None is returned for 0.
+        :param lag_motions: by how many motions the target may lag: "the one before it" is earlier
+            by as many. Its point is -1 if there is no such motion.
         """
         if motions <= self._first_motion:
             return None
@@ -68,7 +68,7 @@ class WireRecords:
         )
 
     def count_before_waypoint(self, waypoint: int) -> int:
-        """Return the number of records before the first one of a point."""
+        """Return the number of records before the first record of a point."""
         return self._first + bisect_left(self._waypoints, waypoint)
 
     def motions_before(self, record: int) -> int:
@@ -76,21 +76,21 @@ class WireRecords:
         return self._first_motion + bisect_left(self._motions, record) if record else 0
 
     def end_time(self, records: int) -> float:
-        """Return when the last of so many records is planned to end [s]."""
+        """Return when the first ``records`` records are planned to end [s]."""
         return self._end_times[records - 1 - self._first] if records > 0 else 0.0
 
     def request_time(self, records: int) -> float:
-        """Return when the robot program asks for the next one after so many records [s]."""
+        """Return when the robot program asks for the record after the first ``records`` [s]."""
         return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
     def count_until(self, time: float) -> int:
-        """Return how many records it takes until one ends at a time [s] or later."""
+        """Return the number of records up to the first one that ends at a time [s] or later."""
         return min(self.total, self._first + bisect_left(self._end_times, time) + 1)
 
     # ---- open goals ---------------------------------------------------------------------------
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Put the records of a job behind the first so many, and drop what was there."""
+        """Put a job's records after the first ``records_before``, and drop those it replaces."""
         kept = records_before - self._first
         for values, new in (
             (self._waypoints, job.waypoint),
@@ -103,7 +103,7 @@ class WireRecords:
         self._motions.extend(_motions(job, records_before))
 
     def forget(self, records: int) -> None:
-        """Forget the first so many records, which are not needed any more."""
+        """Forget the first ``records`` records, which are no longer needed."""
         gone = records - self._first
         if gone <= 0:
             return
@@ -119,5 +119,5 @@ class WireRecords:
 
 
 def _motions(job: MotionJob, first: int) -> array[int]:
-    """Return the numbers of a job's motions, its records numbered from ``first``."""
+    """Return the record numbers of a job's motions; its first record has the number ``first``."""
     return array('q', (job.is_motion.nonzero()[0] + first).astype('int64').tobytes())

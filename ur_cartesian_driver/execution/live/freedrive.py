@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Lets a person guide the arm by hand: a servo goal with the mode TEACH instead of set-points."""
+"""A person guides the arm by hand, in a servo goal with the mode TEACH instead of set-points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import ServoMode
 
-#: How long the robot program may take to let the arm be guided [s].
+#: How long the robot program may take to enter freedrive [s].
 FREEDRIVE_TIMEOUT = 1.0
 
 
@@ -30,13 +30,13 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
 
     @property
     def has_progress(self) -> bool:
-        """Whether the arm can be guided: the first progress report tells the owner so."""
+        """Whether the arm can be guided, which the first progress report tells the owner."""
         return self.stream.is_active
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
         if isinstance(event, ServoReceived) and self.stream.failure:
-            # A program ends freedrive by itself where it is about to end.
+            # The program ends freedrive by itself if it is about to end.
             signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_active else GoalSignal.FAILURE
             return signal, self.stream.failure
         return super().interpret(event, state)
@@ -47,24 +47,24 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
 
 
 class FreedriveStream(ServoStream):
-    """The registers of the buffered servo, with the mode TEACH in the place of set-points."""
+    """The registers of the buffered servo, with the mode TEACH instead of set-points."""
 
     def __init__(self, settings: ServoSettings) -> None:
         """Wait for the first packet."""
         super().__init__(_ZeroSetpoints(), settings)
         self._begun = False
         self._requested_at = 0.0
-        #: Whether the robot program has let the arm be guided.
+        #: Whether the robot program has entered freedrive.
         self.is_active = False
-        #: Why it does not, or no longer, as a clause; '' = it does.
+        #: Why the program did not enter or keep freedrive, as a clause; '' = no failure.
         self.failure = ''
 
     def begin(self) -> None:
-        """Let the arm be guided from now on."""
+        """Request freedrive from now on."""
         self._begun = True
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
-        """Take a packet; return the inputs to write, None = nothing."""
+        """Process a packet; return the inputs to write, None = nothing."""
         if self._begun and self._requested_at == 0.0:
             self._requested_at = now
         is_teaching = feedback.mode == ServoMode.TEACH

@@ -3,7 +3,7 @@
 """
 Feeds a session of live targets: a servo goal without a plan.
 
-It begins, is cancelled and ends as any other goal does, so all that can happen to a goal is
+The session begins, is cancelled and ends like any other goal, so all that can happen to a goal is
 handled already.
 """
 
@@ -18,7 +18,7 @@ from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: The arm goes where the targets lead it: there is no plan that it could leave.
+#: No limit: the arm follows the targets, and there is no plan to deviate from.
 ANY_DEVIATION = (0.0, 0.0)
 
 
@@ -28,18 +28,18 @@ class LiveFeeder(ServoFeeder, Phrasing):
     def __init__(
         self, monitor: GoalMonitor, targets: LiveTargets, settings: ServoSettings
     ) -> None:
-        """Prepare; the arm is at rest where the targets' generator begins."""
+        """Prepare; the arm is at rest."""
         super().__init__(monitor, ServoStream(targets, settings), targets)
         self.targets = targets
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Begin where the arm is."""
+        """Begin the motion at the arm's present position."""
         if state is GoalState.MOVING:
             self.targets.generator.reset(packet.target_q)
         return super().enter(state, packet)
 
     def success_text(self) -> str:
-        """Return the sentence of a session that has ended by itself."""
+        """Return the sentence for a session that has ended by itself."""
         return (
             f'The session is over: no live targets came for {self.targets.settings.timeout:g} s.'
         )

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The targets of a live session: late, out of order, or no longer coming.
+The targets of a live session, which may come late, out of order, or no longer.
 
-The newest target is the one with the newest stamp, in whatever order they arrive. It is followed
-until it is ``max_age`` old; then the arm brakes and waits at rest. A newer one continues. When
-none has arrived for ``timeout``, the session is over. All times are of one steady clock.
+The newest target is the one with the newest stamp, in whatever order the targets arrive. The arm
+follows it until it is ``max_age`` old, then brakes and waits at rest for a newer target. When no
+target has arrived for ``timeout``, the session is over. All times are of one steady clock.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class LiveSettings:
     limits: LiveLimits = field(default_factory=LiveLimits)
     #: How old a target may be to be followed [s].
     max_age: float = 0.2
-    #: The session is over when no target has arrived for so long [s].
+    #: The session is over when no target has arrived for this long [s].
     timeout: float = 2.0
 
     def __post_init__(self) -> None:
@@ -60,7 +60,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self._reasons: dict[str, str] = {}
 
     def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
-        """Take a target."""
+        """Accept a target."""
         self._last_came = now
         if not self.freshness.accept(age, now):
             return
@@ -68,7 +68,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.generator.set_target(T_base_tcp)
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Drop a target that is too old, end the session after its timeout; warn of a stop."""
+        """Drop a target that is too old; end the session after its timeout; warn of a stop."""
         generator = self.generator
         warnings: list[GoalCommand] = []
         if generator.blocked and not self._was_blocked:
@@ -76,7 +76,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
             warnings = self._warnings.due(text, now)
         self._was_blocked = bool(generator.blocked)
         if generator.target is not None and self.freshness.is_stale(now):
-            # An arm that rests at its target is not stopped by that.
+            # Dropping the target does not stop an arm that rests there already.
             self.pauses += not generator.arrived
             generator.clear_target()
         self._last_came = min(self._last_came, now)
@@ -94,7 +94,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
 
     @property
     def done(self) -> bool:
-        """Tell whether the session is over: no targets arrive any more, and the arm is at rest."""
+        """Return whether the session is over: targets have ceased, and the arm is at rest."""
         return self._is_over and self.generator.at_rest
 
     @property

@@ -4,14 +4,14 @@
 Generate the motion from the present pose to the newest target, one set-point per control cycle.
 
 A target from a sensor arrives at any time, jumps, and may be anywhere. The motion of the arm must
-not: the tool goes straight towards the newest target with bounded speed and acceleration, brakes
-in time to arrive at rest, and never goes where it could not stop. To ensure that, each cycle
-checks two poses: the next one, and the one where the tool would come to rest if it braked from
-there. If the second one is out of reach, beyond a joint limit, too near to a singularity or behind
-a workspace plane, the arm brakes instead, along a path that earlier cycles have checked.
+not jump: the tool goes straight towards the newest target with bounded speed and acceleration,
+brakes in time to arrive at rest, and never goes where it could not stop. To ensure this, each
+cycle checks two poses: the next pose, and the pose where the tool would come to rest if it braked
+from there. If the latter is out of reach, beyond a joint limit, too near to a singularity or
+behind a workspace plane, the arm brakes instead, along a path that earlier cycles have checked.
 
 Speed and acceleration are bounded as the lengths of vectors, linear and angular, so the direction
-of the target does not matter (doc/architecture.md tells why ruckig, which bounds each axis, is not
+of the target does not matter (doc/architecture.md says why ruckig, which bounds each axis, is not
 used). The length of a cycle is an argument; there is no clock here.
 """
 
@@ -43,10 +43,10 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
 
-#: A stopped arm goes on only if it can go at least so far [m], [rad]; otherwise it would jitter at
-#: a bound.
+#: A stopped arm goes on only if it can move at least this far [m], [rad]; otherwise it would
+#: jitter at a bound.
 _MIN_RESTART_MOTION = (0.002, 0.01)
-#: Coming nearer to a bound by less does not count [rad, m].
+#: Coming nearer to a bound by less than this is rounding [rad], [m].
 _ROUNDING = 1e-9
 #: How far joints stay away from the ends of their ranges [rad].
 LIMIT_MARGIN = 0.01
@@ -60,19 +60,19 @@ _SINGULARITIES = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveLimits:
     """
-    Bounds on the motion of the tool and the joints, and on where they may go.
+    Bounds on the motion of the tool and the joints, and on their positions.
 
     :raises ValueError: a bound on speed or acceleration is not positive.
     """
 
-    #: Of the tool [m/s], [m/s^2], [rad/s], [rad/s^2].
+    #: Bounds on the tool [m/s], [m/s^2], [rad/s], [rad/s^2].
     linear_velocity: float = 0.25
     linear_acceleration: float = 1.0
     angular_velocity: float = 1.0
     angular_acceleration: float = 4.0
-    #: Of each joint [rad/s].
+    #: Bound on each joint [rad/s].
     joint_velocity: Vector6 = (inf,) * 6
-    #: Distances from the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = any.
+    #: Margins to the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = no limit.
     singularity_margins: Vector3 = (0.05, 0.05, 0.02)
     #: Workspace planes and self-clearance.
     workspace: LiveWorkspace = field(default_factory=LiveWorkspace)
@@ -118,7 +118,7 @@ class OnlineTrajectoryGenerator:
         #: The pose to which the tool goes; None = it brakes or rests.
         self.target: Pose | None = None
         self._bounds_check = _BoundsCheck(arm, T_flange_tcp, limits)
-        # The joints where the tool would come to rest, from the last cycle.
+        # The joint positions at which the tool would come to rest, from the last cycle.
         self._q_stop = q
         #: Length of the last cycle [s].
         self._dt = 0.0
@@ -133,12 +133,12 @@ class OnlineTrajectoryGenerator:
 
     @property
     def at_rest(self) -> bool:
-        """Tell whether the newest set-point does not move."""
+        """Return whether the newest set-point does not move."""
         return self.linear == ZERO3 and self.angular == ZERO3
 
     @property
     def arrived(self) -> bool:
-        """Tell whether the tool rests at its target."""
+        """Return whether the tool rests at its target."""
         return (
             self.at_rest
             and self.target is not None
@@ -147,7 +147,7 @@ class OnlineTrajectoryGenerator:
         )
 
     def set_target(self, T_base_tcp: Pose) -> None:
-        """Go to another target from now on; its quaternion is of length 1."""
+        """Go to another target from now on; its quaternion has length 1."""
         self._is_target_new |= T_base_tcp != self.target
         self.target = T_base_tcp
 
@@ -162,7 +162,7 @@ class OnlineTrajectoryGenerator:
 
         :param dt: nominal time to it [s].
         """
-        # The speed of the last cycle was chosen for its length; less time cannot undo it.
+        # The last speed was chosen for the last cycle; in a shorter one it could not be braked.
         change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_target_new and self.at_rest:
             self._is_target_new = False
@@ -200,9 +200,9 @@ class OnlineTrajectoryGenerator:
         )
 
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
-        """Take a step, shortened where the joints are not fast enough."""
+        """Take a step, shortened if the joints are not fast enough."""
         pose, q = self._next_pose(linear, angular, dt)
-        if q is None:  # beside a pose that was checked: happens by rounding only
+        if q is None:  # the pose was checked before: happens by rounding only
             reason = explain_unreachable(self._arm, pose @ self._T_tcp_flange)
             self.blocked = self.blocked or reason or 'the joint positions jump'
             self.linear = self.angular = ZERO3
@@ -224,13 +224,13 @@ class OnlineTrajectoryGenerator:
 
     def _violation_when_braking(self, linear: Vector3, angular: Vector3, dt: float) -> str:
         """
-        Return why the tool must not get these velocities, or ''.
+        Return why the tool must not move at these velocities, or ''.
 
-        Checks the pose where the tool would come to rest with the full acceleration.
+        Checks the pose where the tool would come to rest if it braked with the full acceleration.
         """
         if linear == ZERO3 and angular == ZERO3:
             return ''
-        # The way to rest from a speed v with the deceleration a is v^2 / 2a: as at v for v / 2a.
+        # From speed v the braking distance is v^2 / 2a: the same as moving at v for v / 2a.
         moving = dt + 0.5 * norm(linear) / self.limits.linear_acceleration
         turning = dt + 0.5 * norm(angular) / self.limits.angular_acceleration
         stop = _integrate(self.T_base_tcp, linear, angular, moving, turning)
@@ -247,7 +247,7 @@ class OnlineTrajectoryGenerator:
         return self._bounds_check.violation(q, self.q)
 
     def _is_path_clear(self) -> bool:
-        """Tell whether the tool can go towards the target again for a minimal distance."""
+        """Return whether the tool can go towards the target again for a minimal distance."""
         if self.target is None:
             return False
         ratio = max(
@@ -276,7 +276,7 @@ class _BoundsCheck:
         """
         Return why the arm must not come to rest at q [rad], or ''.
 
-        An arm that is too near to a bound already may move away from it.
+        An arm that is already too near to a bound may move away from it.
         """
         for name, angle, now, (low, high) in zip(JOINT_NAMES, q, q_now, self._ranges, strict=True):
             clearance = min(angle - low, high - angle)
@@ -318,8 +318,8 @@ def _approach_velocity(
     """
     Return the velocity of the next cycle for a motion that ends at rest.
 
-    :param difference: the way to go, or zeros to brake.
-    :param velocity: of the last cycle.
+    :param difference: vector from here to the target, or zeros to brake.
+    :param velocity: velocity of the last cycle.
     :param change: time in which the velocity may change [s].
     """
     distance, desired = norm(difference), ZERO3
@@ -334,7 +334,7 @@ def _approach_velocity(
 def _integrate(
     pose: Pose, linear: Vector3, angular: Vector3, moving: float, turning: float
 ) -> Pose:
-    """Return a pose after it has moved and turned at a velocity, for a time each [s]."""
+    """Return a pose after moving for ``moving`` [s] and turning for ``turning`` [s]."""
     position, speed = add(pose.position, scale(linear, moving)), norm(angular)
     if speed == 0.0:
         return Pose(position, pose.quaternion)

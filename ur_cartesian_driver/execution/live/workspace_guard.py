@@ -3,9 +3,9 @@
 """
 Keep an arm that follows live targets away from workspace planes and from itself.
 
-A check takes longer than a control cycle, and is needed only near a bound: no part of the arm
-moves farther than the joints turn, times its largest distance from an axis. So each check also
-gives how far the joints may turn until the next one.
+A check takes longer than a control cycle, but is needed only near a bound: no part of the arm
+moves farther than the sum of the joints' turns times its largest distance from an axis. So each
+check also gives how far the joints may turn before the next check.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Joints, ZERO6
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 
-#: No link is thicker [m].
+#: More than the thickness of any link [m].
 _THICKNESS = 0.3
-#: Coming nearer by less does not count [m].
+#: Coming nearer by less than this is rounding [m].
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWorkspace:
-    """The bounds to keep away from."""
+    """The bounds that the arm keeps away from."""
 
     planes: tuple[Plane, ...] = ()
-    #: Smallest distance of the cylinders around the links [m]; None = not checked.
+    #: Smallest distance between the cylinders around the links [m]; None = not checked.
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.
     tool_radius: float = 0.0
 
     def __bool__(self) -> bool:
-        """Tell whether there is any bound."""
+        """Return whether there is any bound."""
         return bool(self.planes) or self.min_clearance is not None
 
 
@@ -60,7 +60,7 @@ class WorkspaceGuard:
         )
         self._moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         self._names = [str(bodies.links[k]) for k in self._moving] + ['the TCP']
-        # Nothing is farther from an axis [m].
+        # More than the distance of any part of the arm from an axis [m].
         self._max_lever_arm = (
             arm.model.max_reach
             + sum(map(abs, arm.model.geometry.d[3:]))
@@ -68,17 +68,17 @@ class WorkspaceGuard:
             + workspace.tool_radius
             + _THICKNESS
         )
-        #: Where the last check was, and by how much nothing was too near there [rad], [m].
+        #: Joint positions of the last check [rad], and how much nearer the bounds could be [m].
         self._last_check: tuple[Joints, float] = ZERO6, 0.0
 
     def violation(self, q: Joints, q_now: Joints) -> str:
         """
         Return the bodies that would be too near to each other or to a plane, as a clause, or ''.
 
-        Those that are too near already may move away.
+        Bodies that are already too near may move away.
 
-        :param q: where the arm would be [rad].
-        :param q_now: where it is.
+        :param q: joint positions to check [rad].
+        :param q_now: present joint positions [rad].
         """
         q_checked, slack = self._last_check
         turns = sum([abs(a - b) for a, b in zip(q, q_checked, strict=True)])
@@ -96,7 +96,7 @@ class WorkspaceGuard:
         return self._clause(index, float(slacks[index]))
 
     def _clearance_slacks(self, q: Joints) -> Floats:
-        """Return all distances, less the margin or clearance that they must keep [m]."""
+        """Return all distances minus the margin or clearance that each must keep [m]."""
         row = np.array([q])
         slacks = np.empty(0)
         if self._workspace.planes:

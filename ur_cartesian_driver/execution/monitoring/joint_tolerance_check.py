@@ -3,9 +3,10 @@
 """
 Check the joints against the tolerances of a joint goal, joint by joint.
 
-An error is desired - actual. On the path the controller's target of the same packet is desired:
-the slider, a pause or the robot's own limits change target and actual value alike, and another
-check sees that the target itself is on the plan. At the end, the last point at rest is desired.
+An error is desired - actual. On the path the desired value is the controller's target of the same
+packet: the slider, a pause or the robot's own limits change target and actual value alike, and
+another check ensures that the target itself is on the plan. At the end the desired value is the
+last point, at rest.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class JointToleranceCheck:
 
 
 def _violation(bounds: JointErrorBounds, q: Vector6, qd: Vector6, state: RobotState) -> str | None:
-    """Return the joint with the largest ratio of error to limit, if that is outside."""
+    """Return a clause about the joint with the largest ratio of error to limit, if above 1."""
     return excess_clause(
         (quantity, f'of {joint}', unit, error, limit)
         for quantity, unit, limits, errors in (

@@ -6,14 +6,15 @@ Find where the controller is on the planned path, and where the tool should be.
 The reference path is compared as a geometric line, so a robot that was slowed down, or that has
 its own speed profile, is not off the path.
 
-Progress is measured by the controller's target, which has no noise and cannot be pushed: where the
-*target* leaves the path, the robot makes another motion than the planned one. The desired pose is
-the one on the path that is nearest to the tool, within a plausible lag behind the target. The
-controller goes on while somebody pushes the arm along its path, so a push beyond the lag is an
+Progress is measured by the controller's target, which has no noise and cannot be pushed: if the
+*target* leaves the path, the robot makes a motion other than the planned one. The desired pose is
+the pose on the path nearest to the tool, at most a plausible lag ahead of or behind the target.
+The controller goes on while somebody pushes the arm along its path, so a push beyond the lag is an
 error too.
 
 All of this runs between a packet and a CANCEL, and most packets concern one or two edges of the
-path. Those are computed in plain floats: numpy costs more than the seven numbers.
+path. Few edges are computed in plain floats: calling numpy costs more than computing with seven
+numbers.
 """
 
 from __future__ import annotations
@@ -37,23 +38,23 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 METRES_PER_RADIAN = 0.1
 #: How much farther the target may have come than its speed explains [m].
 SEARCH_MARGIN = 0.005
-#: The same in planned time [s]: where set-points turn back, a servo that lags turns before them.
+#: The same in planned time [s]: where set-points turn back, a lagging servo turns back early.
 SEARCH_TIME = 0.1
-#: The target is no farther than its speed explains unless the path is nearer there by this [m]:
-#: where a path turns back, both branches are as near.
+#: A position farther on than the speed explains is chosen only if it is nearer by this [m]:
+#: where a path turns back, both branches are equally near.
 CLEARLY_NEARER = 0.0005
-#: How far the tool may be ahead of or behind its target: this long at the speed of the target
-#: [s], and this far [m]. Position controllers of arms lag by some cycles.
+#: How far the tool may be ahead of or behind its target: this time at the target's speed [s], plus
+#: this distance [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_DISTANCE = 0.0005
-#: At a place where the plan waits the target is at most so far beside it [m]: the wire rounds to a
-#: micrometre, and a servo creeps.
+#: When the plan waits, the target is at most this far from the planned place [m]: the wire rounds
+#: to a micrometre, and a servo creeps.
 SAME_PLACE = 2e-5
-#: From this fraction of an edge on the path goes on along the next one.
+#: Beyond this fraction of an edge the path's direction is that of the next edge.
 AT_END = 0.999
 #: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0
-#: Up to so many edges are searched one by one.
+#: At most this many edges are searched one by one.
 MAX_SCALAR_EDGES = 8
 #: How many edges are cached as plain floats.
 MAX_CACHED_EDGES = 256
@@ -95,14 +96,14 @@ class Edge(NamedTuple):
 
 class PathTracker:
     """
-    Follows the controller's target along the reference path, only ever forwards.
+    Follows the controller's target along the reference path, only forwards.
 
-    Poses are compared as points of seven dimensions, position and twice the quaternion times
-    :data:`METRES_PER_RADIAN`: for small angles the distance of two quaternions is half the angle,
+    Poses are compared as points in seven dimensions: the position, and the quaternion times twice
+    :data:`METRES_PER_RADIAN`. For small angles the distance of two quaternions is half the angle,
     so a straight line in these coordinates is a straight line of the tool with a steady turn. The
-    search reaches as far as the target can have come since the last packet, farther only where the
-    path is clearly nearer, and, where the robot program reports it, not beyond the point that it
-    is running; so a path that crosses itself or turns back is followed in the right order.
+    search reaches as far as the target can have come since the last packet, and farther only if
+    the path is clearly nearer there. If the robot program reports to which point it is moving, the
+    search ends there. So a path that crosses itself or turns back is followed in the right order.
     """
 
     def __init__(self, path: ReferencePath) -> None:
@@ -124,12 +125,12 @@ class PathTracker:
             2.0 * METRES_PER_RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
         )
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
-        # Searching an array needs no numpy scalars.
+        # Searching an ``array`` is faster: it yields no numpy scalars.
         self._arc = array('d', np.concatenate(([0.0], np.cumsum(steps))).tobytes())
         self._time = array('d', path.time.astype(np.float64).tobytes())
         self._points = array('i', path.point.tobytes())
         waits = (steps == 0.0) & (np.diff(path.time) > SAME_TIME)
-        #: The rows from which on the plan waits, in order.
+        #: The rows at which the plan waits, in order.
         self._waits = array('l', np.flatnonzero(waits).tolist())
         self._has_blend_tolerance = bool(path.blend_tolerance.any())
         self._edges: dict[int, Edge] = {}
@@ -150,9 +151,9 @@ class PathTracker:
 
         :param target: pose of the TCP in base.
         :param max_advance: longest path that the target can have covered since the last call [m].
-        :param running: the points to which the motion that the robot program has begun last, and
-            the one before it (-1 = there was none), lead; None = unknown.
-        :returns: the new position, never behind the one before.
+        :param running: the points to which the motion begun last and the motion before it lead (-1
+            = there was none); None = unknown.
+        :returns: the new position, never behind the previous one.
         """
         first, end = self._window(max_advance, running)
         explained = self._at(self._arc) + max_advance
@@ -168,8 +169,8 @@ class PathTracker:
     def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
         """Return the rows between which the target may be."""
         if running is not None:
-            # The program runs that motion, or is in the blend that leads to it: everything before
-            # was passed, perhaps between two packets.
+            # The program runs the motion begun last, or is in the blend that leads to it: all
+            # before that was passed, perhaps between two packets.
             passed = bisect_left(self._points, running[1]) - 1
             if passed > self.path_position.row:
                 self.path_position = PathPosition(passed, 0.0)
@@ -193,7 +194,7 @@ class PathTracker:
         """
         nearest = self.path_position, inf
         while end > first:
-            # The target does not pass a place where the plan waits before it has been there.
+            # The search goes past a place where the plan waits only if the target is there.
             wait = self._next_wait(first, end)
             if wait > first:
                 lowest = self.path_position.fraction if first == self.path_position.row else 0.0
@@ -215,18 +216,18 @@ class PathTracker:
         return nearest
 
     def _next_wait(self, first: int, end: int) -> int:
-        """Return the first row from which on the plan waits, or the end of the rows."""
+        """Return the first row at which the plan waits, or the end of the rows."""
         k = bisect_left(self._waits, first)
         return min(self._waits[k], end) if k < len(self._waits) else end
 
     @property
     def waits(self) -> bool:
-        """Whether the target is where the plan waits."""
+        """Whether the target is at a place where the plan waits."""
         row = self.path_position.row
         return self._next_wait(row, row + 1) == row
 
     def wait(self, time: float) -> None:
-        """Let a time pass where the plan waits [s]."""
+        """Advance the planned time at a place where the plan waits, by a time [s]."""
         row, fraction = self.path_position
         fraction += time / (self._time[row + 1] - self._time[row])
         self.path_position = _position(row, fraction)
@@ -237,16 +238,16 @@ class PathTracker:
         self.path_position = PathPosition(row, 0.0)
 
     def pass_stop(self, waypoint: int) -> None:
-        """Move on to a point of the goal that the program has left, if it has no blend."""
+        """Move on to a point of the goal that the program has left, if the point has no blend."""
         row = bisect_right(self._points, waypoint) - 1
         if row > self.path_position.row and not self.path.blend_tolerance[row].any():
             self.path_position = PathPosition(row, 0.0)
 
     def append(self, path: ReferencePath, since: float) -> None:
         """
-        Append a path from a time on [s], and forget the rows far behind.
+        Append a path that replaces the old one after a time [s]; forget the rows far behind.
 
-        From that time up to where the arm is, if it is farther on, both paths are the same.
+        If the arm is already past that time, both paths are the same up to the arm.
         """
         old, row, now = self.path, self.path_position.row, self.time()
         first = max(0, min(bisect_left(self._time, self._time[row] - HISTORY_TIME), row))
@@ -269,14 +270,14 @@ class PathTracker:
             row, (now - self._time[row]) / time if time > 0.0 else 0.0
         )
 
-    # ---- the plan where the target is ---------------------------------------------------------
+    # ---- the plan at the target's position ----------------------------------------------------
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """
         Return the planned pose that is nearest to the tool, around the target's position.
 
         :param actual: pose of the TCP in base.
-        :param twist: of the target; its speed bounds the lag.
+        :param twist: twist of the target, whose speed bounds the lag.
         """
         here, lag = self._at(self._arc), LAG_DISTANCE + LAG_TIME * tracker_speed(twist)
         first = max(bisect_right(self._arc, here - lag) - 1, 0)
@@ -288,7 +289,7 @@ class PathTracker:
         return self.pose(self._nearest(point, first, end, lowest, highest)[0])
 
     def behind(self, pose: Pose) -> Pose:
-        """Return the planned pose nearest to a pose, up to the target's position."""
+        """Return the planned pose nearest to a pose, on the path up to the target's position."""
         row, fraction = self.path_position
         if row == 0 and not fraction:
             return self.pose()
@@ -313,12 +314,12 @@ class PathTracker:
 
     def is_within(self, distance: float, angle: float) -> bool:
         """
-        Tell whether the target is surely within a distance [m] and angle [rad] of the path.
+        Return whether the target is surely within a distance [m] and angle [rad] of the path.
 
-        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
+        A radian weighs :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
         used, because the straight line between two quaternions is not quite the turn from one to
-        the other; where they are so far apart that this matters, the line is farther away than
-        that.
+        the other; if they are so far apart that this matters, the line is farther than that from
+        every unit quaternion.
         """
         return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 
@@ -335,7 +336,7 @@ class PathTracker:
         return self._at(self._time)
 
     def direction(self) -> Vector3:
-        """Return the unit vector along which the path goes on; zeros where it only turns."""
+        """Return the direction of the path ahead, a unit vector; zeros if the path only turns."""
         row = self.path_position.row + (self.path_position.fraction > AT_END)
         while row < self.last_row:
             x, y, z, *turn = self._edge(row).vector
@@ -348,7 +349,7 @@ class PathTracker:
         return ZERO3
 
     def waypoint(self) -> int:
-        """Return the index of the goal's point that comes next."""
+        """Return the index of the next point of the goal."""
         row = self.path_position.row + (1 if self.path_position.fraction > 0.0 else 0)
         return self._points[min(row, self.last_row)]
 
@@ -393,7 +394,7 @@ class PathTracker:
         return edge
 
     def _coordinates(self, pose: Pose, row: int) -> TrackerPoint:
-        """Return the pose in the seven coordinates, its quaternion's sign as at the row."""
+        """Return a pose in the seven coordinates, with the quaternion's sign matched to a row."""
         (x, y, z), (a, b, c, d) = pose.position, pose.quaternion
         _, _, _, ra, rb, rc, rd = self._edge(row).origin
         sign = 1.0 if a * ra + b * rb + c * rc + d * rd >= 0.0 else -1.0
@@ -406,7 +407,7 @@ class PathTracker:
         """
         Return the nearest position on the edges ``first`` to ``end``, and its distance.
 
-        Of positions that are equally near it is the earliest.
+        Of several positions that are equally near, the earliest is returned.
 
         :param lowest: smallest fraction of the first edge.
         :param highest: largest fraction of the last edge.
@@ -425,13 +426,13 @@ class PathTracker:
     def _nearest_of_many(
         self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
     ) -> tuple[PathPosition, float]:
-        """Return the same from arrays, which are faster for many edges."""
+        """Return the same as :meth:`_nearest`, with arrays, which are faster for many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1 : end + 1] - start
         away = np.array(point) - start
         length_squared = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
-        with np.errstate(over='ignore'):  # a robot may report any position; then it is an end
+        with np.errstate(over='ignore'):  # for absurd reported positions an end is the nearest
             fraction = np.divide(
                 along, length_squared, out=np.ones_like(along), where=length_squared > 0.0
             )

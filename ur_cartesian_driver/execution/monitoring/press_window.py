@@ -3,10 +3,10 @@
 """
 The checks of a motion while the tool presses.
 
-Along compliant axes the arm gives way to contact, so a deviation there says nothing and is left
-out; a bound of its own limits it. Whether a controller adds that yield to its target is not
-published, so target and actual pose are treated alike. After a press the arm goes straight to the
-next point from where it is; until there, the same axes are left out.
+Along compliant axes the arm gives way to contact, so deviations along them are left out of the
+other checks; a separate bound limits them. Whether a controller adds this yield to its target is
+not published, so target and actual pose are treated alike. After a press the arm goes straight
+from its present place to the next point; until it arrives, the same axes are left out.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: The tracker may be so much before the time of a point at which the arm stands [s].
+#: How much the tracker's time may differ from that of a point at which the arm stands still [s].
 POINT_TIME_TOLERANCE = 0.01
 _YIELDS = (('m', 'along', 'max_yield'), ('rad', 'about', 'max_yield_angle'))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressWindow:
-    """The part of a path on which the tool gives way, and how."""
+    """The part of a path on which the tool may give way, and along which axes."""
 
-    #: Planned times at which it begins and ends to press, and is back on its path [s].
+    #: Planned times at which the press begins and ends, and the tool is back on its path [s].
     begin: float
     end: float
     release: float
     #: 1.0 for each compliant axis.
     compliant: Vector6
-    #: Axes in the base; None = the axes of the tool.
+    #: Orientation of the press axes in base; None = the axes of the tool.
     q_base_task: Quaternion | None
-    #: How far it may give way [m], [rad].
+    #: How far the tool may give way [m], [rad].
     max_yields: tuple[float, float]
     #: Whether the tool retracts along its path to the place of contact, where the goal ends.
     ends_at_contact: bool = False
 
     def contains(self, time: float) -> bool:
-        """Tell whether the tool may be off its path at a planned time [s]."""
+        """Return whether the tool may be off its path at a planned time [s]."""
         return self.begin - POINT_TIME_TOLERANCE <= time < self.release
 
     def excess(self, planned: Pose, state: RobotState, time: float) -> str | None:
-        """Return that the tool has given way too far, as a clause, or None."""
+        """Return a clause if the tool has given way too far, else None."""
         if time > self.end + POINT_TIME_TOLERANCE:
             return None
         shift, turn = self._errors(planned, state.actual_tcp_pose)
@@ -69,7 +69,7 @@ class PressWindow:
         """
         Return a pose as it would be if the tool had not given way.
 
-        :param share: the part of the yield that stays.
+        :param share: the share of the yield that is kept.
         """
         q_base_task = self._axes(planned)
         shift, turn = self._errors(planned, pose)
@@ -81,11 +81,12 @@ class PressWindow:
 
     def compliant_share(self, planned: Pose, direction: Vector3) -> float:
         """
-        Return how much of a deviation along compliant axes is progress, 0 to 1.
+        Return the share of a deviation along compliant axes to treat as progress, 0 to 1.
 
-        Where the path leads along them it cannot be told from giving way, and all of it counts.
+        Where the path leads along these axes, progress cannot be distinguished from yield, so all
+        of the deviation is treated as progress.
 
-        :param direction: of the path in the base, a unit vector, or zeros where it only turns.
+        :param direction: direction of the path in base, a unit vector; zeros if it only turns.
         """
         x, y, z = rotate(conjugate(self._axes(planned)), direction)
         a, b, c = self.compliant[:3]
@@ -111,7 +112,7 @@ class PressWindow:
         return planned.quaternion if self.q_base_task is None else self.q_base_task
 
     def _errors(self, planned: Pose, pose: Pose) -> tuple[Vector3, Vector3]:
-        """Return how far a pose is from the planned one, along and about the axes."""
+        """Return the shift and turn of a pose from the planned one, along and about the axes."""
         to_task = conjugate(self._axes(planned))
         turn = multiply(pose.quaternion, conjugate(planned.quaternion))
         return (
@@ -120,7 +121,7 @@ class PressWindow:
         )
 
     def _stiff(self, vector: Vector3, first: int, share: float = 0.0) -> Vector3:
-        """Return an error without its parts along compliant axes, but for a share of them."""
+        """Return an error whose parts along compliant axes are reduced to a share of them."""
         x, y, z = vector
         a, b, c = (1.0 - free * (1.0 - share) for free in self.compliant[first : first + 3])
         return (a * x, b * y, c * z)

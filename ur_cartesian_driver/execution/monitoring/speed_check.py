@@ -3,10 +3,10 @@
 """
 Check that a robot program which reports no progress moves about as fast as planned.
 
-Our own program counts the points that it begins, which shows that it reads them as they were
-meant. Another program may read them in another wire dialect, and nothing on the wire shows it: a
-time becomes a thousand times as long, or an acceleration becomes a speed. The path is then right
-and the speed is wrong. The bounds are wide: they only tell the plan's motion from another one.
+Our own program counts the points that it begins, which shows that it reads them as intended. A
+foreign program may read them in another wire dialect, and nothing on the wire reveals this: a time
+becomes a thousand times as long, or an acceleration becomes a speed. The path is then right, but
+the speed is wrong. The bounds are wide: they only detect such a wrong reading.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 PEAK_TO_MEAN = 2.0
 #: Speeds that are always harmless [m/s], [rad/s].
 MIN_SPEED_LIMITS = (0.02, 0.1)
-#: Longest duration as a multiple of the planned one, beside the time to begin [s].
+#: Longest duration as a multiple of the planned one, and the time to begin, which is added [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
-#: What to do about a robot program that reads the points in another way than they were meant.
+#: The remedy for a robot program that reads the points in another wire dialect.
 REMEDY = 'set wire_dialect to the version of that program'
 _CAUSE = f'the robot program reads the points in another wire dialect; {REMEDY}'
 
@@ -37,7 +37,7 @@ class SpeedCheck:
         """Find the largest speeds of the planned path."""
         passed = np.diff(path.time)
         distances = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
-        # Twice the arcsine of half the chord, whose end is the nearer one of q and -q.
+        # A turn is four times the arcsine of half the chord from a to the nearer of b and -b.
         a, b = path.poses[:-1, 3:], path.poses[1:, 3:]
         chords = np.minimum(np.linalg.norm(b - a, axis=1), np.linalg.norm(b + a, axis=1))
         turns = 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
@@ -50,7 +50,7 @@ class SpeedCheck:
         """
         Return the bound on speed or duration that is exceeded, as a clause, or None.
 
-        :param twist: of the controller's own target.
+        :param twist: twist of the controller's own target.
         :param elapsed: time since the start in which the controller's clock ran [s].
         :param planned: planned time of the present position on the path [s].
         """
@@ -70,7 +70,7 @@ class SpeedCheck:
 
 
 def _max_speed(lengths: Floats, times: Floats) -> float:
-    """Return the largest average speed of the edges; infinite where one takes no time."""
+    """Return the largest average speed on an edge; infinite if a moving edge takes no time."""
     moving = lengths > 1e-9
     if not moving.any():
         return 0.0

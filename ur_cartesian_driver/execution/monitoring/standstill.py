@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check that the controller's target does not stand for long although nothing holds it."""
+"""Check that the controller's target does not stand still for long with nothing holding it."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeStat
 
 #: How long the target may stand still in the middle of a goal while nothing holds it [s].
 STANDSTILL_TIMEOUT = 2.0
-#: How much longer than planned it may stand where the plan itself waits [s].
+#: How much longer than planned the target may stand still when the plan itself waits [s].
 STANDSTILL_MARGIN = 1.0
-#: Rows of a path that differ by less are the same pose, at which the plan waits [m], [rad].
+#: Path rows whose numbers differ by less are the same pose, at which the plan waits [m], [1].
 SAME_POSE = 1e-9
 
 
 class Standstill:
-    """Measures how long the target stands."""
+    """Measures how long the target stands still."""
 
     def __init__(self, path: ReferencePath, output_delay: float) -> None:
-        """Find how long the target stands by plan."""
-        #: Whether the target stands for longer than planned.
+        """Find the longest planned standstill of the target."""
+        #: Whether the target has stood still for longer than the plan explains.
         self.is_long = False
-        #: How long the target has stood [s]; the same in scaled time, and the bound on that.
+        #: How long the target has stood still [s]; the same in scaled time, and its bound.
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
 
     def extend(self, path: ReferencePath, output_delay: float) -> None:
         """
-        Take a path that is appended.
+        Take in an appended path.
 
         :param output_delay: how long after the end of the motion the last output is switched [s].
         """
         still = (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).all(axis=1)
-        # A wait may have several rows: those that follow each other count as one.
+        # A wait may have several rows: consecutive rows at one pose are summed.
         waits = np.bincount(np.cumsum(~still), weights=np.where(still, np.diff(path.time), 0.0))
         longest = max(float(waits.max(initial=0.0)), output_delay)
         if longest > 0.0:
@@ -48,9 +48,9 @@ class Standstill:
 
     def update(self, before: RobotState | None, state: RobotState, passed: float) -> None:
         """
-        Compare a packet with the one before.
+        Compare a packet with the previous one.
 
-        :param passed: time between them, by the controller's clock [s].
+        :param passed: time between the packets, by the controller's clock [s].
         """
         if (
             before is not None
@@ -60,7 +60,7 @@ class Standstill:
             and state.runtime_state is RuntimeState.PLAYING
         ):
             self._time += passed
-            # At rest the scaling is 0: only the slider says how fast a wait would pass.
+            # At rest the speed scaling is 0: only the slider says how fast a planned wait passes.
             self._scaled_time += passed * state.target_speed_fraction
             self.is_long = self._time >= STANDSTILL_TIMEOUT and self._scaled_time >= self._timeout
         else:
@@ -68,9 +68,9 @@ class Standstill:
 
     def violation(self, longest_wait: float) -> str | None:
         """
-        Return that the target stands for no reason, as a clause, or None.
+        Return a clause if the target stands still for no reason, else None.
 
-        :param longest_wait: how long the robot program may wait where it is, in real time [s].
+        :param longest_wait: how long the robot program may wait at this point, in real time [s].
         """
         if self._time < longest_wait + STANDSTILL_MARGIN:
             return None

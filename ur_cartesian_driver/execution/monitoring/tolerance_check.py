@@ -45,7 +45,7 @@ class ToleranceQuantity:
     name: str
     unit: str
     limits: Callable[[Tolerance], Vector3]
-    #: From the planned pose, the robot's packet and the rotation from base to the goal's frame.
+    #: The error, from the planned pose, the robot's packet and the rotation base to goal frame.
     error: Callable[[Pose, RobotState, Quaternion], Vector3]
 
 
@@ -71,7 +71,7 @@ class ToleranceCheck:
         )
 
     def __bool__(self) -> bool:
-        """Tell whether there is any limit."""
+        """Return whether there is any limit."""
         return bool(self._limited)
 
     def violation(self, desired: Pose, state: RobotState) -> str | None:
@@ -96,11 +96,11 @@ class ToleranceCheck:
 
 def excess_clause(errors: Iterable[tuple[str, str, str, float, float]]) -> str | None:
     """
-    Return a clause about the error with the largest ratio to its limit, if that is outside.
+    Return a clause about the error with the largest ratio to its limit, if that exceeds 1.
 
-    The first NaN is the largest.
+    A NaN is treated as the largest error; of several the first is named.
 
-    :param errors: quantity, axis or joint, unit, error and limit; limits <= 0 are none.
+    :param errors: quantity, axis or joint, unit, error and limit; a limit <= 0 = no limit.
     """
     worst, found = 1.0, None
     for entry in errors:
@@ -128,7 +128,7 @@ def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> 
 
 
 def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
-    """Return one half of twists or accelerations; NaN where the robot reports none."""
+    """Return the quantity of half a twist or acceleration; NaN if the robot reports none."""
 
     def limits(tolerance: Tolerance) -> Vector3:
         values: Vector6 = getattr(tolerance, field)
@@ -142,9 +142,9 @@ def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
     return ToleranceQuantity(name, unit, limits, error)
 
 
-#: Where the three axes begin in twists and accelerations.
+#: Index of the first of the three axes in twists and accelerations.
 _LINEAR, _ANGULAR = 0, 3
-#: All quantities that have a tolerance; planning refuses limits of those that are not reported.
+#: All quantities that have a tolerance; planning refuses limits on values that are not reported.
 QUANTITIES: tuple[ToleranceQuantity, ...] = (
     ToleranceQuantity('position', 'm', lambda t: t.position, _position),
     ToleranceQuantity('orientation', 'rad', lambda t: t.orientation, _orientation),

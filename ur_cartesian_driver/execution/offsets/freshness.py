@@ -14,28 +14,28 @@ WARNING_PERIOD = 2.0
 
 class Freshness:
     """
-    Tells which of the values that come at any time, and in any order, count.
+    Selects the values to use, of values that come at any time and in any order.
 
     All times are of one steady clock.
 
-    :param max_age: how old a value may be to count [s].
+    :param max_age: how old a value may be to be used [s].
     """
 
     def __init__(self, max_age: float) -> None:
         """Begin with no value."""
         self.max_age = max_age
-        #: How many values were newer than those before, and how many were not, or were too old.
+        #: How many values were accepted, and how many were dropped: out of order or too old.
         self.accepted = self.dropped = 0
         self._stamp = -inf
 
     def accept(self, age: float, now: float) -> bool:
         """
-        Take a value, and tell whether it counts.
+        Note a value, and return whether to use it.
 
-        :param age: how long ago it was true [s].
+        :param age: how old the value is on arrival [s].
         """
         stamp = now - max(0.0, age)
-        if stamp <= self._stamp or not age <= self.max_age:  # NaN is no age
+        if stamp <= self._stamp or not age <= self.max_age:  # also refuses NaN
             self.dropped += 1
             return False
         self._stamp = stamp
@@ -43,19 +43,19 @@ class Freshness:
         return True
 
     def is_stale(self, now: float) -> bool:
-        """Tell whether the newest value is too old, or there is none."""
+        """Return whether the newest value is too old, or there is none."""
         return now - self._stamp > self.max_age
 
 
 class RareWarnings:
-    """Bounds how often something is warned of."""
+    """Limits the rate of a warning."""
 
     def __init__(self) -> None:
         """Begin before the first warning."""
         self._next = -inf
 
     def due(self, text: str, now: float) -> list[GoalCommand]:
-        """Return a warning, or nothing within :data:`WARNING_PERIOD` of the one before."""
+        """Return a warning, or nothing within :data:`WARNING_PERIOD` of the last warning."""
         if now < self._next:
             return []
         self._next = now + WARNING_PERIOD

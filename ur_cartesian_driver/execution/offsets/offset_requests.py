@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The offsets that a client requests of a path: the newest one, its age, and a report of all.
+The offsets that a client requests for a path: the newest one, its age, and a report of all.
 
-An offset may come at any time, jump, be too old or too large. The newest one counts, cut to the
-limits of the goal; where the path is not open to offsets it is zero, and where it is stale the
-goal says whether it holds or fades. The motion to the offset is left to others.
+An offset may come at any time, jump, be too old or too large. The newest one is used, cut to the
+limits of the goal; where the path is not open to offsets it is zero, and when it is stale the goal
+says whether it holds or fades. Other classes move the tool to the offset.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from ur_cartesian_driver.motion.plan.offset_band import OFFSET_AXES, OffsetBand
 
 
 class OffsetRequests(Displaceable, Ageing, Reporting):
-    """Takes offsets, and returns the one to which the tool shall go."""
+    """Accepts offsets, and returns the offset to which the tool should move."""
 
     def __init__(self, band: OffsetBand) -> None:
         """
         Begin with no offset.
 
-        :param band: of the path.
+        :param band: the offset band of the path.
         """
         self._band = band
         self._fades = band.on_stale is StaleOffset.FADE
@@ -43,7 +43,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         self._largest = list(ZERO3)
 
     def set_offset(self, offset: Vector3, age: float, now: float) -> None:
-        """Take an offset; values beyond the limits are cut."""
+        """Accept an offset; values beyond the limits are cut."""
         if not all(map(isfinite, offset)):
             age = nan
         if not self._freshness.accept(age, now):
@@ -56,7 +56,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         self._is_stale = False
 
     def age(self, now: float) -> list[GoalCommand]:
-        """Let the newest offset age; warn, now and then, when it becomes stale."""
+        """Check the age of the newest offset; warn, not too often, when it becomes stale."""
         before, self._is_stale = self._is_stale, self._freshness.is_stale(now)
         if before or not self._is_stale:
             return []
@@ -67,20 +67,20 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
         )
 
     def target(self, time: float) -> Vector3:
-        """Return the offset to which the tool shall go, at a time of the motion [s]."""
+        """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # behind a corner it would mean another direction
+            if self._is_stale:  # after a corner it would mean another direction
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest
 
     def note_applied(self, offset: Vector3) -> None:
-        """Take note of the offset that the tool has."""
+        """Note the offset that the tool has now."""
         self._largest = [max(a, abs(b)) for a, b in zip(self._largest, offset, strict=True)]
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The lines about offsets that were followed, ignored or cut, and the largest of them."""
+        """The lines about offsets that were followed, ignored or cut, and the largest offset."""
         taken, dropped = self._freshness.accepted, self._freshness.dropped
         largest = ', '.join(
             f'{1e3 * value:.2f} mm {name}'

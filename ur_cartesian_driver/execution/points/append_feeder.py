@@ -4,18 +4,19 @@
 Feeds a goal to which points are appended while it runs (keep_open).
 
 Its trajectory is a stream, which came with URCL 2.14: the robot program reads points until it is
-sent their number. Three things hold, whoever appends:
+sent their number. Three rules hold whatever is appended:
 
-* The program never waits for a point while the arm moves: it would fail, or stop the arm the hard
-  way. So every append is planned with an *ending* that brings the arm to rest (the last motion,
-  without a blend; behind a spline a braking piece), and the ending is held back. Where nothing
-  else has come ``margin`` before the program would ask, the ending is sent, and the stream is
+* The program never waits for a point while the arm moves: it would fail, or stop the arm abruptly.
+  So every append is planned with an *ending* that brings the arm to rest (the last motion, without
+  a blend; after a spline a braking piece), and the ending is held back. If nothing else has come
+  ``margin`` before the program would ask for the next point, the ending is sent, and the stream is
   closed with the number of its records.
-* Records that were sent are final, so few are sent: as many seconds as ``horizon``. A program that
-  is cancelled has to read all of them.
+* Records that were sent are final, so few are sent ahead: only ``horizon`` seconds of motion. A
+  program that is cancelled has to read all of them.
 * Memory does not grow: records that were sent, and the path behind the arm, are forgotten.
 
-The states RUNNING_OUT and AWAITING_POINTS are of these goals only (:mod:`~.goal_transitions`).
+Only goals with keep_open have the states RUNNING_OUT and AWAITING_POINTS
+(:mod:`~.goal_transitions`).
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
-#: How long a motion that has nothing but its ending waits for more before it begins [s]: the robot
-#: program waits half a second for its first point.
+#: How long a motion that consists only of its ending waits for more points before it begins [s]:
+#: the robot program waits half a second for its first point.
 FIRST_POINTS_TIMEOUT = 0.25
 
 
 class AppendFeeder(PointFeeder, Appendable):
-    """Sends records up to the horizon, and the ending where nothing is appended in time."""
+    """Sends records up to the horizon, and the ending if nothing is appended in time."""
 
     def __init__(
         self, monitor: GoalMonitor, *, horizon: float, margin: float, timeout: float
@@ -45,16 +46,16 @@ class AppendFeeder(PointFeeder, Appendable):
         """
         Prepare the records that are known so far.
 
-        :param horizon: planned time of the motion that the robot program has and has not run [s].
+        :param horizon: how far ahead of the arm motion is sent to the robot program [s].
         :param margin: the stream is closed this long before the robot program would ask for a
-            point that is not there [s].
+            missing point [s].
         :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
         """
         super().__init__(monitor)
         self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended,)
-        #: How many records were sent before this stream, and whether its number was sent.
+        #: How many records were sent before this stream, and whether its length was sent.
         self._stream_first_record = 0
         self._is_stream_end_sent = False
         #: When the stream was begun, by the robot's clock [s].
@@ -63,7 +64,7 @@ class AppendFeeder(PointFeeder, Appendable):
     # ---- points that come ---------------------------------------------------------------------
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Take all points or none; send those whose turn it is."""
+        """Accept all points or none; send the records that are due."""
         sent = self._window.sent
         answer = self._appended.append(
             append_job, state, sent=sent, sent_until=self.monitor.records.end_time(sent)
@@ -81,7 +82,7 @@ class AppendFeeder(PointFeeder, Appendable):
         )
 
     def _is_running_out(self) -> bool:
-        """Tell whether the program is about to ask for a point that is not there."""
+        """Return whether the program is about to ask for a missing point."""
         sent = self._window.sent
         if not self._appended.is_open or sent != self._appended.committed:
             return False
@@ -113,14 +114,14 @@ class AppendFeeder(PointFeeder, Appendable):
         return []
 
     def _release(self) -> list[GoalCommand]:
-        """Return the records up to the horizon, without the ending; close a complete stream."""
+        """Send the records up to the horizon, without the ending; close a complete stream."""
         ahead = self.monitor.records.count_until(self.monitor.time() + self._horizon)
         begun, limit = self.monitor.records_begun(), min(ahead, self._appended.committed)
         commands = self._window.release(begun, limit)
         return commands if self._appended.is_open else commands + self._end_stream()
 
     def _end_stream(self) -> list[GoalCommand]:
-        """Return the number of the stream's records, once all of them are sent."""
+        """Send the number of the stream's records once all of them are sent."""
         if self._is_stream_end_sent or self._window.sent != self.monitor.records.total:
             return []
         self._is_stream_end_sent = True

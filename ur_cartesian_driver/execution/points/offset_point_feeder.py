@@ -3,10 +3,10 @@
 """
 Feeds a goal whose points the robot runs while offsets displace its path.
 
-Beside the points, each packet of the robot is answered with the offset to reach. The robot program
-moves the offset there within the bounds of the goal, cycle by cycle, so neither the network nor
-this computer can make it jump; the controller adds it to its motion, and reports it. The time of
-the motion follows the progress of the arm on its path.
+In addition to the points, each packet of the robot is answered with the offset to reach. The robot
+program moves towards it within the bounds of the goal, cycle by cycle, so neither the network nor
+this computer can make the offset jump; the controller adds it to its motion, and reports it. The
+time of the motion follows the progress of the arm on its path.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ from ur_cartesian_driver.motion.plan.offset_band import (
 )
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: The first sequence number is so far beyond the last one that the robot has read: more than a
-#: client that was lost may have written and the robot not read.
+#: How far our first sequence number is beyond the last one that the robot has read: more than the
+#: numbers that a lost client may have written and the robot has not read.
 SEQUENCE_GAP = 1000
-#: Beyond this number they begin at 0 again, long before the register overflows.
+#: If the robot has read a number beyond this, ours begin at 0, long before the register overflows.
 MAX_SEQUENCE = 2**30
 
 
 class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
-    """Sends points, and the offset in answer to each packet about it."""
+    """Sends points, and answers each packet about the offset with the offset to reach."""
 
     motion = 'path offsets'
     _takes_offsets = True
 
     def __init__(self, monitor: GoalMonitor, band: OffsetBand) -> None:
-        """Prepare; the inputs are not taken yet."""
+        """Prepare; the inputs are not claimed yet."""
         super().__init__(monitor)
         self._band, self._requests = band, OffsetRequests(band)
         self.parts = (self._requests,)
@@ -58,11 +58,11 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         self._applied = NO_OFFSET
 
     def prepare(self) -> list[GoalCommand]:
-        """Return the command that takes the inputs."""
+        """Return the command that claims the inputs."""
         return [OpenOffsets()]
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
-        """Return that the inputs are not there yet, or ''."""
+        """Return a clause if the inputs are not there yet, else ''."""
         return NO_INPUTS if self._first is None else ''
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
@@ -75,7 +75,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         return commands
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Answer a packet about the offset with a write, one about the state with points."""
+        """Answer a packet about the offset with a write, a packet of the state with points."""
         if not isinstance(event, OffsetReceived):
             return super().feed(event, now)
         if self._is_closed:
@@ -88,7 +88,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         if self._first is None:
             self._sequence = last + SEQUENCE_GAP if 0 <= last < MAX_SEQUENCE else 0
             self._first = self._sequence + 1
-        elif self._first <= last <= self._sequence:  # else an earlier goal has left it there
+        elif self._first <= last <= self._sequence:  # else the number is of an earlier goal
             self._applied = AppliedOffset(feedback.shift, feedback.offset)
             self._requests.note_applied(feedback.offset)
 

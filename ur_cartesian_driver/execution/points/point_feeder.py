@@ -17,7 +17,7 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 class PointFeeder(Feeder):
     """Sends records as fast as the send window permits."""
 
-    #: Whether the robot program displaces the path by offsets that come through registers.
+    #: Whether the robot program displaces the path by offsets that arrive through registers.
     _takes_offsets = False
 
     def __init__(self, monitor: GoalMonitor) -> None:

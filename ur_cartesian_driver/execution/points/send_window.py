@@ -15,21 +15,21 @@ class SendWindow:
     Releases records so that at most ``size`` are sent and not yet begun.
 
     The robot program reads and discards everything that was sent when a goal is cancelled
-    (10 points in each step of the controller), so this bounds the cancel: 500 points cost 0.1 s.
-    It is also far more than the robot can run in its 0.5 s read timeout.
+    (10 points in each step of the controller), so the window bounds the time of a cancel: 500
+    points cost 0.1 s. They are also far more than the robot can run in its 0.5 s read timeout.
     """
 
     size: int = 500
     sent: int = 0
-    #: How many the robot has begun, as far as is known.
+    #: How many records the robot has begun, as far as is known.
     begun: int = 0
 
     def release(self, begun: int, limit: int) -> list[GoalCommand]:
         """
-        Return the command that sends the records whose turn it is, or none.
+        Return the command that sends the records that fit into the window, or none.
 
         :param begun: how many records the robot has begun.
-        :param limit: how many records may be sent in all, whatever the robot has begun.
+        :param limit: how many records may be sent in total, no matter how many have begun.
         """
         self.begun = max(self.begun, begun)
         return self.send(min(limit, self.begun + self.size))

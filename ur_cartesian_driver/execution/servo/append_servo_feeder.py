@@ -3,10 +3,10 @@
 """
 Feeds a goal with keep_open through the buffered servo.
 
-The driver makes the set-points, and nothing but those is final: the rest of the curve can be
-replaced at once, its ending too. A goal whose set-points reach the ending comes to rest
+The driver makes the set-points, and only set-points already made are final: the rest of the curve,
+even its ending, can be replaced at once. A goal whose set-points reach the ending comes to rest
 (RUNNING_OUT, :mod:`~ur_cartesian_driver.execution.goal.goal_transitions`); points that come later
-begin there.
+continue from that rest.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self.append_timeout = timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended, *self.parts)
-        #: The motion that begins where the arm comes to rest; and when that is planned [s], as
-        #: soon as nothing can replace the ending any more.
+        #: The motion that begins where the arm comes to rest, and the planned time of that rest
+        #: [s]; inf = the ending can still be replaced.
         self._next_spline: JointSpline | None = None
         self._stop_time = inf
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Take all points or none."""
+        """Accept all points or none."""
         self._notice_ending()
         answer = self._appended.append(append_job, state, sent_until=self._source.time)
         job = append_job.job
@@ -76,7 +76,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         )
 
     def _notice_ending(self) -> None:
-        """Commit the ending once a set-point of it was made."""
+        """Commit the ending once a set-point of the ending has been made."""
         records = self.monitor.records
         if (
             self._stop_time == inf
@@ -90,7 +90,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self._spline = self._source.spline
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Rest behind the ending, and go on with the points that came there."""
+        """Rest after the ending, and go on with the points that came meanwhile."""
         if state is GoalState.AWAITING_POINTS:
             self._appended.rest(self._stop_time)
         elif state is GoalState.MOVING and self._next_spline is not None:
@@ -105,6 +105,6 @@ class AppendServoFeeder(ServoFeeder, Appendable):
             packet = self.monitor.latest
             if state is GoalState.RUNNING_OUT and packet is not None and is_at_rest(packet):
                 return GoalSignal.SUCCESS, ''
-            if self._stop_time < inf:  # it runs out with the next packet
+            if self._stop_time < inf:  # the next packet leads to RUNNING_OUT
                 return NO_MEANING
         return super().interpret(event, state)

@@ -1,14 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Set-points beside a path that offsets displace while the arm moves.
+Set-points of a path that offsets displace while the arm moves.
 
 The tool moves towards the requested offset (:mod:`~ur_cartesian_driver.execution.offsets`) with
 bounded speed and acceleration along each axis of the frame of the path, never beyond the limits of
-the goal, and back to its path in time for the end of the motion. All of that counts in the time of
-the motion: where the motion is held, so is the offset.
+the goal, and back to its path in time for the end of the motion. All of this runs in the time of
+the motion: when the motion is held, so is the offset.
 
-The joints follow the path, changed so that the tool is displaced and turns as planned.
+The joint positions are those of the path, changed so that the tool is displaced but turns as
+planned.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOL
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: The offset moves in steps of the motion's time that are no longer [s].
+#: Length of the steps, in the time of the motion, in which the offset moves [s].
 STEP = MIN_STEP
-#: How many set-points are remembered, to find the one at which the arm is: more than are in
+#: How many set-points are remembered, to find the one that the arm has reached: more than are in
 #: flight.
 HISTORY = 192
 _ROUNDING = 1e-9
@@ -54,18 +55,18 @@ class BoundedOffset:
     """
     The offset, which moves towards a target within the bounds of a band.
 
-    Each axis moves by itself, so none is ever too fast to stop at its limit.
+    Each axis moves independently, so none is too fast to stop at its limit.
     """
 
     def __init__(self, band: OffsetBand) -> None:
         """Begin on the path, at rest."""
         self._band = band
-        #: Along, across, normal [m], and its speed there [m/s].
+        #: The offset along, across and normal to the path [m], and its speed [m/s].
         self.value: Vector3 = ZERO3
         self.speed: Vector3 = ZERO3
 
     def step(self, target: Vector3, dt: float = STEP) -> None:
-        """Move for a step of time [s] towards a target within the limits."""
+        """Move towards a target within the limits, for one step of time [s]."""
         if target == self.value and self.speed == ZERO3:
             return
         a, b, c = (
@@ -96,13 +97,13 @@ class OffsetSetpoints(Displaced):
         """
         Begin on the path, with no offset to move to.
 
-        :param setpoints: on the path; they take the time of the motion.
-        :param band: of the path.
+        :param setpoints: source of the set-points on the path, in the time of the motion.
+        :param band: the offset band of the path.
         """
         self._setpoints, self._band, self._arm = setpoints, band, arm
         self.requests = OffsetRequests(band)
         self._offset = BoundedOffset(band)
-        #: Time of the motion [s], and the part of it that the offset has used.
+        #: Time of the motion, and of the offset, which moves in whole steps [s].
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
@@ -120,7 +121,7 @@ class OffsetSetpoints(Displaced):
         return self._setpoints.done
 
     def next(self, dt: float) -> Joints:
-        """Return the joint positions so much later [rad]."""
+        """Return the joint positions [rad] that follow after a time of the motion [s]."""
         on_path = self._setpoints.next(dt)
         if dt <= 0.0:
             return self._joints if self._count else on_path
@@ -130,7 +131,7 @@ class OffsetSetpoints(Displaced):
             self._before = self._offset.value
             self._offset.step(self.requests.target(self._time))
         value = self._offset.value
-        if self._used > self._time + _ROUNDING:  # the motion is held: between two steps
+        if self._used > self._time + _ROUNDING:  # the motion is between two steps, as when held
             back = (self._used - self._time) / STEP
             value = add(value, scale(subtract(self._before, value), back))
         self._joints = self._displaced(on_path, value)
@@ -143,8 +144,8 @@ class OffsetSetpoints(Displaced):
             shift = self._band.shift(self._time, offset)
             flange = self._arm.forward(on_path)
             near = add6(on_path, self._change)
-            # The band was checked: without a solution it would be by rounding, and the change
-            # stays.
+            # The band was checked in planning: only rounding can leave no solution, and then the
+            # last change is kept.
             T_base_flange = Pose(add(flange.position, shift), flange.quaternion)
             q = track_pose(self._arm, T_base_flange, near) or near
             self._change = subtract6(q, on_path)
@@ -155,9 +156,9 @@ class OffsetSetpoints(Displaced):
 
     def applied_offset(self, packet: RobotState) -> AppliedOffset:
         """
-        Return the offset at the place of the controller's target.
+        Return the offset that the controller's target has now.
 
-        It belongs to the nearest set-point that the target has not passed.
+        It is the offset of the set-point nearest to the target, never of one passed before.
         """
         if not self._count:
             return NO_OFFSET

@@ -4,7 +4,7 @@
 The clock of streamed set-points, which runs as fast as the robot carries them out.
 
 It uses both feedbacks of the manufacturer's guide: the effective speed shows at once how fast
-the robot's time runs; L, the motion time in flight, accumulates what that leaves over::
+the robot's time runs; L, the motion time in flight, accumulates the remaining error::
 
     rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
@@ -12,9 +12,9 @@ L is the motion time in the robot's buffer, which the robot reports, plus the ti
 that it had not read when it made the report. So the delay of the wire does not look like a
 missing lag, and the loop (an integrator with a proportional gain) does not oscillate.
 
-With s for the true speed, L changes by ``rate - s``. The clock never lets L grow beyond
-``max_lag``, whatever the rate: everything in flight fits into the buffer even if the robot reads
-all of it at once and carries out nothing. So the buffer cannot overflow.
+With s for the true speed, L changes by ``rate - s``. The clock keeps L within ``max_lag`` at any
+rate: everything in flight fits into the buffer even if the robot reads all of it at once and
+carries out nothing. So the buffer cannot overflow.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ MAX_RATE = 1.5
 CORRECTION_TIME = 0.05
 #: Bound on the change of the rate [1/s].
 MAX_RATE_CHANGE = 50.0
-#: How many steps a set-point may stand for: more than one where the clock catches up.
+#: How many control steps a set-point may cover: more than one when the clock catches up.
 MAX_STEPS = 2
-#: How much the clock catches up with after late packets, at most [steps].
+#: How many control steps the clock makes up for after late packets, at most.
 MAX_PENDING_STEPS = 10
 _ROUNDING = 1e-6
 
@@ -37,7 +37,7 @@ _ROUNDING = 1e-6
 @dataclass(slots=True, kw_only=True)
 class ServoClock:
     """
-    Counts the control steps of motion time for which the next set-point stands.
+    Counts the control steps of motion time that the next set-point covers.
 
     :param step: the robot's control step [s].
     :param target: motion time to keep in flight [s].
@@ -52,11 +52,11 @@ class ServoClock:
 
     def advance(self, passed: float, speed: float, in_flight: float) -> None:
         """
-        Let time pass.
+        Advance the clock.
 
-        :param passed: by the controller's clock [s].
+        :param passed: time that has passed by the controller's clock [s].
         :param speed: effective speed of the controller, 0 when its program does not run.
-        :param in_flight: L, see the module [s].
+        :param in_flight: L in the module's description [s].
         """
         target_rate = speed + (self.target - in_flight) / CORRECTION_TIME
         target_rate = min(max(target_rate, 0.0), MAX_RATE)
@@ -66,7 +66,7 @@ class ServoClock:
 
     def take_steps(self, in_flight: float) -> int:
         """
-        Return for how many steps a set-point stands that is sent now; 0 = none is due.
+        Return how many control steps a set-point sent now covers; 0 = none is due.
 
         :param in_flight: as in :meth:`advance`.
         """

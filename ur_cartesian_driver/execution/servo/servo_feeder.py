@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a goal through the buffered servo: not points but set-points go to the robot.
+Feeds a goal through the buffered servo: the robot gets set-points instead of points.
 
-A source makes one for each packet of the robot (:mod:`~.servo_stream`). In the states of a goal
-(:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) that means:
+A source makes a set-point for each packet of the robot (:mod:`~.servo_stream`). In the states of a
+goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) that means:
 
-* in ARMING the inputs of the robot are taken, the divergence thresholds are written and the
-  robot program has to answer. Inputs that belong to another client, or a program that does not
-  answer, end the goal before anything moves;
+* in ARMING the inputs of the robot are claimed, the divergence thresholds are written and the
+  robot program has to answer. If the inputs belong to another client, or the program does not
+  answer, the goal ends before anything moves;
 * MOVING begins with a full buffer and ends when the robot has carried out the last set-point;
 * SETTLING holds that set-point until the arm is there and at rest;
 * in CANCELLING the mode IDLE is written instead of a CANCEL; the program answers by leaving the
@@ -49,13 +49,13 @@ from ur_cartesian_driver.motion.geometry.vectors import subtract6
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
 
-#: A robot program that has read one of our sequence numbers so lately does not hang, wherever the
-#: arm stands [s].
+#: A robot program that has read one of our sequence numbers within this time does not hang, even
+#: if the arm stands still [s].
 ANSWER_TIMEOUT = 1.0
-#: The controller's target is behind the set-point that the arm is led to by about the lookahead
-#: time of ``servoj``, by more with a low gain: so many lookahead times at most.
+#: The controller's target lags the set-point that ``servoj`` follows by about its lookahead time,
+#: and by more with a low gain: by this many lookahead times at most.
 MAX_LAG_LOOKAHEADS = 4.0
-#: So near to its last set-point servoj has come to its end [rad].
+#: ``servoj`` has reached its end if every joint is this near to the last set-point [rad].
 _END_TOLERANCE = 1e-4
 
 
@@ -66,9 +66,9 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def __init__(self, monitor: GoalMonitor, stream: ServoStream, *parts: object) -> None:
         """
-        Prepare; the inputs are not taken yet.
+        Prepare; the inputs are not claimed yet.
 
-        :param stream: of the set-points of the goal's spline, or of another source.
+        :param stream: the stream of set-points, from the goal's spline or another source.
         :param parts: objects with further capabilities of this motion.
         """
         super().__init__(monitor)
@@ -83,7 +83,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     # ---- before the motion --------------------------------------------------------------------
 
     def prepare(self) -> list[GoalCommand]:
-        """Return the command that takes the inputs."""
+        """Return the command that claims the inputs."""
         return [OpenServo()]
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
@@ -96,7 +96,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
                 f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo; '
                 'nothing was moved'
             )
-        # The servo would pull an arm that was moved since it was planned back to the start.
+        # If the arm was moved after planning, the servo would pull it back to the start.
         error = 0.0 if packet is None else self._joint_distance(packet, 0)
         if error <= START_ANGLE_TOLERANCE:
             return ''
@@ -106,7 +106,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         )
 
     def _joint_distance(self, packet: RobotState, knot: int) -> float:
-        """Return how far a joint is from a knot of the spline, at most; 0 = no spline [rad]."""
+        """Return the largest joint distance from a knot of the spline [rad]; 0 = no spline."""
         if self._spline is None:
             return 0.0
         q, _, _ = self._spline.at(float(self._spline.times[knot]))
@@ -115,17 +115,17 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     # ---- the motion ---------------------------------------------------------------------------
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Begin the set-points in MOVING, end them where the goal ends."""
+        """Begin the set-points in MOVING, and end them when the goal ends."""
         match state:
             case GoalState.MOVING:
                 self.monitor.start(0)
                 self._has_filled = False
                 self.stream.begin()  # the next packet is answered with the first set-point
             case GoalState.RESTORING:
-                # Nothing is written while this lasts, and the program must not wait for that.
+                # Nothing is written in RESTORING, and the program must not wait for writes.
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
-                # A program that begins after it was lost must not find set-points in the inputs.
+                # A program that is started after this must not find set-points in the inputs.
                 return self._stop()
             case GoalState.ENDED:
                 return [*self._leave(), *self.reports()]
@@ -151,7 +151,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         before = self.stream.phase
         row = self.stream.on_feedback(event.feedback, now)
         if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
-            # The time of the goal begins with its motion: not with the filling of the buffer.
+            # The time of the goal begins with its motion, not when the buffer begins to fill.
             self._has_filled = True
             self.monitor.start_delay = (
                 self.monitor.scaled_time - self.stream.source_time + self.stream.lag
@@ -163,7 +163,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
-        if isinstance(event, TrajectoryEnded):  # of a goal before this one
+        if isinstance(event, TrajectoryEnded):  # of an earlier goal
             return NO_MEANING
         if not isinstance(event, ServoReceived):
             return None
@@ -174,13 +174,13 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         if state is GoalState.CANCELLING:
             return GoalSignal.CANCELED, ''
         if state in INTERRUPTIBLE_STATES:
-            # A program that is about to end leaves; we hear of the reason in a moment, perhaps.
+            # A program that is about to end leaves the servo; the reason may follow in a moment.
             return GoalSignal.PROGRAM_STOPPED, (
                 'the robot program left the servo by itself; its log on the pendant says why'
             )
         return NO_MEANING
 
-    # ---- how far it is ------------------------------------------------------------------------
+    # ---- progress -----------------------------------------------------------------------------
 
     def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
         """Return how many pieces of the spline the arm has begun, and the lag of its target."""
@@ -191,15 +191,15 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return begun, begun - self._pieces_begun(time - self._max_servo_lag)
 
     def _pieces_begun(self, time: float) -> int:
-        """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
+        """Return how many pieces of the spline begin before a time [s]; 0 = none yet."""
         return self.monitor.records.count_until(time) if time > 0.0 else 0
 
     def is_read(self, now: float) -> bool:
-        """Tell whether the robot program has lately read a set-point."""
+        """Return whether the robot program has lately read a set-point."""
         return now - self._last_answer < ANSWER_TIMEOUT
 
     def has_arrived(self, packet: RobotState) -> bool:
-        """Tell whether the target is at the last set-point: servoj may swing past it, and back."""
+        """Return whether the target is at the last set-point: servoj may swing past and back."""
         return self._joint_distance(packet, -1) <= _END_TOLERANCE
 
     @property
@@ -209,7 +209,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     @property
     def lag(self) -> float:
-        """The time by which the arm is behind the newest set-point [s]."""
+        """The time by which the arm lags the newest set-point [s]."""
         return self.stream.lag
 
     def reports(self) -> list[GoalCommand]:

@@ -10,9 +10,9 @@ in :data:`TRANSITIONS`:
 * **OPENING**: the inputs are requested. The first packets show the control step of the robot, and
   the sequence number that it read last, perhaps of an earlier client; ours continue after it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
-  asked to read the inputs (a program after the guide always does). It has answered when it has
-  read one of our sequence numbers.
-* **READY**: it reads them. Nothing moves before :meth:`ServoStream.begin`.
+  asked to read the inputs (a program made after the guide always reads them). The program has
+  answered when it has read one of our sequence numbers.
+* **READY**: the program reads the inputs. Nothing moves before :meth:`ServoStream.begin`.
 * **FILLING**: mode SERVO; set-points repeat the present position until enough motion time is in
   flight.
 * **SERVOING**: set-points come from the source, at the rate of the clock (:mod:`~.servo_clock`).
@@ -20,10 +20,10 @@ in :data:`TRANSITIONS`:
   The arm stops at the last set-point; it is repeated until the buffer is full again, then the
   motion continues slowly and speeds up.
 * **DRAINING**: the source is at its end; the last set-point is repeated.
-* **ARRIVED**: all set-points were carried out. Where the source goes on, it begins again as after
-  READY.
+* **ARRIVED**: all set-points were carried out. If the source goes on, the stream begins again as
+  after READY.
 * **LEAVING**: mode IDLE is written; the arm brakes.
-* **LEFT**: the robot program has confirmed that, or has left by itself.
+* **LEFT**: the robot program has left the servo, on our request or by itself.
 
 Only registers are used, not the reverse socket, so the sample program of the guide works too.
 """
@@ -49,18 +49,19 @@ from ur_cartesian_driver.motion.state.servo_report import (
 )
 from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoMode, SyncState
 
-#: Shortest time between two writes, as a part of a control step: of two writes in one step the
+#: Shortest time between two writes, as a fraction of a control step: of two writes in one step the
 #: robot would read only the second.
 MIN_WRITE_PERIOD = 0.5
-#: Part of ``target_lag`` that is in flight when the arm starts.
+#: Fraction of ``target_lag`` that is in flight when the arm starts.
 START_FILL = 0.75
 #: How fast the rate of the motion recovers after the buffer was empty [1/s].
 RESTART_ACCELERATION = 2.0
-#: How fast it falls while the arm is off its path [1/s].
+#: How fast the rate of the motion falls while the arm is off its path [1/s].
 STALL_DECELERATION = 4.0
-#: After this sequence number they begin at 0 again, long before the register overflows.
+#: If the robot has read a sequence number beyond this, ours begin at 0, long before the register
+#: overflows.
 MAX_SEQUENCE = 2**30
-#: Longer or negative steps of the robot's clock count as 0 [s].
+#: Steps of the robot's clock that are negative or longer than this are taken as 0 [s].
 MAX_CLOCK_GAP = 1.0
 #: Shortest and longest control step of existing robots [s].
 MIN_STEP, MAX_STEP = 0.002, 0.008
@@ -99,7 +100,7 @@ class ServoEvent(Enum):
 
 _STOPS = {ServoEvent.STOP: ServoPhase.LEAVING, ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT}
 
-#: The next phase of each change in each phase; others leave the phase as it is.
+#: The next phase after each event in each phase; other events leave the phase as it is.
 TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = {
     ServoPhase.OPENING: {
         ServoEvent.OPENED: ServoPhase.ENTERING,
@@ -133,7 +134,7 @@ _ACTIVITIES: Mapping[ServoPhase, ServoActivity] = {
     ServoPhase.DRAINING: ServoActivity.DRAINING,
     ServoPhase.ARRIVED: ServoActivity.DRAINING,
 }
-#: Phases in which set-points lead the arm.
+#: Phases in which the arm follows set-points.
 STREAMING = frozenset(_ACTIVITIES)
 
 
@@ -145,15 +146,15 @@ class ServoSettings:
     :raises ValueError: the values contradict each other.
     """
 
-    #: Motion time to keep in flight [s]: a gap in the packets may be so long.
+    #: Motion time to keep in flight [s]: gaps in the packets up to this long do not stop the arm.
     target_lag: float = 0.04
     #: Longest motion time in flight [s].
     max_lag: float = 0.2
     #: How many set-points the robot's buffer holds.
     buffer_depth: int = 250
-    #: How far each joint may be from its set-point [rad]; beyond, the robot program stops the arm.
+    #: How far each joint may be from its set-point before the robot program stops the arm [rad].
     max_divergence: float = 0.3
-    #: How far ``servoj`` lags behind its set-points by itself [s].
+    #: The time by which ``servoj`` itself lags its set-points [s].
     lookahead_time: float = 0.03
 
     def __post_init__(self) -> None:
@@ -172,10 +173,10 @@ class ServoSettings:
 
 
 class _Setpoint(NamedTuple):
-    """A set-point that the arm was not led to yet."""
+    """A set-point that the robot has not carried out yet."""
 
     sequence: int
-    #: The time of the stream at which it ends [s].
+    #: The time of the stream at which the set-point ends [s].
     state_time: float
     #: The time of the source [s].
     source_time: float
@@ -201,15 +202,14 @@ class ServoStream:
         self._state_time = self._read_time = 0.0
         #: Motion time in the robot's buffer [s].
         self.buffered = 0.0
-        #: Set-points that the robot has not read, and those that it has not carried out.
+        #: Set-points that the robot has not read yet, and set-points not carried out yet.
         self._unread: deque[_Setpoint] = deque()
         self._unfinished: deque[_Setpoint] = deque()
-        #: Time of the source at the newest set-point, and where the arm was led to last [s].
+        #: Time of the source at the newest set-point, and at the last one carried out [s].
         self.source_time = self.motion_time = 0.0
         #: Rate of the motion relative to the set-points, 0 to 1.
         self._motion_rate = 1.0
-        #: Whether the motion is held where it is on its path, and by how much that has delayed it
-        #: [s].
+        #: Whether the motion is held at its place on the path, and its delay by being held [s].
         self.is_held, self.held_time = False, 0.0
         self._recovers = False
         self._last_write = -inf
@@ -232,7 +232,7 @@ class ServoStream:
 
     @property
     def lag(self) -> float:
-        """The time by which the arm is behind the newest set-point, with the lag of servoj [s]."""
+        """The time by which the arm lags the newest set-point, with the lag of servoj [s]."""
         return self.in_flight + self.settings.lookahead_time
 
     def report(self, joint_error: Vector6 = UNKNOWN6) -> ServoReport | None:
@@ -264,10 +264,10 @@ class ServoStream:
     # ---- events -------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Let the arm follow the set-points from now on."""
+        """Make the arm follow the set-points from now on."""
         self._apply(ServoEvent.BEGUN)
         self._first_servo = self._sequence + 1
-        # The source may have moved since, and the first write may come before its next set-point.
+        # The source may have moved meanwhile, and the first write may precede its next set-point.
         self._joints = self._source.next(0.0)
 
     def stop(self) -> tuple[float, ...] | None:
@@ -282,7 +282,7 @@ class ServoStream:
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
         """
-        Take a packet; return the inputs to write, None = nothing.
+        Process a packet; return the inputs to write, None = nothing.
 
         :param now: time of a steady clock [s].
         """
@@ -307,7 +307,7 @@ class ServoStream:
         return self._row()
 
     def _open(self, feedback: ServoFeedback) -> bool:
-        """Measure the control step in the first packets; return whether they were enough."""
+        """Measure the control step in the first packets; return whether it is known."""
         self._times.append(feedback.timestamp)
         if len(self._times) < STEP_SAMPLES:
             return False
@@ -321,8 +321,8 @@ class ServoStream:
         return True
 
     def _forget_finished(self, feedback: ServoFeedback) -> None:
-        """Forget set-points that the robot has read, and those that it has carried out."""
-        if feedback.last_sequence <= self._sequence:  # else it is not one of ours
+        """Drop the set-points that the robot has read, or has carried out, from their queues."""
+        if feedback.last_sequence <= self._sequence:  # else the number is not ours
             while self._unread and self._unread[0].sequence <= feedback.last_sequence:
                 self._read_time = self._unread.popleft().state_time
         done = self._state_time - self.in_flight + 0.5 * self._clock.step
@@ -351,7 +351,7 @@ class ServoStream:
         return self.in_flight <= 0.5 * self._clock.step
 
     def _has_left(self, feedback: ServoFeedback) -> bool:
-        """Tell whether the program is out of SERVO, on our request or by itself."""
+        """Return whether the program has left SERVO, on our request or by itself."""
         if feedback.mode == ServoMode.SERVO:
             return False
         if self.phase is ServoPhase.LEAVING:
@@ -359,7 +359,7 @@ class ServoStream:
         return self.phase in STREAMING and self._has_read(self._first_servo)
 
     def _advance_clock(self, passed: float, feedback: ServoFeedback) -> None:
-        """Let the robot's time pass."""
+        """Advance the clock and the rate of the motion by the robot's time."""
         passed = passed if 0.0 <= passed <= MAX_CLOCK_GAP else 0.0
         if self.phase in STREAMING:
             speed = feedback.effective_speed if feedback.playing else 0.0
@@ -374,7 +374,7 @@ class ServoStream:
             self._recovers = self._recovers and self._motion_rate < 1.0
 
     def _next_setpoint(self, steps: int) -> None:
-        """Make the set-point of the next write, which stands for so many control steps."""
+        """Make the set-point of the next write, which covers ``steps`` control steps."""
         moves, time = self.phase is ServoPhase.SERVOING, steps * self._clock.step
         passed = self._motion_rate * time if moves else 0.0
         self._sent += steps

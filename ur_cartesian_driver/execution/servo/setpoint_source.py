@@ -11,7 +11,8 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, vector6
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 
-#: How many set-points of a spline are computed at a time: in an array each costs a fiftieth.
+#: How many set-points of a spline are computed at a time: in an array each takes a fiftieth of
+#: the time.
 BATCH = 128
 _TIME_TOLERANCE = 1e-12
 
@@ -28,7 +29,7 @@ class SetpointSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether the last positions were those at the end, where the arm comes to rest."""
+        """Whether the last positions were those of the end, where the arm comes to rest."""
 
 
 class SplineSetpoints:
@@ -36,7 +37,7 @@ class SplineSetpoints:
 
     def __init__(self, spline: JointSpline) -> None:
         """Begin at the start of the spline."""
-        #: The curve, without the pieces that lie behind.
+        #: The curve, without the pieces already passed.
         self.spline = spline
         #: The time of the set-point that was returned last [s].
         self.time = float(spline.times[0])
@@ -49,12 +50,12 @@ class SplineSetpoints:
         return self.time >= self.spline.duration - _TIME_TOLERANCE
 
     def replace_tail(self, spline: JointSpline) -> None:
-        """Go on along another spline from where it begins, or from here if that is later."""
+        """Go on along another spline from its start, or from the present time if that is later."""
         self.spline = self.spline.followed_by(spline, self.time)
         self._rows, self._row = [], 0
 
     def next(self, dt: float) -> Vector6:
-        """Return the joint positions so much later."""
+        """Return the joint positions a time [s] after the last ones [rad]."""
         if dt <= 0.0:
             return self._current
         if abs(dt - self._step) > _TIME_TOLERANCE or self._row >= len(self._rows):

@@ -14,9 +14,9 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeStat
 
 class WaitForArm(Stallable, Ageing, Reporting):
     """
-    Holds the set-points while the arm is off its path, for a while.
+    Holds the set-points while the arm is off its path, for a limited time.
 
-    The robot's time counts, and only while its program plays: in a pause the arm cannot come back.
+    Only the robot's time while its program plays is measured: in a pause the arm cannot come back.
     """
 
     def __init__(self, monitor: GoalMonitor, stream: ServoStream) -> None:
@@ -25,12 +25,12 @@ class WaitForArm(Stallable, Ageing, Reporting):
         self._timeout = monitor.job.stall_timeout
         self._since = self._timestamp = 0.0
         self._count, self._longest = 0, 0.0
-        #: By how much the motion was delayed, as far as its start time contains it [s].
+        #: The delay of the motion that is already part of its start delay [s].
         self._held_time = 0.0
         self._unsaid: list[GoalCommand] = []
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
-        """Hold the motion where its fault is a violation that does not last too long."""
+        """Hold the motion, and hide the fault, while a violation does not last too long."""
         stream = self._stream
         was_held = stream.is_held
         stream.is_held = fault is not None and fault[0] is GoalSignal.VIOLATION
@@ -39,7 +39,7 @@ class WaitForArm(Stallable, Ageing, Reporting):
         elif packet.runtime_state is not RuntimeState.PLAYING:
             self._since += packet.timestamp - self._timestamp
         self._timestamp = packet.timestamp
-        # The time of the goal stands still meanwhile.
+        # The time of the goal stands still while the motion is held.
         self._monitor.start_delay += stream.held_time - self._held_time
         self._held_time = stream.held_time
         if fault is None or not stream.is_held:

@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan appended points (keep_open): part by part, each from the end of the one before.
+Plan appended points (keep_open): part by part, each from the end of the previous one.
 
 The last motion of a part is planned to end at rest, because the next point is unknown. The driver
-holds it back as the *ending* of the goal. If points come in time, it is planned again together
-with them, so that a blend or a spline passes through its end. Otherwise it is sent, the arm rests
-at its end, and the next part begins there.
+holds this motion back as the *ending* of the goal. If points come in time, it is planned again
+together with them, so that a blend or a spline passes through its end. Otherwise it is sent, the
+arm rests at its end, and the next part begins there.
 
-A primitive is planned again with the two before it as context, because its blend depends on them.
-A spline needs none, for its state at a point is position, velocity and acceleration; its ending is
-a piece that brakes after the last point
+Primitives are planned together with the last two points before them, because blends depend on
+these. A spline needs no such context, as position, velocity and acceleration are its whole state;
+its ending is a piece that brakes after the last point
 (:func:`~ur_cartesian_driver.planning.spline.spline_planner.plan_stop`).
 """
 
@@ -58,10 +58,10 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 
-#: Number of points that are planned again with the next ones: the last, which is held back, and
-#: the one whose blend leads into its motion.
+#: Number of points that are planned again with the next ones: the last point, whose motion is held
+#: back, and the one before it, whose blend leads into that motion.
 REPLANNED_POINTS = 2
-#: Delays after which a spline may start again from rest [s]; the first possible one is taken.
+#: Delays to try for the start of a spline from rest [s]; the first possible one is used.
 START_DELAYS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 #: Rows of the reference path along a stopping piece.
 _STOP_ROWS = 16
@@ -75,17 +75,17 @@ _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
 class AppendPlan:
     """The plan of appended points, which passed all checks."""
 
-    #: Its segments including the ending; its reference path is in motion time.
+    #: The plan with the ending; its reference path is in motion time.
     plan: Plan
-    #: How many records stay before it, and when they end [s].
+    #: Number of records that stay before this plan, and the time at which they end [s].
     records_before: int
     start_time: float
-    #: How many of its records are the ending.
+    #: Number of records of this plan that belong to the ending.
     ending_records: int
-    #: When it ends, if the goal has times [s].
+    #: Time at which this plan ends, if the goal has times [s].
     end_time: float | None
-    #: The joints in motion time, of a spline; and where it leaves the plan before it, if that is
-    #: not behind its last point [s].
+    #: Of a spline: the joints in motion time; and the time at which it leaves the previous plan
+    #: [s], if that is before the last point of the previous plan.
     spline: JointSpline | None = None
     cut_time: float | None = None
     #: The answer to the client.
@@ -125,8 +125,8 @@ def plan_append(
     """
     Return the plan of appended points.
 
-    :param from_rest: whether the ending was sent, so that the arm rests, or is about to.
-    :raises GoalRefused: points are numbered from the start of the goal.
+    :param from_rest: whether the ending was sent, so that the arm rests or is about to rest.
+    :raises GoalRefused: its text numbers points from the start of the goal.
     """
     cut = cut_tail(appendable, cut_time(appendable, appended), arm)
     if cut is appendable:
@@ -144,7 +144,7 @@ def _plan_behind(
     *,
     from_rest: bool,
 ) -> AppendPlan:
-    """Return the plan of points behind the last one of a goal."""
+    """Return the plan of points after the last one of a goal."""
     check_appended_points(appendable, appended, options)
     options = replace(
         options,
@@ -191,7 +191,7 @@ class _PartPlanner:
     # -- motions of the robot --------------------------------------------------------------------
 
     def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
-        """Return the part after motions of the robot, of which some are planned again."""
+        """Return a part of robot motions, planned together with the last ones before it."""
         before, appended = self._before, self._appended
         replannable, q_start, time_before = (
             before.replannable,
@@ -213,7 +213,7 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
-        # The last but one is under way: the robot goes on from its state in the blend after it.
+        # The first replanned motion is under way: the next one starts from the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
             plan = plan_goal(goal, self._at_rest(q_start), self._arm, self._options, running)
@@ -224,9 +224,9 @@ class _PartPlanner:
         return self.moves_part(plan, records_before, start_time)
 
     def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
-        """Return the commands of a part, with those before it that are still due."""
+        """Return the commands of a part, and the earlier commands that are still due."""
         old = []
-        # The last point of a motion that is planned again, but already committed.
+        # The last of the points whose motions are planned again although already committed.
         committed = len(self._before.replannable) - 2
         for end_time, command in self._before.outputs:
             if command.waypoint == self._before.points - 1:
@@ -252,7 +252,7 @@ class _PartPlanner:
         return self._part(plan, records_before, start_time, (last,), next_goal, timed=timed)
 
     def _replannable(self, plan: Plan) -> tuple[ReplannablePoint, ...]:
-        """Return the last points of the goal, with where the arm is before them."""
+        """Return the last points of the goal, with the state of the arm before each."""
         before = self._before
         known = list(before.replannable) + [
             ReplannablePoint(
@@ -281,8 +281,8 @@ class _PartPlanner:
         """
         Return the commands whose records belong to the ending: the next part places them again.
 
-        Records before the last motion are committed, even if they are due after the motion before
-        it. Of commands for the same output the earlier ones have the earlier records.
+        Records before the last motion are committed, even if they are due during that motion. Of
+        commands for the same output, the earlier ones have the earlier records.
         """
         ends = _end_times(plan.segments, start_time)
         commands = [
@@ -312,7 +312,7 @@ class _PartPlanner:
     def append_spline(
         self, start: SplineState, records_before: int, time_offset: float
     ) -> AppendPlan:
-        """Return the part of a spline after a state; client time + offset = motion time [s]."""
+        """Return the part of a spline from a state; client time + offset = motion time [s]."""
         before = self._before = replace(self._before, time_offset=time_offset)
         goal = self._spline_goal(start)
         found = plan_spline(
@@ -347,7 +347,7 @@ class _PartPlanner:
         """Return the checked goal of the appended points for the TCP, in motion time."""
         before, appended = self._before, self._appended
         points = WaypointRows.of(appended.waypoints)
-        # It is checked as a goal of its own: its times count from the last point.
+        # The points are checked as a separate goal, with times since the last point before them.
         goal = replace(
             before.goal,
             waypoints=replace(
@@ -356,7 +356,7 @@ class _PartPlanner:
             segments=appended.segments,
             io_commands=numbered(appended, before.points),
             keep_open=not appended.last,
-            replace_horizon=0.0,  # it counts for the goal, of which this may be the end
+            replace_horizon=0.0,  # not allowed without keep_open; set again below
         )
         try:
             table = check(goal, self._options)
@@ -377,8 +377,8 @@ class _PartPlanner:
         """
         Return a part whose ending is a stopping piece, if the arm moves at its last point.
 
-        If outputs are due at the last point or later, the piece to that point belongs to the
-        ending too: they follow it on the wire, and their trigger poses depend on the next points.
+        If outputs are due at the last point or later, the piece to that point also belongs to the
+        ending: the outputs follow it on the wire, and their triggers depend on the next points.
         """
         start_time = begin.time
         closing = self._stop(end) if end.is_moving and not self._appended.last else None
@@ -451,13 +451,13 @@ class _PartPlanner:
         closing: tuple[PlannedSegment, ReferencePath] | None,
         start_time: float,
     ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
-        """Return a plan of pieces with its stop and outputs, and when each command is due [s]."""
+        """Return a plan with its stop and outputs, and the commands with their due times [s]."""
         pieces, reference = plan.segments, plan.reference
         segments = [replace(segment, outputs=()) for segment in pieces]
         if closing is not None:
             stop, path = closing
             pieces, reference = (*pieces, stop), _join_paths(reference, path)
-            # It leads to no point: outputs due on it are due after the last one.
+            # The stop leads to no point: outputs that are due during it come after the last point.
             segments.append(replace(stop, waypoint=stop.waypoint + 1))
         ends = _end_times(segments, start_time)
         due_commands = [
@@ -493,10 +493,10 @@ class _PartPlanner:
         *,
         timed: bool,
     ) -> AppendPlan:
-        """Return a part; its next goal lacks only what follows from the points and records."""
+        """Return a part; the counts of points and records are added to its next goal."""
         last, records = self._appended.last, records_before + _record_count(plan.segments)
         ending_records = _record_count(ending)
-        # The robot program waits after the last motion for its outputs.
+        # After the last motion, the robot program waits until its outputs are switched.
         delay = max(
             (each.delay for each in plan.segments[-1].outputs if isinstance(each, SwitchOutput)),
             default=0.0,
@@ -543,7 +543,7 @@ class _PartPlanner:
 
 
 def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
-    """Return a plan without what leads to points before a waypoint, numbers and times shifted."""
+    """Return a plan without the motions to points before a waypoint, renumbered and shifted."""
     left_out = [s for s in plan.segments if s.waypoint + first < waypoint]
     begin = sum(segment.duration for segment in left_out)
     path = plan.reference
@@ -557,7 +557,7 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             for s in plan.segments[len(left_out) :]
         ),
         reference=_path_from(path, start_time, SAME_TIME),
-        find_slow_stretches=tuple,  # they count from another point
+        find_slow_stretches=tuple,  # the plan's own would name other points
     )
 
 
@@ -569,7 +569,7 @@ def _renumber_text(text: str, first: int) -> str:
 def _path_from(
     path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
 ) -> ReferencePath:
-    """Return the rows of a path from a time on [s]; copies, so that the others can go."""
+    """Return copies of the rows of a path from a time on [s]; the other rows can be freed."""
     row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
     return ReferencePath(
         poses=path.poses[row:].copy(),
@@ -594,7 +594,7 @@ def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
 
 
 def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:
-    """Return when the motion to each waypoint ends [s]."""
+    """Return the time at which the motion to each waypoint ends [s]."""
     ends, now = {}, start_time
     for segment in segments:
         now += segment.duration
@@ -603,12 +603,12 @@ def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[in
 
 
 def _blend_half(segment: PlannedSegment) -> float:
-    """Return the time from where the blend after a segment begins to its point [s]."""
+    """Return the time in the blend after a segment up to the point that is blended [s]."""
     return segment.blend_entry.half if segment.blend_entry else 0.0
 
 
 def _output_key(output: IOCommand | OutputRecord) -> tuple[object, ...]:
-    assert not isinstance(output, SpeedLaw)  # open goals have none
+    assert not isinstance(output, SpeedLaw)  # open goals have no speed laws
     return output.output, output.pin, output.value, output.domain
 
 

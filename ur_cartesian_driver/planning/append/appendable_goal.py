@@ -48,23 +48,23 @@ class AppendedPoints:
     waypoints: Sequence[Waypoint] = ()
     #: Empty, or one for each waypoint.
     segments: Sequence[Segment] = ()
-    #: Their waypoints are numbered from the start of the goal.
+    #: Commands whose waypoints are numbered from the start of the goal.
     io_commands: tuple[IOCommand, ...] = ()
-    #: Whether they are the last.
+    #: Whether these points are the last of the goal.
     last: bool = False
-    #: What they replace: the points from this one on, or the motion from this time on, which
-    #: counts as the times of points [s]. Without either they follow the last point.
+    #: The first point that is replaced, or the time from which the motion is replaced, on the
+    #: clock of the points' times [s]. If both are None, the points follow the last point.
     replace_from_point: int | None = None
     replace_from_time: float | None = None
 
     @property
     def replaces(self) -> bool:
-        """Whether they take the place of others."""
+        """Whether the points replace others."""
         return self.replace_from_point is not None or self.replace_from_time is not None
 
     def in_rows(self) -> AppendedPoints:
         """
-        Return the same with points and segments as rows.
+        Return the same request with points and segments as rows.
 
         :raises WrongType: a value is not of its declared type; the text names the field.
         """
@@ -77,47 +77,47 @@ class AppendedPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplannablePoint:
-    """A point that may be planned again, with the state of the arm before it."""
+    """A point that can be planned again, with the state of the arm before it."""
 
     waypoint: Waypoint
     segment: Segment
     q_before: Joints
     time_before: float
-    #: Its motion as it was planned last.
+    #: The motion to the point as it was planned last.
     planned: PlannedSegment | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendableGoal:
-    """The state of a goal to which points can be appended; its size does not grow."""
+    """The state of a goal to which points can be appended; it does not grow with the goal."""
 
-    #: Without its points.
+    #: The goal without its points.
     goal: Goal
     T_flange_active: Pose
     T_flange_tcp: Pose | None
     points: int = 0
-    #: Records on the wire, and how many of them are committed (not part of the ending).
+    #: Number of records on the wire, and of those that are committed (not part of the ending).
     records: int = 0
     committed_records: int = 0
-    #: When the committed ones end, and when all of them do; motion time [s].
+    #: Motion times at which the committed records end, and at which all of them end [s].
     time: float = 0.0
     rest_time: float = 0.0
     #: Client time + offset = motion time [s].
     time_offset: float = 0.0
     #: Time of the last point, as the client gave it [s].
     last_client_time: float = 0.0
-    #: Where the arm rests after the ending [rad].
+    #: Joint positions at rest after the ending [rad].
     q_rest: Joints
     replannable: tuple[ReplannablePoint, ...] = ()
     #: Of a spline: the state at its last point.
     state: SplineState | None = None
-    #: Pieces before that and their path that are sent (again) with the next ones: outputs follow
-    #: them, or a new tail begins in the middle of one.
+    #: Pieces up to that state, with their path, that are sent (again) with the next ones, because
+    #: outputs follow them or a new tail begins in the middle of one.
     replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
     #: Commands that may not have switched yet, with the time at which they are due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
-    #: Of a spline: the pieces planned and not passed, in the order of planning; each holds until
-    #: the next one begins. And all commands on it.
+    #: Of a spline: the planned parts that are not passed, in the order of planning, each valid
+    #: until the next one begins; and all commands on the spline.
     parts: tuple[PlannedPart, ...] = ()
     commands: tuple[tuple[float, IOCommand], ...] = ()
 
@@ -128,7 +128,7 @@ def check_appended_points(
     """
     Make the checks of appended points that do not depend on the state of the arm.
 
-    :raises GoalRefused: points are numbered from the start of the goal.
+    :raises GoalRefused: its text numbers points from the start of the goal.
     """
     count, first = len(appended.waypoints), appendable.points
     check_list_lengths(
@@ -151,7 +151,7 @@ def check_appended_points(
                 'name one of these',
             )
         check_record(f'io_commands[{i}]', command)
-    # The commands alone: the plan numbers them behind older ones.
+    # The new commands alone, so that refusals give their numbers in this request.
     check_outputs(
         goal_table(
             replace(
@@ -166,7 +166,7 @@ def check_appended_points(
 
 
 def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
-    """Return the appended commands, with waypoints counted from a point."""
+    """Return the appended commands, with waypoints numbered from the point ``first``."""
     return tuple(shifted(command, -first) for command in appended.io_commands)
 
 

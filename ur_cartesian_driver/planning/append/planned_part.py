@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The pieces of a spline as they were planned in one go, with the state of the joints on them."""
+"""The pieces of a spline that were planned in one go, and the state of the joints on them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
-# Digits of joint rates that are more than rounding, and of times: microseconds.
+# Digits of joint rates (further ones are rounding errors) and of times (microseconds).
 _DIGITS, _TIME_DIGITS = 12, 6
 
 
@@ -24,24 +24,24 @@ _DIGITS, _TIME_DIGITS = 12, 6
 class PlannedPart:
     """The pieces of one append plan; a new tail may begin on them."""
 
-    #: The joints in motion time, with the ending.
+    #: The joints in motion time, including the ending.
     spline: JointSpline
-    #: Of each piece up to its last point: the point to which it leads, and how many records of
-    #: the goal are before it.
+    #: For each piece up to the last point: the point to which it leads, and the number of records
+    #: of the goal before it.
     waypoints: Int32s
     records_before: Indices
 
     def begin(self, row: int) -> float:
-        """Return when a piece begins [s]; the one behind the last: when that ends."""
+        """Return the time at which a piece begins, or at which the piece before it ends [s]."""
         return float(self.spline.times[row])
 
     def row_at(self, time: float) -> int:
-        """Return the piece that runs at a time [s]."""
+        """Return the row of the piece that runs at a time [s]."""
         times = self.spline.times[: len(self.waypoints)]
         return max(int(np.searchsorted(times, time + SAME_TIME, side='right')) - 1, 0)
 
     def state(self, row: int, time: float) -> SplineState:
-        """Return the state in a piece, as the robot program goes on from it."""
+        """Return the state on a piece at a time [s], as the robot program continues from it."""
         coefficients = self.spline.coefficients[row : row + 1]
         rows = evaluate(coefficients, np.array([time - self.begin(row)]))
         q, qd, qdd = (vector6(values[0].tolist()) for values in rows)
@@ -49,7 +49,7 @@ class PlannedPart:
         return SplineState(time=time, q=q, qd=qd, qdd=ZERO6 if self._is_cubic(row) else qdd)
 
     def piece(self, row: int, end_time: float) -> PlannedSegment:
-        """Return a piece up to a time [s]."""
+        """Return a piece that is cut off at a time [s]."""
         end, duration = self.state(row, end_time), end_time - self.begin(row)
         return PlannedSegment(
             primitive=Spline(

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Replace the tail of a spline: the goal as it was up to a cut, behind which a new tail is appended.
+Replace the tail of a spline: keep the goal up to a cut, after which a new tail is appended.
 
 The new tail begins with the position, velocity and acceleration that the joints have at the cut.
-A piece in whose middle the cut is becomes a shorter piece, which is sent in its place.
+If the cut is in the middle of a piece, a shorter piece is sent in its place.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.request.field_rules import check_finite
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
-#: Pieces are not cut into shorter ones [s]: a cycle of the slowest controllers.
+#: Shortest piece that a cut leaves [s]: a cycle of the slowest controllers.
 MIN_PIECE_TIME = 0.008
-#: Passed pieces are kept for so long [s]: the newest state of the arm can be old.
+#: Time for which passed pieces are kept [s], because the newest state of the arm can be old.
 HISTORY_TIME = 0.5
 # Time between the rows of the path of pieces that are sent again [s].
 _ROW_PERIOD = 0.004
@@ -35,7 +35,7 @@ _TIME_DIGITS = 6
 
 def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
     """
-    Return when a new tail is to begin, in motion time [s]; infinite = behind the last point.
+    Return the motion time at which a new tail is to begin [s]; infinite = after the last point.
 
     :raises GoalRefused: there is no such point or time, or the goal has no tail to replace.
     """
@@ -71,10 +71,10 @@ def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
 
 def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
     """
-    Return the first point that can be replaced, and the earliest time.
+    Return the first point that can be replaced, and the earliest time for a new tail.
 
-    :param time: until which everything is final, in motion time [s].
-    :returns: its number, and a time as the client counts [s], in whole milliseconds.
+    :param time: motion time until which the motion is final [s].
+    :returns: the number of the point, and the client time in whole milliseconds [s].
     """
     client_time = ceil(1e3 * (time - before.time_offset) - 1e-6) * 1e-3
     part = _part_at(before, time)
@@ -87,9 +87,9 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
 
 def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
-    Return a goal without the part planned from a time on [s]; the same one if there is none.
+    Return a goal without the motion planned from a time on [s]; the same goal if there is none.
 
-    :raises AlreadySent: the plan of that time is not known any more.
+    :raises AlreadySent: the plan of that time is no longer known.
     """
     if time == inf:
         return before
@@ -102,7 +102,7 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     if found is None:
         raise AlreadySent(*first_replaceable(before, before.parts[0].begin(0)))
     part, row = found, found.row_at(time)
-    # Outputs that are due behind the cut follow the piece before it on the wire.
+    # Outputs that are due after the cut follow the piece before it on the wire.
     first = row - any(
         time - SAME_TIME <= due < part.begin(row + 1) - SAME_TIME for due, _ in before.commands
     )
@@ -139,14 +139,14 @@ def without_passed(before: AppendableGoal, time: float) -> AppendableGoal:
 
 
 def state_at(before: AppendableGoal, time: float) -> SplineState:
-    """Return the state at the begin of a piece [s]."""
+    """Return the state of the joints at a motion time [s]."""
     part = _part_at(before, time)
     assert part is not None
     return part.state(part.row_at(time), time)
 
 
 def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
-    """Return the part that counts at a time [s]: the last one that has begun."""
+    """Return the part in effect at a time [s]: the last one that has begun."""
     for part in reversed(before.parts):
         if part.begin(0) <= time + SAME_TIME:
             return part
@@ -154,7 +154,7 @@ def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
 
 
 def _end_time(before: AppendableGoal, point: int) -> float:
-    """Return when a point is reached [s]; -inf = long ago."""
+    """Return the time at which a point is reached [s]; -inf = before all parts that are kept."""
     for part in reversed(before.parts):
         if part.waypoints[0] <= point:
             row = int(np.searchsorted(part.waypoints, point, side='right'))
@@ -163,7 +163,7 @@ def _end_time(before: AppendableGoal, point: int) -> float:
 
 
 def _away_from_ends(part: PlannedPart, time: float) -> float:
-    """Return a time at which no piece becomes too short, not earlier [s]."""
+    """Return the first time, not before ``time``, at which a cut leaves no short piece [s]."""
     row = part.row_at(time)
     begin, end = part.begin(row), part.begin(row + 1)
     if time - begin < SAME_TIME:

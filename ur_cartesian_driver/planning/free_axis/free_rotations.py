@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Choose the rotations of a goal whose tool may turn about an axis of its own.
+Choose the rotations of a goal with a free axis.
 
 The result is the goal with the chosen orientations and without a free axis; it is planned and
-checked like any other. So the search here has to be good, not exact: the search knows
-the nominal arm, samples of the path, and no blends.
+checked like any other. So the search here need not be exact: it uses the ideal arm and samples of
+the path, and ignores blends.
 """
 
 from __future__ import annotations
@@ -60,24 +60,25 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     OPTIMIZED_TYPES,
 )
 
-#: Samples on a segment: one for so much length [m] and tilt of the axis [rad], to a limit.
+#: Samples on a segment: one for each of these lengths [m] or tilts of the axis [rad], to a limit.
 _SAMPLE_LENGTH = 0.02
 _SAMPLE_TILT = pi / 18.0
 _MAX_SAMPLES = 32
-#: Where all rotations are allowed they are chosen this far apart; evenly in between.
+#: Where all rotations are allowed, they are chosen at points this far apart [m], [rad], and
+#: interpolated between these.
 _KNOT_LENGTH = 0.01
 _KNOT_TILT = pi / 36.0
-#: Length [m] that counts as much as a radian in the size of a path.
+#: Length that adds as much to the size of a path as a tilt of one radian [m].
 _LENGTH_PER_RADIAN = 0.05
-#: Searches, each without the collisions that the ones before found.
+#: Greatest number of searches, each of which avoids the collisions found by those before.
 _MAX_SEARCHES = 8
-#: What a rotation costs with less than so much clearance more than it must have [m].
+#: Costs of a rotation whose clearance exceeds the required one by less than each key [m].
 _NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
-#: Passes of smoothing, and how far they may move a rotation [rad].
+#: Number of smoothing passes, and the greatest change of a rotation by all of them [rad].
 _SMOOTHING_PASSES = 40
 _MAX_SMOOTHING = pi / 120.0
 
-#: How far a rotation may change for each sample of a segment [rad].
+#: Greatest change of a rotation per sample of a segment [rad].
 _MAX_CHANGE_PER_SAMPLE = pi / 6.0
 
 _AXES: dict[int, Vector3] = {
@@ -89,13 +90,13 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
 def as_named(goal: GoalTable) -> GoalTable:
-    """Return a goal in the orientations that it names, or the nearest allowed; no axis is free."""
+    """Return a goal without a free axis, in its given orientations or the nearest allowed ones."""
     segments = goal.segments
     return _turned(goal, np.clip(0.0, segments.free_minima, segments.free_maxima))
 
 
 def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
-    """Return a goal with its poses turned about the free axis (n,) [rad], and no free axis."""
+    """Return a goal without a free axis, with poses turned about it by ``turns`` (n,) [rad]."""
     points, segments = goal.waypoints, goal.segments
     free, plain = segments.free_axes != FreeAxis.NONE, SegmentRows.plain(len(segments))
     half = 0.5 * turns[free, None]
@@ -105,7 +106,7 @@ def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
         multiply_rows(poses[free, 3:], np.concatenate([np.sin(half) * axes, np.cos(half)], axis=1))
     )
     points = replace(points, poses=poses)
-    if is_spline(goal):  # the rates of the rotation are chosen with it
+    if is_spline(goal):  # let the planner choose the angular rates of turned points
         rates = {}
         for name in ('twists', 'accelerations'):
             rows = getattr(points, name).copy()
@@ -123,7 +124,7 @@ def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
 
 @dataclass(frozen=True, slots=True)
 class ChosenGoal:
-    """A goal without a free axis, and what its report says about the choice."""
+    """A goal without a free axis, and the remarks on the choice of its rotations."""
 
     goal: GoalTable
     remarks: tuple[str, ...] = ()
@@ -135,9 +136,10 @@ def choose_rotations(
     """
     Return a checked goal with its rotations about the free axis chosen.
 
-    :param state: where the arm is at the start.
-    :param density: so many times the samples; the arm may be near a singularity between two.
-    :raises NoRotation: none leads along the path.
+    :param state: state of the robot at the start.
+    :param density: factor on the number of samples; between two samples, the arm may come near a
+        singularity.
+    :raises NoRotation: no rotations lead along the whole path.
     """
     path = _FreePath(goal, state, options, density)
     if not path.is_open.any():  # every range is a single rotation
@@ -160,7 +162,7 @@ def choose_rotations(
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
-    """Return the best way on which nothing collides; the best one found, if all do."""
+    """Return the best way without collisions; the last one found, if all have some."""
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
@@ -197,7 +199,7 @@ class _FreePath:
         segments = goal.segments
         free = segments.free_axes != FreeAxis.NONE
         first = int(np.argmax(free))
-        #: Whether the controlled frame is or becomes the TCP, which alone can turn on a line.
+        #: Whether the controlled frame is or becomes the TCP; others cannot turn on a line.
         self.can_turn = options.allow_tcp_change or (
             T_tcp_controlled.distance_to(IDENTITY) <= SAME_TCP
             and T_tcp_controlled.angle_to(IDENTITY) <= SAME_TCP
@@ -211,14 +213,14 @@ class _FreePath:
         self.is_joint = np.isin(segments.types, _JOINT_TYPES)
         self.low, self.high = segments.free_minima, segments.free_maxima
         self.is_any = free & (self.low == 0.0) & (self.high == 0.0)
-        #: (n,) which rotations are a choice.
+        #: (n,) whether there is more than one rotation to choose from.
         self.is_open = free & (self.is_any | (self.high > self.low))
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         self.start = state.actual_tcp_pose @ T_tcp_controlled
         self.poses = self._with_arc_ends(poses)
         self.references, self.rotations = self._references()
         if is_timed(goal) and goal.waypoints.times[0] == 0.0 and free[0]:
-            # The arm is there already: as it stands, if it may.
+            # The arm is already at this point: keep its orientation if that is allowed.
             turn = _wrapped(-self.rotations[:1], 0.5 * (self.low + self.high)[:1])
             may = self.is_any[0] or self.low[0] <= turn[0] <= self.high[0]
             self.low, self.high = self.low.copy(), self.high.copy()
@@ -226,7 +228,7 @@ class _FreePath:
             self.is_any[0] = self.is_open[0] = False
 
     def _with_arc_ends(self, poses: Floats) -> Floats:
-        """Return the poses in which arcs that follow their tangent arrive."""
+        """Return the poses, with those at the ends of FIXED arcs as the arcs arrive there."""
         self.arcs: dict[int, ArcCurve] = {}
         segments = self.goal.segments
         for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
@@ -241,7 +243,7 @@ class _FreePath:
                     pose_from_row(poses[row]),
                     mode,
                 )
-            except ValueError:  # the planner refuses it
+            except ValueError:  # the planner refuses the arc
                 continue
             self.arcs[row] = arc
             if mode is ArcMode.FIXED:
@@ -252,7 +254,8 @@ class _FreePath:
         """
         Return the reference orientations (n, 4), and the rotations (n,) of the poses from them.
 
-        A reference is the one before, turned the shortest way to where the axis points.
+        Each reference is the previous one, turned the shortest way so that its axis points as the
+        axis of the pose.
         """
         references = np.empty((len(self.poses), 4))
         reference, axis = self.start.quaternion, rotate(self.start.quaternion, self.axis)
@@ -311,7 +314,7 @@ class _FreePath:
         )
 
     def _knots(self, lengths: Floats, tilts: Floats) -> Indices:
-        """Return the rows whose rotations are searched; those between them follow evenly."""
+        """Return the rows whose rotations are searched; those between are interpolated."""
         extent = np.maximum(lengths / _KNOT_LENGTH, tilts / _KNOT_TILT)
         full = np.diff(np.floor(np.cumsum(np.minimum(extent, 1.0))), prepend=0.0) > 0.0
         after_any = np.append(self.is_any[1:] & ~self.is_joint[1:], False)
@@ -319,15 +322,15 @@ class _FreePath:
 
     def _layers(self, ends: Indices, whole: Floats, tilts: Floats) -> list[Layer]:
         postures = self.goal.waypoints.postures
-        # The commanded change of the rotation must be possible where it is not free.
+        # Where the rotation is not free, the change that the goal commands must be possible.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
-        tilted = tilts * self.sizes  # how far the axis leaves its way is tilt x turn / 8
+        tilted = tilts * self.sizes  # the axis leaves its way by tilt x turn / 8
         layers: list[Layer] = []
         begin = first = 0
         for number, (end, row) in enumerate(zip(ends.tolist(), self.knots.tolist(), strict=True)):
             change = inf
-            if first:  # the arm comes to the first point as it stands
+            if first:  # the way to the first point has no such bound
                 share = float(tilted[first : row + 1].max()) / whole[number]
                 change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
             change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE / self.density)
@@ -361,7 +364,7 @@ class _FreePath:
         return layers
 
     def _times(self, lengths: Floats) -> Floats:
-        """Return how long each segment takes (n,) [s], inf where that is not known."""
+        """Return the duration of each segment (n,) [s], inf = not known."""
         goal, segments = self.goal, self.goal.segments
         if is_timed(goal):
             return np.where(self.is_joint, inf, np.diff(goal.waypoints.times, prepend=0.0))
@@ -374,7 +377,7 @@ class _FreePath:
     # -- the choice ------------------------------------------------------------------------------
 
     def turns(self, layers: Sequence[Layer], found: RotationPath) -> Floats:
-        """Return how far each pose is turned (n,) [rad]: smoothed, and within its range."""
+        """Return the turn of each pose (n,) [rad], smoothed and within its range."""
         chosen = self._smoothed(layers, found.rotations)
         at = np.cumsum(self.sizes)
         at_knots = at[self.knots]
@@ -387,7 +390,7 @@ class _FreePath:
         return np.where(self.free, turns, 0.0)
 
     def _smoothed(self, layers: Sequence[Layer], rotations: Floats) -> Floats:
-        """Return rotations (layers,) without the steps of the search."""
+        """Return rotations (layers,), smoothed to remove the discrete steps of the search."""
         low, high = rotations - _MAX_SMOOTHING, rotations + _MAX_SMOOTHING
         for number, layer in enumerate(layers):
             if not layer.is_any:
@@ -409,7 +412,7 @@ class _FreePath:
     def with_postures(
         self, goal: GoalTable, layers: Sequence[Layer], found: RotationPath
     ) -> GoalTable:
-        """Return the goal with the configurations in which joint moves to free points end."""
+        """Return the goal with postures for joint moves to points with a free rotation."""
         names = tuple(self.options.tf_prefix + name for name in JOINT_NAMES)
         postures = dict(goal.waypoints.postures)
         for number, row in enumerate(self.knots.tolist()):
@@ -419,7 +422,7 @@ class _FreePath:
         return replace(goal, waypoints=replace(goal.waypoints, postures=postures))
 
     def remark(self, goal: GoalTable, turns: Floats) -> str:
-        """Return the report's lines about the choice."""
+        """Return the remark on the choice."""
         rows = np.flatnonzero(self.is_open)
         points = f'points {rows[0]} to {rows[-1]}' if len(rows) > 1 else f'point {rows[0]}'
         low, high = degrees(turns[rows].min()), degrees(turns[rows].max())
@@ -432,7 +435,7 @@ class _FreePath:
         return f'{text}; between points the axis leaves its way by up to {deviation:.1f} degrees'
 
     def _axis_deviation(self, goal: GoalTable) -> float:
-        """Return how far the axis is from the shortest way between points, at most [rad]."""
+        """Return the greatest deviation of the axis from the shortest way between points [rad]."""
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         counts = self.free[1:] & ~self.is_joint[1:]
         if not counts.any():
@@ -447,12 +450,12 @@ class _FreePath:
 
 
 def _wrapped(angles: Floats, middle: Floats) -> Floats:
-    """Return angles within half a turn of others."""
+    """Return angles wrapped to within half a turn of ``middle``."""
     return angles - tau * np.rint((angles - middle) / tau)
 
 
 def _rotated(quaternions: Floats, axis: Vector3) -> Floats:
-    """Return an axis in the orientations (n, 4)."""
+    """Return an axis rotated by each of the quaternions (n, 4)."""
     u, w = quaternions[:, :3], quaternions[:, 3:]
     v = np.broadcast_to(np.array(axis), u.shape)
     t = 2.0 * cross_rows(u, v)
@@ -463,7 +466,7 @@ def _rotated(quaternions: Floats, axis: Vector3) -> Floats:
 def _shortest_turn(a: Vector3, b: Vector3) -> Quaternion:
     """Return the rotation that turns one unit vector into another the shortest way."""
     w = 1.0 + dot(a, b)
-    if w < 1e-9:  # opposite: about any axis across
+    if w < 1e-9:  # opposite vectors: turn about any axis across them
         side = cross(a, (1.0, 0.0, 0.0) if abs(a[0]) < 0.7 else (0.0, 1.0, 0.0))
         return normalize((*side, 0.0))
     return normalize((*cross(a, b), w))

@@ -1,19 +1,20 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Search the rotation about a free axis along a path: a lattice, and dynamic programming over it.
+Search the rotation about a free axis along a path by dynamic programming over a lattice.
 
 A *layer* is a place at which the rotation can be chosen, and its *nodes* are rotations. An *edge*
-joins nodes of two layers; along it the rotation changes evenly, as on a line of the robot, and the
-arm is solved on the *samples* in between. Each branch has a closed form, so all rotations of all
-samples are solved at once into a table, and edges look them up. Each node keeps the joints of the
-best way to it, so that full turns are counted and joint limits hold for the way taken.
+connects nodes of two layers; along it, the rotation changes linearly, as on a line of the robot,
+and the arm is solved on the *samples* in between. Each branch has a closed-form solution, so all
+rotations of all samples are solved at once into a table, in which edges look up their joints. Each
+node keeps the joints of the best way to it, so that full turns are tracked and joint limits hold
+along that way.
 
 The search is first coarse, over all rotations, then finer and finer around the best way.
 
 Rotations are angles [rad] about the axis from the reference orientation, which goes along the path
-without turning about it. They are not wrapped: a rotation and the same after a full turn are two
-nodes, because the joints tell them apart.
+without turning about the axis. They are not wrapped: rotations that differ by a full turn are
+different nodes, because their joints differ.
 """
 
 from __future__ import annotations
@@ -43,35 +44,36 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
     SINGULARITY_MEASURES,
 )
 
-#: Rotations of a full turn in the coarse search, and its step [rad]. The finer searches try so
-#: many rotations to either side of the best one, each with a third of the step before.
+#: Number of rotations in a full turn in the coarse search, and its step [rad]. Each finer search
+#: has a third of the previous step, and tries ``_FINE_REACH`` rotations to each side of the best.
 TURN_COUNT = 72
 COARSE_STEP = tau / TURN_COUNT
 _FINE_STEPS = tuple(COARSE_STEP / 3**k for k in (1, 2, 3))
 _FINE_REACH = 3
-#: Full turns before and behind the first one in which a rotation may lie.
+#: Numbers of full turns that are added to rotations to make further nodes.
 _COPIES = (-1, 0, 1)
-#: How far the rotation may change from layer to layer [rad]: below half a turn, whose direction is
+#: Greatest change of the rotation from layer to layer [rad]: below half a turn, whose direction is
 #: ambiguous.
 _MAX_CHANGE = 0.95 * pi
-#: A joint that turns farther between two samples jumps [rad].
+#: A joint that turns farther than this between two samples counts as jumping [rad].
 _MAX_JOINT_STEP = 1.0
-#: How far the axis may leave the shortest way between two points, because the tool turns and tilts
-#: at once [rad].
+#: Greatest deviation of the axis from the shortest way between two points, which results from
+#: turning and tilting at once [rad].
 MAX_AXIS_DEVIATION = pi / 180.0
 
-#: The cost of an edge: the turns of all joints [rad]; a quadratic part, which spreads turns;
+#: The cost of an edge is the sum of the turns of all joints [rad]; a quadratic part, which spreads
+#: the change of the rotation evenly;
 _EVENNESS = 2.0
-#: nearness to limits and singularities, for each unit of the path, from this margin on, which is a
-#: part of its scale;
+#: nearness to joint limits [rad] and singularities (fraction of their scale) within this margin,
+#: per unit of the path;
 _WIDE_MARGIN = 0.6
 _NEARNESS = 1.0
-#: where the planner would refuse: too near to a singularity; too fast for a joint [1/rad]; off the
-#: posture of a point [1/rad].
+#: and penalties for what the planner would refuse: too near to a singularity; too fast for a joint
+#: [1/rad]; off the posture of a point [1/rad].
 _REFUSED = 50.0
 _TOO_FAST = 50.0
 _OFF_POSTURE = 20.0
-#: Sources of a joint move: so many of the best.
+#: Greatest number of nodes, the best ones, from which joint moves are tried.
 _JOINT_SOURCES = 24
 _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
 
@@ -80,23 +82,23 @@ _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
 class Layer:
     """A place at which the rotation can be chosen, and the samples of the path to it."""
 
-    #: Slice of the samples; the last one is the place itself.
+    #: Slice of the samples; the last sample is the place itself.
     begin: int
     end: int
-    #: Allowed rotations [rad]: any, or from ``low`` to ``high`` and the same in other full turns.
+    #: Allowed rotations [rad]: any, or from ``low`` to ``high`` plus any number of full turns.
     low: float = -inf
     high: float = inf
-    #: Whether a joint move leads there, which may change branch and turns; to the nearest solution
-    #: where the rotation is fixed and there is no posture.
+    #: Whether a joint move leads to the place, which may change branch and full turns; and whether
+    #: it leads to the nearest solution, as the rotation is fixed and there is no posture.
     is_joint: bool = False
     is_nearest: bool = False
-    #: Largest change of the rotation from the layer before [rad].
+    #: Largest change of the rotation from the previous layer [rad].
     max_change: float = _MAX_CHANGE
-    #: Joint positions [rad] to be near to, NaN where none is asked for.
+    #: Requested joint positions [rad], NaN for joints without one.
     posture: Joints | None = None
 
     def turns(self, rotation: float) -> float:
-        """Return the full turns [rad] between the range and the same around a rotation."""
+        """Return the full turns [rad] by which the range is shifted to lie around a rotation."""
         return tau * round((rotation - 0.5 * (self.low + self.high)) / tau)
 
     @property
@@ -111,10 +113,10 @@ class RotationSamples:
 
     #: (n, 7) the reference pose of the controlled frame in base.
     poses: Floats
-    #: Which part of the way from layer to layer is behind, (0, 1].
+    #: Fractions of the way from the previous layer to the next one, in (0, 1].
     fractions: Floats
-    #: The length of the path from the sample before, in units of 5 cm or a radian, and the time
-    #: that it takes [s], inf where it is not known.
+    #: The length of the path from the previous sample, in units of 5 cm or a radian, and the time
+    #: for that length [s], inf = not known.
     sizes: Floats
     times: Floats
 
@@ -126,7 +128,7 @@ class RotationSamples:
 class RotationPath:
     """The rotation at each layer, and the arm there."""
 
-    #: (layers,) [rad].
+    #: (layers,) rotations [rad].
     rotations: Floats
     #: (layers,) number of the branch; (layers, 6) joint positions [rad].
     branches: Int64s
@@ -146,15 +148,15 @@ class _Tables:
     """
     The arm on each sample: joints (n, 6, branches, rotations), costs (n, branches, rotations).
 
-    The joints come first, as in all arrays of the search: numpy adds rows many times faster than
-    it adds up what lies side by side.
+    The axis of the joints comes early, as in all arrays of the search: numpy sums over an outer
+    axis many times faster than over the innermost one.
     """
 
-    #: First rotation of each sample (n,) [rad], their step, and whether they go all the way round.
+    #: First rotation of each sample (n,) [rad], step, and whether the rotations fill a full turn.
     first: Floats
     step: float
     is_round: bool
-    #: [rad], and the cost of being there: inf where there is no solution.
+    #: Joint positions [rad], and their cost: inf = no solution.
     q: Floats
     cost: Floats
 
@@ -181,7 +183,7 @@ class RotationLattice:
     layers: Sequence[Layer]
     q_start: Joints
     options: PlanningOptions
-    #: By sample: what coarse rotations cost more (8, 72).
+    #: Additional costs of coarse rotations (8, 72), by sample.
     _charges: dict[int, Floats] = field(default_factory=dict)
     _coarse: _Tables | None = None
     _speeds: Floats = field(init=False)
@@ -229,7 +231,7 @@ class RotationLattice:
         return tables.q[:, :, 0, 0]
 
     def charge(self, sample: int, branch: int, costs: Floats) -> None:
-        """Let the coarse rotations (72,) at a sample, in a branch, cost more."""
+        """Add costs to the coarse rotations (72,) at a sample, in a branch."""
         known = self._charges.setdefault(sample, np.zeros((8, TURN_COUNT)))
         known[branch] += costs
         if self._coarse is not None:
@@ -299,7 +301,7 @@ class RotationLattice:
         return _Tables(first=first, step=step, is_round=is_round, q=q, cost=cost)
 
     def _solve(self, solution: BranchSolution) -> tuple[Floats, Floats]:
-        """Return joints (n, 6), and the cost of nearness to singularities for each unit (n,)."""
+        """Return joints (n, 6), and costs of nearness to singularities per unit of path (n,)."""
         q = solution.q.T
         distances = singularity_distance_rows(self.arm, q)
         bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
@@ -322,7 +324,7 @@ class RotationLattice:
         return np.concatenate([one + tau * k for k in _COPIES])
 
     def _refined(self, path: RotationPath, step: float) -> RotationPath:
-        """Return the best way around another one."""
+        """Return the best way close to another one, with a finer step."""
         first = self.along(path.rotations) - _FINE_REACH * step
         tables = self._tables(first, step, 2 * _FINE_REACH + 1, self.sample_branches(path))
         offsets = step * np.arange(-_FINE_REACH, _FINE_REACH + 1)
@@ -343,7 +345,7 @@ class RotationLattice:
         """
         Return the best way through nodes.
 
-        :param around: the way around which the nodes lie; None = all branches are searched.
+        :param around: the way near which the nodes lie; None = all branches are searched.
         """
         width = tables.q.shape[2]
         branches = np.arange(8)[None] if width == 8 else np.array([[self._start]])
@@ -374,7 +376,7 @@ class RotationLattice:
         """
         Return the way to the best node of the last layer.
 
-        :param branches: (layers, b) the numbers of the branches in the nodes' first index.
+        :param branches: (layers, b) the branch for each value of the nodes' first index.
         """
         n = len(back)
         path = RotationPath(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 6)))
@@ -418,7 +420,7 @@ class RotationLattice:
         total = np.where(np.abs(change) <= reach, _EVENNESS / max(size, 1e-6) * change**2, inf)
         index = index + first
         total = np.take(cost, index, axis=1) + total
-        here = np.take(q, index, axis=2)  # in one piece of memory, other than by index
+        here = np.take(q, index, axis=2)  # contiguous in memory, unlike the result of indexing
         for sample in range(layer.begin, layer.end):
             if sample == layer.end - 1:
                 entry = tables.look_up(sample, targets)[:, None]
@@ -455,9 +457,9 @@ class RotationLattice:
         near: Floats | None,
     ) -> tuple[Floats, Floats, Int64s, Floats]:
         """
-        Return the same of a layer to which a joint move leads: from any node to any other.
+        Return the same as :meth:`_edges` for a joint move, which connects any two nodes.
 
-        :param near: where the move ends; None = anywhere.
+        :param near: joint positions near which the move ends; None = anywhere.
         """
         sample = layer.end - 1
         flat = cost.ravel()
@@ -468,7 +470,7 @@ class RotationLattice:
         if near is None:
             turn = there - start
             turn -= tau * np.rint(turn / tau)
-            # The copies of a rotation are the turns of the last joint before and behind.
+            # The copies of a rotation are reached by full turns of the last joint.
             copies = np.repeat(tau * np.array(_COPIES), len(targets) // len(_COPIES))
             turn[5] += copies[:, None]
         else:
@@ -488,7 +490,7 @@ class RotationLattice:
         return total[b, k, best], end[:, b, k, best], sources[best], targets
 
     def _limits(self, q: Floats, size: float) -> Floats:
-        """Return the cost (...) of nearness to joint limits on a part of the path."""
+        """Return the costs (...) of nearness to joint limits on a part of the path."""
         low, high = self._ranges
         margin = np.minimum(q - low, high - q).min(axis=0)
         return np.where(margin < 0.0, inf, _nearness(margin) * size)

@@ -3,10 +3,10 @@
 """
 The shapes of blends: the transitions from one curve into the next that round waypoints.
 
-UR publishes the radius within which a blend stays, and its shape only for ``movep`` (a circular
+UR publishes the radius within which a blend stays, but its shape only for ``movep`` (a circular
 fillet). The other blends are modelled as a crossfade of the two motions: the first slows down
-evenly while the second speeds up evenly, which between straight lines is a parabola. Between two
-joint moves this happens in joint space, else in Cartesian space.
+evenly while the second speeds up evenly; between straight lines this makes a parabola. Between two
+joint moves the crossfade is in joint space, else in Cartesian space.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from ur_cartesian_driver.planning.geometry.curves import (
     MAX_TURN_PER_SAMPLE,
 )
 
-# Segments that continue straight on, or straight back, have no circle between them [rad].
+# Within this angle [rad], segments continue straight on or straight back, without a circle.
 _STRAIGHT = 1e-6
-# Where they go straight back it is no smaller than this [m].
+# Least radius of the circle between segments that go straight back [m].
 _MIN_RADIUS = 1e-9
 
 
 def crossfade(leave: N, join: N, s: N) -> tuple[N, N]:
-    """Return ``u`` of the first and of the second curve at ``s`` of blends."""
+    """Return the ``u`` of the first and of the second curve at the parameters ``s`` of blends."""
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
 
 def crossfade_rows(first: Floats, waypoint: Floats, second: Floats) -> Floats:
-    """Return the poses (n, 7) in blends from those on both curves and that at the waypoint."""
+    """Return the poses (n, 7) in blends, from the poses on both curves and at the waypoint."""
     rows = first + second - waypoint
     rows[:, 3:] = waypoint[:, 3:]
     turns = np.flatnonzero(
@@ -54,8 +54,8 @@ class BlendShapes:
     """
     Lengths, turns and tolerances of many blends.
 
-    :param start: poses (n, 7) where they begin; ``middle`` of their waypoints, ``end`` where they
-        end.
+    :param start: (n, 7) the poses where the blends begin; ``middle``: the waypoints; ``end``: the
+        poses where the blends end.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class BlendShapes:
         self.opening = opening_rows(self.start, self.middle, self.end)
 
     def lengths(self) -> Floats:
-        """Return the lengths [m], of parabolas and circles between straight lines."""
+        """Return the lengths [m] of the blends, as parabolas or circles between straight lines."""
         arc = self._circle_radii() * (np.pi - self.opening)
         there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
             self.end - self.middle, axis=1
@@ -88,7 +88,7 @@ class BlendShapes:
         return lengths
 
     def arc_radii(self) -> Floats:
-        """Return the radii of the circles [m], inf of other blends."""
+        """Return the radii of the circles [m]; inf for other blends."""
         radii: Floats = np.where(self.fillet, self._circle_radii(), np.inf)
         return radii
 
@@ -96,7 +96,7 @@ class BlendShapes:
         return np.maximum(fillet_radius(self.radius, self.opening), _MIN_RADIUS)
 
     def samples(self) -> Indices:
-        """Return the numbers of chords that follow them closely enough."""
+        """Return the number of chords that follow each blend closely enough."""
         # At its ends the blend turns at twice its mean rate.
         turns = np.ceil(2.0 * self.turns / MAX_TURN_PER_SAMPLE)
         radius = np.maximum(fillet_radius(self.radius, self.opening), 1e-3)
@@ -108,7 +108,7 @@ class BlendShapes:
         return np.maximum(2.0, np.maximum(turns, curve)).astype(np.intp)
 
     def tolerances(self) -> Floats:
-        """Return their blend tolerances (n, 2) [m], [rad]."""
+        """Return the blend tolerances (n, 2) [m], [rad]."""
         height = np.linalg.norm(self.middle - 0.5 * (self.start + self.end), axis=1)
         return 0.5 * np.stack((height, np.maximum(self.before, self.after)), axis=1)
 
@@ -116,7 +116,7 @@ class BlendShapes:
 def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """Return the angles between the two segments at the waypoints [rad], pi = straight on."""
     a, b = _units(start - waypoint), _units(end - waypoint)
-    # More accurate than the arc cosine where the segments are in line.
+    # More accurate than the arc cosine if the segments are in line.
     opening: Floats = 2.0 * np.arctan2(
         np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
     )
@@ -130,7 +130,7 @@ def fillet_radius(radius: Floats, opening: Floats) -> Floats:
 
 
 def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
-    """Return positions (n, 3) on circles that touch both segments, evenly along them."""
+    """Return positions (n, 3) on circles that touch both segments; even in ``s`` along the arc."""
     opening = opening_rows(start, waypoint, end)
     rho = fillet_radius(radius, opening)
     inwards = _units(_units(start - waypoint) + _units(end - waypoint))
@@ -139,8 +139,9 @@ def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s:
     # The center lies rho / sin(opening / 2) from the waypoint.
     depth = rho / np.maximum(np.sin(0.5 * opening), 1e-12) - rho * np.cos(phi)
     circle = waypoint + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
-    # Without a circle it is the chord: straight on through the waypoint. Straight back it is the
-    # point where the segment is left, as the circle shrinks there when the opening does.
+    # Without a circle the blend is its chord. If the segments go straight on, the chord leads
+    # through the waypoint. If they go straight back, it is the point where the first segment is
+    # left: there the circle shrinks to a point as the opening goes to zero.
     chord = start + s[:, None] * (end - start)
     has_circle = (opening > _STRAIGHT) & (opening < np.pi - _STRAIGHT)
     return np.where(has_circle[:, None], circle, chord)
@@ -150,9 +151,9 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """
     Return the lengths of parabolas with these control points [m].
 
-    The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b; its square A s^2 + B s + C has a
-    root whose integral is elementary, but has special cases. Gauss-Legendre has none: its eight
-    points are exact to a millionth, and to a thousandth for blends that go back nearly straight.
+    The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b, the root of some A s^2 + B s + C. Its
+    integral is elementary, but has special cases. Gauss-Legendre quadrature has none: eight points
+    are exact to a millionth, and to a thousandth for blends that go back nearly straight.
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
     nodes, weights = np.polynomial.legendre.leggauss(8)

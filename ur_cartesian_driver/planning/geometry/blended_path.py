@@ -3,8 +3,8 @@
 """
 The path of a goal in columns: the curve of each segment, and the blends between them.
 
-Goals have up to 100,000 segments, and nearly all of them are lines. So lines and blends are rows.
-The other curves (arcs, joint lines) stand beside the rows as objects.
+Goals have up to 100,000 segments, and nearly all of them are lines. So lines and blends are stored
+as rows, the other curves (arcs, joint lines) as objects.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from ur_cartesian_driver.planning.geometry.curves import (
 
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
-# Chords that measure the length of a blend without a formula.
+# Number of chords that measure the length of a blend for which there is no formula.
 _CHORDS = 16
 
 
 class CurveSequence(Protocol):
     """
-    Consecutive curves as the checks along a path need them.
+    Consecutive curves, for the checks along a path.
 
     The curve of segment k has the number 2k, the blend after it 2k + 1.
     """
@@ -54,23 +54,23 @@ class CurveSequence(Protocol):
         """
         Return poses (n, 7) on many curves.
 
-        :param number: (n,) of the curve of each row, not decreasing.
-        :param t: (n,) in [0, 1].
+        :param number: (n,) the number of the curve of each row, not decreasing.
+        :param t: (n,) the parameter on the curve, in [0, 1].
         """
 
     def extent(self, number: int) -> tuple[float, float]:
-        """Return length [m], and turn of tool or leading joint [rad], of a curve."""
+        """Return the length of a curve [m], and its turn of tool or leading joint [rad]."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (n,) that places count to, and the fractions (n,) of them."""
+        """Return the segments (n,) to which places belong, and the fractions (n,) of them."""
 
 
 class CurveRows:
     """
     The curves of consecutive segments, a row for each.
 
-    :param start: (n, 7) the pose where each begins, ``end`` (n, 7) where it ends.
-    :param others: those that are no lines, by row.
+    :param start: (n, 7) the pose where each curve begins; ``end``: (n, 7) where it ends.
+    :param others: the curves that are not lines, by row.
     """
 
     def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
@@ -104,7 +104,7 @@ class CurveRows:
         self.others[row] = curve
 
     def put_line(self, row: int, start: Pose) -> None:
-        """Replace a curve by the line from a pose to its end."""
+        """Replace a curve by the line from a pose to the end of the curve."""
         self.start[row] = start.row()
         one = slice(row, row + 1)
         self.length[one] = distance_rows(self.start[one], self.end[one])
@@ -115,7 +115,7 @@ class CurveRows:
 
     @property
     def samples(self) -> Indices:
-        """(n,) into how many pieces to cut each so that chords follow it."""
+        """(n,) the number of chords that follow each curve closely enough."""
         samples = np.maximum(1, np.ceil(self.angle / MAX_TURN_PER_SAMPLE)).astype(np.intp)
         for row, curve in self.others.items():
             samples[row] = curve.samples
@@ -135,7 +135,7 @@ class CurveRows:
         return rows
 
     def trim(self, row: Indices, radius: Floats, *, at_end: bool = False) -> Floats:
-        """Return the ``u`` (n,) at which curves leave balls around their starts, or ends [m]."""
+        """Return the ``u`` (n,) at a distance [m] from the starts, or the ends, of curves."""
         length = self.length[row]
         u: Floats = np.minimum(1.0, radius / np.maximum(length, 1e-300)) * (length > 0.0)
         if at_end:
@@ -158,19 +158,21 @@ class BlendedPath:
         """Begin without blends."""
         n = len(curves)
         self.curves = curves
-        #: The ``u`` where each curve is joined after the blend before, and left for the one after.
+        #: The ``u`` at which each curve begins after the blend before it, and ends at the blend
+        #: after it.
         self.u_join, self.u_leave = np.zeros(n), np.ones(n)
-        #: Of the blend after each curve: distance from the waypoint at which both curves are left
-        #: [m], 0 = none; whether it is a circular arc (``movep``), between lines.
+        #: Of the blend after each curve: the distance from the waypoint at which the blend begins
+        #: and ends [m], 0 = no blend; whether it is a circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        #: Radius of that arc [m], inf = it is none.
+        #: Radius of the arc [m]; inf if the blend is no arc.
         self.arc_radius = np.full(n, np.inf)
-        #: Its length [m] and turn of the tool [rad], and the number of chords that follow it.
+        #: Length of the blend [m], turn of the tool in it [rad], and the number of chords that
+        #: follow it.
         self.blend_length, self.blend_angle = np.zeros((2, n))
         self.blend_samples = np.zeros(n, dtype=np.intp)
-        #: (n, 2) how far the robot's own blend may lie beside it [m], [rad]. It may come as close
-        #: to the waypoint as it likes, or cut across straight: this one is half-way between. The
-        #: turn of the tool may run ahead of its position, or behind it.
+        #: (n, 2) how far the robot's own blend may be from this one [m], [rad]. The robot's blend
+        #: may come arbitrarily close to the waypoint, or cut straight across; this one lies
+        #: half-way between. The turn of the tool may lead or lag its position.
         self.blend_tolerance = np.zeros((n, 2))
 
     @property
@@ -184,12 +186,12 @@ class BlendedPath:
         return np.append(False, self.has_blend_after[:-1])
 
     def remove_blends(self, first: int, stop: int) -> None:
-        """Remove the blends after the curves of some rows; these then end at their waypoints."""
+        """Remove the blends after the curves of some rows; the curves then end at waypoints."""
         self.radius[first:stop], self.u_leave[first:stop] = 0.0, 1.0
         self.u_join[first + 1 : stop + 1] = 0.0
 
     def leave(self, row: Indices, radius: Floats) -> None:
-        """Leave curves where blends will begin, the second curves of which are not known yet."""
+        """End curves where blends will begin, while the curves after them are not known yet."""
         self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
     def make_blends(self, row: Indices, radius: Floats, fillet: Flags) -> None:
@@ -217,7 +219,7 @@ class BlendedPath:
             self.blend_length[k] = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
 
     def extents(self, number: Indices) -> tuple[Floats, Floats]:
-        """Return the lengths (n,) [m], and the turns (n,) of tool or leading joint [rad]."""
+        """Return the lengths of curves (n,) [m], and the turns of tool or leading joint [rad]."""
         row, is_blend = number // 2, number % 2 == 1
         travel, own = self.curves.joint_travel, self.curves.joint_travel[row]
         length, turn = self.curves.length[row], np.where(own > 0.0, own, self.curves.angle[row])
@@ -268,7 +270,7 @@ class BlendedPath:
         return rows
 
     def is_in_joint_space(self, number: int) -> bool:
-        """Tell whether a curve is a joint line, or a blend between two."""
+        """Return whether a curve is a joint line, or a blend between two joint lines."""
         row, is_blend = divmod(number, 2)
         return bool(self.curves.is_joint_line[row : row + is_blend + 1].all())
 
@@ -284,7 +286,7 @@ class BlendedPath:
         return rows
 
     def _crossfaded(self, row: Indices, s: Floats) -> Floats:
-        """Return poses in blends that crossfade poses."""
+        """Return poses (n, 7) in blends in Cartesian space."""
         curves, after = self.curves, row + 1
         a, b = crossfade(self.u_leave[row], self.u_join[after], s)
         waypoint = curves.start[after]
@@ -302,7 +304,7 @@ class BlendedPath:
         return rows
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """See :class:`CurveSequence`; the second half of a blend counts to the next segment."""
+        """See :class:`CurveSequence`; the second half of a blend belongs to the next segment."""
         row, on_blend = number // 2, number % 2 == 1
         after = on_blend & (t > 0.5)
         first, second = crossfade(self.u_leave[row], self.u_join[row + on_blend], t)

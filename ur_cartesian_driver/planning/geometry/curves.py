@@ -5,7 +5,7 @@ The curves of the robot's motions: lines, arcs and joint lines.
 
 A curve maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
 the leading quantity of the motion (length of a line or an arc, travel of the joints). It runs from
-waypoint to waypoint. :mod:`~.blended_path` has the curves of a goal in columns, and rounds the
+waypoint to waypoint. :mod:`~.blended_path` holds the curves of a goal in columns, and rounds the
 transitions.
 """
 
@@ -43,27 +43,27 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.goal.goal import ArcMode
 
-#: This close to half a turn, rounding on the wire and the arm's actual pose decide in which
-#: direction a line turns the tool [rad].
+#: If a line turns the tool by half a turn within this angle [rad], rounding on the wire and the
+#: arm's actual pose decide in which direction.
 HALF_TURN = 1e-3
 
-#: Two poses that differ by less are the same: the resolution of the wire [m], [rad].
+#: Poses that differ by less than the resolution of the wire [m], [rad] are the same.
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Minimum height of the via above the chord [m] at which three points make a circle.
 MIN_ARC_HEIGHT = 1e-5
-#: How far rounding to micrometres on the wire moves three points against each other [m].
+#: How far rounding to micrometres on the wire moves three points relative to each other [m].
 _ROUNDING = 1.5e-6
-#: By how much that may turn the tool at the end of an arc whose tangent it follows [rad].
+#: Largest turn of the tool by such rounding at the end of an arc whose tangent it follows [rad].
 MAX_ARC_TURN_ERROR = 0.005
-#: Arcs through points that are farther apart are refused [m]: no arm reaches that far.
+#: Arcs through points that are farther apart than this [m] are refused: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
 #: Chord error of sampled arcs and of sampled joint lines [m].
 ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
-#: Where a joint line leaves a ball is narrowed down to one of so many parts, again and again.
+#: Where a joint line leaves a ball is searched by dividing it into these numbers of parts in turn.
 _TRIM_DIVISIONS = (32,) * 6
 
 
@@ -84,7 +84,7 @@ class ArcCurve:
     radius: float
     sweep: float
     mode: ArcMode
-    #: Where the via lies, (0, 1).
+    #: The ``u`` of the via, in (0, 1).
     u_via: float
     joint_travel: ClassVar[float] = 0.0
 
@@ -93,9 +93,10 @@ class ArcCurve:
         """
         Return the arc from start through a position [m] to the end's position.
 
-        In mode FIXED the end's orientation is replaced by that with which the arc arrives.
+        In mode FIXED the orientation of ``end`` is replaced by the one in which the arc arrives.
 
-        :raises ValueError: the three positions make no circle; the text is a clause that says why.
+        :raises ValueError: the three positions make no circle, or in mode FIXED an inexact one;
+            the text is a clause that says why.
         """
         center, axis, radius = _circle(start.position, via, end.position)
         if mode is ArcMode.FIXED:
@@ -116,12 +117,12 @@ class ArcCurve:
 
     @property
     def angle(self) -> float:
-        """Turn of the tool along the arc [rad]; beyond pi where the tool follows the tangent."""
+        """Turn of the tool along the arc [rad]; may exceed pi if the tool follows the tangent."""
         return self.sweep if self.mode is ArcMode.FIXED else self.start.angle_to(self.end)
 
     @property
     def samples(self) -> int:
-        """Into how many pieces to cut it so that chords follow it."""
+        """Number of chords that follow the arc closely enough."""
         step = sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
         return max(1, ceil(self.sweep / step), ceil(self.angle / MAX_TURN_PER_SAMPLE))
 
@@ -137,7 +138,7 @@ class ArcCurve:
         return rows
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` at which the arc crosses a ball [m] around its start, or its end."""
+        """Return the ``u`` at which the arc leaves a ball of a radius [m] at its start, or end."""
         u = min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
         return 1.0 - u if at_end else u
 
@@ -153,7 +154,7 @@ class JointLineCurve:
     start: Pose
     end: Pose
     length: float
-    #: Into how many pieces to cut it so that chords follow it.
+    #: Number of chords that follow the curve of the tool closely enough.
     samples: int
     #: Peak speed of the tool over its mean speed.
     unevenness: float
@@ -163,8 +164,8 @@ class JointLineCurve:
         cls, arm: Arm, T_flange_tcp: Pose, q_start: Joints, q_end: Joints
     ) -> JointLineCurve:
         """Return the joint line from one configuration to another."""
-        # A point at most `reach` from all axes of rotation leaves its chord by at most
-        # reach delta^2 / 8 when the joints together turn by delta.
+        # If the joints together turn by delta, a point within `reach` of all axes of rotation
+        # deviates from its chord by at most reach delta^2 / 8.
         max_reach = arm.model.max_reach + hypot(*T_flange_tcp.position)
         step = sqrt(8.0 * CURVE_CHORD_ERROR / max_reach)
         samples = max(1, ceil(sum(abs(b - a) for a, b in zip(q_start, q_end, strict=True)) / step))
@@ -186,7 +187,7 @@ class JointLineCurve:
 
     @property
     def angle(self) -> float:
-        """Turn of the tool from the start to the end [rad], the shortest."""
+        """Shortest turn of the tool from the start to the end [rad]."""
         return self.start.angle_to(self.end)
 
     @property
@@ -218,7 +219,7 @@ class JointLineCurve:
         return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` at which the tool first leaves a ball [m] around its start, or end."""
+        """Return the first ``u`` outside a ball of a radius [m] about the start, or the end."""
         center = np.array([(self.end if at_end else self.start).row()])
         low, high = 0.0, 1.0
         for n in (max(16, self.samples), *_TRIM_DIVISIONS):
@@ -238,12 +239,12 @@ def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:
 
 
 def is_same_pose(a: Pose, b: Pose) -> bool:
-    """Tell whether two poses are the same within the resolution of the wire."""
+    """Return whether two poses are the same within the resolution of the wire."""
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
 
 def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float]:
-    """Return center, axis (unit) and radius of the circle that goes a, b, c in this order."""
+    """Return center, axis (unit) and radius of the circle through a, b and c in this order."""
     ab, ac = subtract(b, a), subtract(c, a)
     chord = hypot(*ac)
     for name, distance_apart in (
@@ -269,10 +270,10 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
 
 def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
     """
-    Refuse an arc at whose end rounded points turn the tool.
+    Refuse an arc at whose end the rounding of its points turns the tool too far.
 
-    They tilt the circle by rounding / height of the triangle. Turned by the sweep that makes
-    2 sin(sweep / 2) of it, which the law of sines puts into the distances from the via.
+    Rounding tilts the circle by rounding / height of the triangle. The turn by the sweep makes
+    2 sin(sweep / 2) times this tilt, which the law of sines expresses in the distances of the via.
     """
     from_start, to_end = distance(a, b), distance(b, c)
     error = 2.0 * _ROUNDING * max(from_start, to_end, distance(a, c)) / (from_start * to_end)

@@ -3,9 +3,9 @@
 """
 Samples along the path of a goal: on parts of curves, and on the blends between them.
 
-One sample every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
-and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four samples
-on each of them. Where the joints turn fast
+Samples are at most 2 mm and one degree apart, and there are at least eight on each piece. Pieces
+up to 11.2 mm and 5.6 degrees have fewer, at most 1.6 mm and 0.8 degrees apart: a path of 5 mm
+steps has four samples on each step. Where the joints turn fast,
 :mod:`~ur_cartesian_driver.planning.preflight.joint_path_solver` adds samples.
 """
 
@@ -28,14 +28,14 @@ T = TypeVar('T', bound=np.generic)
 #: Maximum distance of two samples [m], [rad].
 STEP_LENGTH = 0.002
 STEP_ANGLE = pi / 180.0
-#: Minimum number of samples on a piece, as long as they are no closer than the maximum distance
-#: divided by this.
+#: Minimum number of samples on a piece. A short piece has fewer: as many as bring them no farther
+#: apart than the maximum distance divided by _MIN_REFINEMENT.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
 
 
 def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
-    """Return arrays as one; a single one is not copied."""
+    """Return arrays joined to one; a single array is not copied."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
@@ -74,7 +74,7 @@ class CurvePieces:
     path: CurveSequence
     #: Index of the waypoint at the end of the path's first segment.
     first: int
-    #: The number of the curve, and its range: ``u`` of a segment's curve, ``s`` of a blend.
+    #: The number of the curve, and the range on it: ``u`` of a segment's curve, ``s`` of a blend.
     number: Indices
     begin: Floats
     end: Floats
@@ -84,7 +84,7 @@ class CurvePieces:
     def of(
         cls, path: BlendedPath, first: int, number: Indices, begin: Floats, end: Floats
     ) -> CurvePieces:
-        """Return parts of segments' curves, and whole blends, of a path with both."""
+        """Return parts of the curves of segments, and whole blends, of a path."""
         length, turn = path.extents(number)
         part, is_blend = end - begin, number % 2 == 1
         steps = np.maximum(length * part / STEP_LENGTH, turn * part / STEP_ANGLE)
@@ -106,12 +106,12 @@ class CurvePieces:
 
     @property
     def index(self) -> Int32s:
-        """Index of the waypoint at the end of each curve; of a blend the one that it rounds."""
+        """Index of the waypoint at the end of each curve; of a blend, the waypoint it rounds."""
         return (self.first + self.number // 2).astype(np.int32)
 
     @property
     def is_blend(self) -> Flags:
-        """Whether they are blends."""
+        """Whether each piece is a blend."""
         is_blend: Flags = self.number % 2 == 1
         return is_blend
 
@@ -124,16 +124,16 @@ class CurvePieces:
         return pose_from_row(self.rows(np.array([k]), np.array([t]))[0])
 
     def rows(self, piece: Indices, t: Floats) -> Floats:
-        """Return poses (n, 7) on pieces (n,), which must not decrease."""
+        """Return poses (n, 7) on pieces, whose numbers (n,) must not decrease."""
         return self.path.rows(self.number[piece], t)
 
     def locate(self, piece: Indices, t: Floats) -> tuple[Int32s, Floats]:
-        """Return the segments (n,) to which places on pieces count, and the fractions of them."""
+        """Return the segments (n,) to which places on pieces belong, and the fractions of them."""
         row, fraction = self.path.locate(self.number[piece], t)
         return (self.first + row).astype(np.int32), fraction
 
     def locate_one(self, k: int, t: float) -> tuple[int, float]:
-        """Return the segment to which a place on a piece counts, and the fraction of it."""
+        """Return the segment to which a place on a piece belongs, and the fraction of it."""
         segment, fraction = self.locate(np.array([k]), np.array([t]))
         return int(segment[0]), float(fraction[0])
 
@@ -144,7 +144,7 @@ class PoseSamples:
 
     #: (n,) not decreasing.
     piece: Indices
-    #: (n,) the ``u`` or ``s``.
+    #: (n,) the ``u`` of a segment's curve, or ``s`` of a blend.
     t: Floats
     #: (n, 7) the TCP in base.
     poses: Floats

@@ -4,8 +4,8 @@
 The tool spline: the pose of the tool over time in a SPLINE or SERVO goal.
 
 From point to point the position is a polynomial, and so is the rotation vector from the
-orientation at the start of the piece (:mod:`~.rotation_rows`): cubic where twists are given,
-quintic where accelerations are given too. Both are met exactly at the points.
+orientation at the start of the piece (:mod:`~.rotation_rows`): cubic if only twists are given,
+quintic if accelerations are given, too. The given values are met exactly at the points.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ToolPoints:
     twists: Floats
     #: (n + 1, 6) [m/s^2], [rad/s^2]
     accelerations: Floats
-    #: Whether the accelerations count.
+    #: Whether the accelerations are used: the pieces are quintic, not cubic.
     quintic: bool
 
 
@@ -65,13 +65,13 @@ class ToolRows(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolSpline:
-    """n pieces, in the robot's base."""
+    """A spline of n pieces, in the robot's base."""
 
     #: (n + 1,) [s]
     times: Floats
     #: (n, 6 powers, 3) [m / s^power]
     positions: Floats
-    #: (n, 6 powers, 3) [rad / s^power] from ``orientations`` (n, 4)
+    #: (n, 6 powers, 3) [rad / s^power], rotation vectors from ``orientations`` (n, 4)
     turns: Floats
     orientations: Floats
 
@@ -126,7 +126,7 @@ class ToolSpline:
         return values(self.positions[piece], t), values(self.turns[piece], t)
 
     def at(self, times: Floats) -> ToolRows:
-        """Return the tool at times (m,) [s]; where two pieces meet, on the second one."""
+        """Return the tool at times (m,) [s]; where two pieces meet, on the later piece."""
         piece = np.clip(
             np.searchsorted(self.times, times, side='right') - 1, 0, len(self.positions) - 1
         )
@@ -149,7 +149,7 @@ class ToolSplinePath:
 
     rests_at_points: ClassVar[bool] = False
     spline: ToolSpline
-    #: (n,) the numbers of samples with which to measure them.
+    #: (n,) the number of samples that measure the extent of each piece.
     sample_count: Indices
 
     def rows(self, number: Indices, t: Floats) -> Floats:

@@ -3,10 +3,10 @@
 """
 Plan the joint path of a whole goal: the curve of each segment and its joint configurations.
 
-Lines and arcs that follow each other, with the blends between them, are a *run*: its poses are
-known beforehand, so the joints are solved at once. A joint move ends a run, because it begins in
-the configuration in which the run arrives. So does a line that has to become a joint move
-(``on_posture_change: movej``): the joint move replaces it, and the rest is solved again.
+Consecutive lines and arcs, with the blends between them, form a *run*. The poses of a run are
+known beforehand, so its joints are solved in one pass. A joint move ends a run, because it begins
+in the configuration in which the run arrives. A line that has to become a joint move
+(``on_posture_change: movej``) also ends a run: it is replaced, and the rest is solved again.
 """
 
 from __future__ import annotations
@@ -66,15 +66,16 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 from ur_cartesian_driver.planning.request.program_features import check_wait
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
-#: Solutions that differ by less are the same [rad].
+#: Solutions that differ by less than this are the same [rad].
 SAME_SOLUTION = 1e-6
-#: How far from a joint line the arm may leave a blend into it [rad].
+#: Largest distance of the arm from a joint line where the blend into the line ends [rad].
 _MAX_LINE_OFFSET = 0.05
-#: Segments of the first run where lines may become joint moves; each later one doubles.
+#: Maximum length of the first run, in segments, if lines may become joint moves; the maximum
+#: doubles after each solved run, and is reset after a replacement.
 _FIRST_RUN = 8
 
 _JOINT, _PROCESS = SegmentType.JOINT, SegmentType.PROCESS
-#: The refusals of a line or an arc for which a joint move may replace it.
+#: Refusals of a line or an arc that a joint move may avoid.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
 
@@ -83,8 +84,8 @@ class JointPathPlanner:
     Plans the segments of one goal, one after the other, from the pose of the robot.
 
     :param targets: the poses of all waypoints in base (n, 7).
-    :param remarks: on changed or ignored fields; added to.
-    :param reasons: by waypoint, for a primitive other than the plain one; added to.
+    :param remarks: list to which remarks on changed or ignored fields are appended.
+    :param reasons: by waypoint, lists to which the reasons for a special primitive are appended.
     """
 
     def __init__(
@@ -110,8 +111,9 @@ class JointPathPlanner:
         Return every segment with its curve, its blends and the configuration at its end.
 
         :param begin: index of the first waypoint with a motion.
-        :param T_base_tcp: pose of the tool at the start, ``q`` the joint positions [rad].
-        :raises GoalRefused: the arm cannot go there.
+        :param T_base_tcp: pose of the tool at the start.
+        :param q: joint positions at the start [rad].
+        :raises GoalRefused: the arm cannot follow the path.
         """
         self.q_start = self._q = q
         self._parts: list[PathSamples] = []
@@ -144,7 +146,7 @@ class JointPathPlanner:
         """
         Solve the segments from k to stop; return the row to continue with.
 
-        That is k again if one of them has become a joint move.
+        The row is k again if a segment of the run has become a joint move.
         """
         drafts = self._drafts
         self._make_blends(k, stop)
@@ -169,13 +171,13 @@ class JointPathPlanner:
         return stop
 
     def _add(self, joint_path: JointPath, measures: Floats) -> None:
-        """Add joints solved from the arm's place, and move the arm to their end."""
+        """Add a solved joint path, and continue from the configuration at its end."""
         self._parts.append(PathSamples.of(joint_path, measures))
         if len(joint_path.q):
             self._q = vector6(joint_path.q[-1].tolist())
 
     def _make_blends(self, k: int, stop: int) -> None:
-        """Make the blends of a run, including the one into it; leave room for that after it."""
+        """Make the blends of a run and the one before it; leave room for the one after it."""
         drafts, path, first = self._drafts, self._path, max(k - 1, 0)
         path.remove_blends(first, stop)
         rows = first + np.flatnonzero(drafts.is_blended[first:stop])
@@ -188,12 +190,12 @@ class JointPathPlanner:
             check_blend_parameters(drafts.begin + first + row, float(u_join), float(u_leave))
 
     def _pieces(self, k: int, stop: int) -> CurvePieces:
-        """Return the pieces from where the path is solved to where the last segment is left."""
+        """Return the pieces from the end of the solved path to the end of the last segment."""
         path, rows = self._path, np.arange(k, stop)
         begin, end = path.u_join[rows], path.u_leave[rows]
         after_blend, before_blend = path.has_blend_before[rows], path.has_blend_after[rows]
         is_used = np.stack([after_blend, (end > begin) | ~(after_blend | before_blend)], axis=1)
-        is_used[0, 0] = False  # the entry
+        is_used[0, 0] = False  # added by _entry()
         end = np.minimum(
             end, begin + self._max_path_length / np.maximum(path.curves.length[rows], 1e-300)
         )
@@ -204,7 +206,7 @@ class JointPathPlanner:
         )
 
     def _entry(self, k: int) -> Floats:
-        """Return the piece into a segment: the blend, or the rest of the segment before."""
+        """Return the piece before a segment: the blend, or the rest of the previous segment."""
         if k > 0 and self._path.radius[k - 1] > 0.0:
             return np.array([(2.0 * k - 1.0, 0.0, 1.0)])
         if k > 0 and self._drafts.solved_until[k - 1] < 1.0:
@@ -212,12 +214,12 @@ class JointPathPlanner:
         return np.empty((0, 3))
 
     def _curve_pieces(self, pieces: Floats) -> CurvePieces:
-        """Return pieces, of which each row has the number of the curve, begin and end."""
+        """Return the pieces given by rows of curve number, begin and end."""
         number, begin, end = pieces.T
         return CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
 
     def _arrivals(self, k: int, stop: int, joint_path: JointPath) -> Floats:
-        """Return the configurations (n, 6) at the waypoints of segments, as far as solved."""
+        """Return the configurations (n, 6) at the waypoints of solved segments."""
         if not len(joint_path.q):
             return np.tile(self._q, (stop - k, 1))
         indices = self._drafts.begin + np.arange(k, stop)
@@ -225,7 +227,8 @@ class JointPathPlanner:
         q = joint_path.q[np.maximum(last, 0)]
         rounded = np.flatnonzero(self._path.u_leave[k:stop] < 1.0)
         if len(rounded):
-            # The arm does not reach it, but the report and joint moves from there need it.
+            # The arm does not reach a blended waypoint, but the report and joint moves that begin
+            # at the waypoint need its configuration.
             ends = self._path.curves.end[k + rounded]
             there = nearest_rows(
                 self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
@@ -251,7 +254,7 @@ class JointPathPlanner:
         )
 
     def _replace(self, row: int, refusal: GoalRefused) -> None:
-        """Make a segment a joint move, or refuse the goal."""
+        """Replace a segment by a joint move, or refuse the goal."""
         point = self._drafts.begin + row
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
@@ -290,14 +293,14 @@ class JointPathPlanner:
         drafts.solved_until[k] = end
 
     def _start_joints(self, k: int) -> Joints:
-        """Return the configuration in which a joint move begins: that at the waypoint before."""
+        """Return the configuration at the previous waypoint, where a joint move begins."""
         if k == 0:
             return self.q_start
         solved_until = self._drafts.solved_until[k - 1]
         if solved_until == 1.0 or self._path.curves.is_joint_line[k - 1]:
             return vector6(self._drafts.joints[k - 1].tolist())
         # A blended waypoint may be out of reach, but not one at which a joint line begins: the
-        # robot needs the joints in which the rest of the segment would arrive.
+        # line starts from the configuration in which the rest of the segment would arrive.
         rest = self._curve_pieces(np.array([(2.0 * k - 2.0, solved_until, 1.0)]))
         joint_path = solve_joint_path(self.kinematics, rest, self._q)
         if joint_path.refusal is not None:
@@ -305,7 +308,7 @@ class JointPathPlanner:
         return vector6(joint_path.q[-1].tolist())
 
     def _solve_entry(self, k: int, line: JointLineCurve) -> None:
-        """Solve what leads into a joint move."""
+        """Solve the piece that leads into a joint move."""
         entry = self._entry(k)
         if not len(entry):
             return
@@ -333,7 +336,7 @@ class JointPathPlanner:
 
     def _add_joint_move(self, piece: Floats) -> None:
         joint_path = sample_joint_move(self.kinematics, self._curve_pieces(piece), self._path)
-        # Singularities do not matter here.
+        # Singularities do not matter to joint moves.
         self._add(joint_path, np.full((len(joint_path.t), 3), np.inf))
 
     def _remark_stops(self) -> None:
@@ -371,13 +374,13 @@ class JointPathPlanner:
         return geometries
 
     def _has_no_motion(self) -> Flags:
-        """Tell which segments neither move nor turn the tool, nor the joints (n,)."""
+        """Return whether each segment leaves the tool and the joints where they are (n,)."""
         curves = self._path.curves
         turn = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         return (curves.length <= SAME_POSITION) & (turn <= SAME_ANGLE)
 
     def _at_first_point(self, geometries: SegmentGeometries) -> SegmentGeometries:
-        """Return the segments of which the first leads to where the robot already is."""
+        """Return the geometries for a first segment that ends where the robot already is."""
         time = float(geometries.times[0])
         waits = time > 0.0
         wait_clause = f', and waits {time:g} s' if waits else ''

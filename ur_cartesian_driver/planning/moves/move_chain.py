@@ -3,13 +3,14 @@
 """
 The timing of a chain of moves, as the controller carries it out; a row for each move.
 
-The controller knows one move ahead. It plans each move to rest at its waypoint. The call of the
-next one comes where the blend begins: there the path is cut, the rate of the blend changes evenly,
-and the rest of the next move begins with the speed at the end of the blend. So a move depends on
-the one before only by its handover (:class:`Handover`), and most moves forget it. All rows are
-computed at once, then the rows with a changed handover again, until none has changed.
+The controller looks one move ahead, and plans each move to come to rest at its waypoint. Where the
+blend begins, the next move is called: the current path is cut there, the rate in the blend changes
+linearly over time, and the rest of the next move begins with the speed at the end of the blend. So
+a move depends on the previous one only through the handover (:class:`Handover`), and what most
+moves hand over does not depend on what they received. All rows are computed at once; then those
+whose handover has changed are computed again, until no handover changes.
 
-Lengths are measured as the robot does: in metres, or radians where the turn or a joint leads.
+Lengths are measured as by the robot: in metres, or in radians if the turn or a joint leads.
 """
 
 from __future__ import annotations
@@ -23,17 +24,17 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.plan.plan import BlendEntry
 
-#: To be in time, the part behind a blend is driven at most this much faster than the mean.
+#: After a blend, a late move with a time goes at most this many times faster than its mean speed.
 _MAX_CATCH_UP = 2.0
-#: A handover that changes by less is the same (relative).
+#: Relative change below which a handover counts as unchanged.
 _SAME = 1e-10
-#: A point is in time within this [s]; so often neighbours are fitted to each other at most.
+#: Largest deviation at which a point is in time [s]; greatest number of rounds of fits.
 _IN_TIME = 1e-7
 _MAX_FITS = 60
-#: Steps of a fit, which takes one more from where times differ by less than this (relative).
+#: Greatest number of steps of a fit; relative error of the times below which it ends.
 _FIT_STEPS = 14
 _SAME_TIME = 1e-13
-#: The part of the mean speed below which no move is slowed.
+#: No move is slowed below this fraction of the mean speed that its time requires.
 _MIN_RATE = 0.2
 _TINY = 1e-300
 
@@ -49,11 +50,11 @@ class _Columns:
         return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls.__slots__)).T.copy())
 
     def take(self, rows: Indices) -> Self:
-        """Return some rows."""
+        """Return the given rows."""
         return type(self)(*[getattr(self, name)[rows] for name in self.__slots__])
 
     def put(self, rows: Indices, other: Self) -> None:
-        """Replace some rows."""
+        """Replace the given rows."""
         for name in self.__slots__:
             getattr(self, name)[rows] = getattr(other, name)
 
@@ -62,26 +63,27 @@ class _Columns:
 class Moves(_Columns):
     """Per-move parameters on the wire; lengths in m or rad, whichever leads."""
 
-    #: From waypoint to waypoint.
+    #: Length from waypoint to waypoint, with the greatest speed and acceleration.
     length: Floats
     speed: Floats
     acceleration: Floats
-    #: On the wire [s]; 0 = speed and acceleration count, else they give ``ramp_part`` only: the
-    #: part of its time in which it speeds up, and that in which it brakes.
+    #: Time on the wire [s]; 0 = speed and acceleration apply.
     time: Floats
+    #: Fraction of its time for which a move with a time speeds up; it brakes as long.
     ramp_part: Floats
-    #: It brakes from full speed within this length; inf = with its acceleration.
+    #: Length within which the move brakes from full speed; inf = it brakes with its acceleration.
     stops_within: Floats
-    #: Length in the blend before it and in the one after it, 0 = it rests there.
+    #: Lengths in the blends before and after the move; 0 = the arm rests there.
     head: Floats
     tail: Floats
-    #: Length for a unit of ``s``, where the blend before it ends and where the one after begins.
+    #: Length per unit of the blend's parameter ``s``: at the end of the blend before the move, and
+    #: at the beginning of the blend after it.
     exit_rate: Floats
     entry_rate: Floats
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; of a move with a time those from rest to rest."""
+        """Accelerations; for a move with a time, the one that it needs from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -96,11 +98,11 @@ class Moves(_Columns):
 class Handover(_Columns):
     """The state that a move hands over to the next one where the blend between them begins."""
 
-    #: Rate of ``s`` there [1/s], 0 = no blend.
+    #: Rate of the blend's parameter ``s`` [1/s]; 0 = no blend.
     rate: Floats
-    #: Time that the move before still has until it would rest at its waypoint [s].
+    #: Time until the first of the two moves would rest at its waypoint [s].
     remaining: Floats
-    #: Its acceleration and, if it has a time, its length; in units of ``s``.
+    #: Acceleration of the first move and, if it has a time, its length; in units of ``s``.
     acceleration: Floats
     length: Floats
 
@@ -110,32 +112,32 @@ class MoveTimes(_Columns):
     """
     The execution of moves by the controller.
 
-    Each has a profile from the blend before it to rest at its waypoint, of which the blend after
-    it takes the end away: it changes to the cruise, and brakes from there to rest.
+    Each move has a profile from the end of the blend before it to rest at its waypoint: its speed
+    changes to the cruising speed, and from there to 0. The blend after the move cuts off the end.
     """
 
-    #: The rate of ``s`` at the begin and at the end of the blend before it, 0 = none [1/s].
+    #: Rates of ``s`` at the beginning and end of the blend before the move [1/s]; 0 = no blend.
     begin_rate: Floats
     end_rate: Floats
-    #: The profile.
+    #: The profile: length, speeds at its beginning and while cruising, and accelerations.
     length: Floats
     enter: Floats
     cruise: Floats
     acceleration: Floats
     braking: Floats
-    #: The part that the blend after it takes away; time until there [s], and speed there.
+    #: Length that the blend after the move cuts off; time until the cut [s], and the speed there.
     tail: Floats
     between: Floats
     leave: Floats
 
     @property
     def blend_time(self) -> Floats:
-        """Time in the blend before it [s]."""
+        """Time in the blend before each move [s]."""
         return ramp_time(self.begin_rate, self.end_rate, 1.0)
 
     @property
     def blend_half(self) -> Floats:
-        """Time in the first half of the blend before it, up to the point [s]."""
+        """Time in the first half of the blend before each move, up to the point [s]."""
         return ramp_time(self.begin_rate, self.end_rate, 0.5)
 
     @property
@@ -147,12 +149,12 @@ class MoveTimes(_Columns):
 
     @property
     def begins(self) -> Floats:
-        """When the part between the blends begins [s]."""
+        """Time at which each move leaves the blend before it [s]."""
         blend = self.blend_time
         return np.cumsum(blend + self.between) - self.between
 
     def time_at(self, distance: Floats) -> Floats:
-        """Return when a distance on the profile is done, from its begin [s]."""
+        """Return the time from the beginning of the profile to a distance on it [s]."""
         enter, cruise = self.enter, np.maximum(self.cruise, _TINY)
         ramp_in = _ramp_distance(enter, cruise, self.acceleration)
         ramp_out = _ramp_distance(0.0, cruise, self.braking)
@@ -163,7 +165,7 @@ class MoveTimes(_Columns):
         speed = np.sqrt(np.maximum(enter * enter + 2.0 * rate * x, 0.0))
         time = 2.0 * x / np.maximum(enter + speed, _TINY)
         time += np.clip(distance - ramp_in, 0.0, even) / cruise
-        # The time of braking so far: all of it less the rest.
+        # Time spent braking: the whole braking time less what is left of it.
         to_come = np.sqrt(2.0 * np.minimum(left, ramp_out) / self.braking)
         time += np.maximum(cruise / self.braking - to_come, 0.0)
         return time
@@ -188,7 +190,7 @@ class MoveTimes(_Columns):
 
 
 def ramp_time(begin: Floats, end: Floats, s: Floats | float) -> Floats:
-    """Return when ``s`` (n,) is reached in blends whose rates change evenly over time [s]."""
+    """Return the time to reach ``s`` (n,) in blends whose rates change linearly over time [s]."""
     there = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * s, 0.0))
     time: Floats = np.where(end > 0.0, 2.0 * s / np.maximum(begin + there, _TINY), 0.0)
     return time
@@ -201,13 +203,13 @@ def _ramp_distance(speed: Floats | float, cruise: Floats, acceleration: Floats) 
 
 class MoveChain:
     """
-    Moves one after the other, and how they are carried out.
+    A sequence of moves, and the times of its execution.
 
-    :param first: where the first blend begins, if the first move is under way already.
+    :param first: state at the beginning of the first blend, if the first move has already begun.
     """
 
     def __init__(self, moves: Moves, first: BlendEntry | None = None) -> None:
-        """Follow the moves."""
+        """Compute the times of all moves."""
         n = len(moves.length)
         self.moves, self._first = moves, first
         self._handed = Handover.of(np.zeros((n, 4)))
@@ -224,7 +226,7 @@ class MoveChain:
         return np.concatenate((before[1:], np.zeros((1, 5))))
 
     def follow(self, rows: Indices) -> None:
-        """Compute rows whose moves have changed, and those behind them that it concerns."""
+        """Recompute rows whose moves have changed, and the later rows that this affects."""
         while len(rows):
             moves = self.moves.take(rows)
             times = _carry_out(moves, self._handed.take(rows))
@@ -240,7 +242,7 @@ class MoveChain:
             self._handed.put(rows, new.take(np.flatnonzero(changed)))
 
     def durations_with(self, rows: Indices, moves: Moves) -> Floats:
-        """Return the durations of some moves with other speeds, all others as they are [s]."""
+        """Return the durations of rows with other moves, each as if only it had changed [s]."""
         times = _carry_out(moves, self._handed.take(rows))
         after = np.minimum(rows + 1, len(self.moves.length) - 1)
         handed = _hand_over(moves, times)
@@ -256,11 +258,11 @@ class MoveChain:
         at_rate: Callable[[Indices, Floats], Moves],
     ) -> None:
         """
-        Change speeds so that the moves take given times, as far as they can.
+        Change speeds so that the moves take the wanted times, as far as possible.
 
-        :param wanted: times from point to point (n,) [s]; NaN = they stay as they are.
-        :param rate: (n,) on which their speeds depend; none is faster than ``max_rate``.
-        :param at_rate: returns some moves at rates.
+        :param wanted: times from point to point (n,) [s]; NaN = the move stays as it is.
+        :param rate: rates of the moves (n,) [1/s], changed in place up to ``max_rate``.
+        :param at_rate: returns the moves of given rows at given rates.
         """
         asked = np.isfinite(wanted)
         asked[0] &= self._first is None
@@ -268,7 +270,7 @@ class MoveChain:
         for _ in range(_MAX_FITS):
             spent = self.times.durations
             off = spent - wanted
-            # Where a move cannot be slower and is early, the next one makes up for it.
+            # If a move is early and cannot be slower, the next one makes up for it.
             early = np.where((rate <= lowest) & (off < -_IN_TIME), -off, 0.0)
             if self._first is not None:
                 early[0] = -off[0]
@@ -293,12 +295,12 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
     begin, end = _blend_rates(moves, handed)
     enter = end * moves.exit_rate
     rest, braking = moves.length - moves.head, moves.braking
-    # By speed: as fast as it gets, and in time to brake.
+    # By speed: the greatest speed from which the move can still brake.
     a = moves.acceleration
     peak = np.minimum(
         moves.speed, np.sqrt((2.0 * rest + enter**2 / a) / (1.0 / a + 1.0 / braking))
     )
-    # By time: the sum of times is kept.
+    # By time: blend and profile take the move's own time and the rest of the previous move's.
     timed, time = moves.time > 0.0, moves.time + handed.remaining
     left = np.maximum(
         time - ramp_time(begin, end, 1.0),
@@ -341,9 +343,10 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     """
     Return the rates at which blends begin and end.
 
-    A rate changes to the next cruising speed, within three bounds: neither part gets faster than
-    it accelerates (r'' = 2 r s'^2), and the rest of the move must suffice to brake. A move with a
-    time accelerates as from rest to rest, or as the next one does in proportion to their lengths.
+    The rate changes to the cruising speed of the next move, within three bounds: neither move may
+    exceed its acceleration in the blend (r'' = 2 r s'^2), and the rest of the next move must
+    suffice to brake. A move with a time has the acceleration that it needs from rest to rest; the
+    move before the blend also that of the next one, in proportion to their lengths, if greater.
     """
     blended, timed = handed.rate > 0.0, moves.time > 0.0
     time = np.maximum(moves.time + handed.remaining, _TINY)
@@ -366,9 +369,9 @@ def _fit(
     highest: Floats,
 ) -> Floats:
     """
-    Return the rates at which moves take given times, or the bounds.
+    Return the rates at which moves take the wanted times, or the bounds.
 
-    Times are nearly powers of the rate: the secant between two rates with the time in between.
+    Times are nearly powers of the rate, so the secant method is applied to logarithms.
     """
     low, high, x = np.log([lowest, highest, np.clip(rate, lowest, highest)])
     took = durations(np.tile(rows, 3), np.concatenate([lowest, highest, np.exp(x)]))
@@ -378,7 +381,7 @@ def _fit(
         slow = f > 0.0
         low, f_low_new = np.where(slow, x, low), np.where(slow, f, f_low)
         high, f_high_new = np.where(slow, high, x), np.where(slow, f_high, f)
-        # The end that stays a second time counts half, so that it moves too.
+        # Illinois method: the value at an end that stays a second time is halved.
         f_high = np.where(slow & (side > 0.0), 0.5 * f_high_new, f_high_new)
         f_low = np.where(~slow & (side < 0.0), 0.5 * f_low_new, f_low_new)
         side = np.where(slow, 1.0, -1.0)

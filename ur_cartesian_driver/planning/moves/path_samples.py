@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints
 from ur_cartesian_driver.planning.geometry.samples import group_begins, last_greatest
 from ur_cartesian_driver.planning.preflight.joint_path_solver import JointPath
 
-# Samples whose parameters differ by less say nothing about a speed.
+# Samples whose parameters differ by less than this do not define a speed.
 _MIN_STEP = 1e-12
 
 
@@ -23,12 +23,13 @@ _MIN_STEP = 1e-12
 class JointSpeedBounds:
     """The times of whole segments at the speed limits of the joints; columns (n,)."""
 
-    #: At the rate of the sample where the joints are fastest [s]; the leading joint there, and the
-    #: fraction of the segment.
+    #: Time at the rate that the sample with the fastest joints allows [s]; the leading joint in
+    #: that sample, and its fraction of the segment.
     times: Floats
     joints: Indices
     fractions: Floats
-    #: At the rate of the sample where they are slowest; with some joint at its limit everywhere.
+    #: Time at the rate that the sample with the slowest joints allows [s]; time if some joint is
+    #: at its limit everywhere [s].
     shortest_times: Floats
     times_at_limits: Floats
 
@@ -37,11 +38,11 @@ class JointSpeedBounds:
 class BlendSamples:
     """The samples in all blends of a goal; columns (n,)."""
 
-    #: The waypoint that the blend rounds, and the parameter half-way to the sample before.
+    #: Waypoint that the blend rounds; its parameter ``s`` half-way from the previous sample.
     index: Int32s
     s: Floats
-    #: For a unit of ``s`` there: time at the joint speed limits [s], with the joint that takes
-    #: longest, and distance of the tool [m].
+    #: Per unit of ``s``: the time at the joint speed limits [s], the joint that takes longest, and
+    #: the distance that the tool moves [m].
     joint_time: Floats
     joint: Indices
     tool_distance: Floats
@@ -52,14 +53,15 @@ class PathSamples(NamedTuple):
 
     segment: Int32s
     fraction: Floats
-    #: (n, 6) [rad], (n, 7), and (n, 3) distances from singularities, inf where they do not count.
+    #: Joint positions (n, 6) [rad], tool poses (n, 7), and distances from singularities (n, 3),
+    #: inf where singularities do not matter.
     q: Floats
     poses: Floats
     measures: Floats
-    #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
+    #: Index of the waypoint at the end of the curve, or of the one that the blend rounds.
     waypoint: Int32s
     is_blend: Flags
-    #: The parameter on the curve, and its change from the sample before.
+    #: The parameter on the curve, and its change from the previous sample.
     t: Floats
     step: Floats
 
@@ -68,7 +70,7 @@ class PathSamples(NamedTuple):
         """
         Return the samples of a joint path.
 
-        :param measures: (n, 3) distances from singularities, inf where they do not count.
+        :param measures: (n, 3) distances from singularities, inf where they do not matter.
         """
         pieces, piece, t = path.pieces, path.piece, path.t
         is_first = np.diff(piece, prepend=-1) != 0
@@ -90,7 +92,7 @@ def speed_bounds(
     arm: Arm, of: PathSamples, q_start: Joints
 ) -> tuple[JointSpeedBounds, BlendSamples]:
     """
-    Return what bounds the speeds of whole segments, and those in blends.
+    Return the speed bounds of whole segments, and the samples in blends.
 
     :param q_start: the configuration before the first sample [rad].
     """
@@ -111,7 +113,8 @@ def speed_bounds(
         joint=joint[on_blend],
         tool_distance=(np.append(0.0, distance) / step)[on_blend],
     )
-    # A sample in a blend counts for both segments. Joints may reverse there.
+    # A sample in a blend adds half its time to each segment, and does not bound the rate of
+    # either: joints may reverse there.
     joint_time[on_blend] *= 0.5
     local_time[on_blend], rate[on_blend] = np.inf, 0.0
     rows = np.concatenate([np.arange(len(rate)), on_blend])

@@ -27,7 +27,7 @@ def segment_lines(
     """
     Return the lines of all segments.
 
-    :param reasons: by point, for the choice of the primitive.
+    :param reasons: by point, the reasons for the choice of its primitive.
     """
 
     def make() -> list[str]:
@@ -56,7 +56,7 @@ def segment_lines(
 
 
 def stop_remarks(geometries: SegmentGeometries) -> list[str]:
-    """Return at which inner points the arm stops."""
+    """Return the remarks on inner points at which the arm stops."""
     lines: list[str] = []
     add_remark(
         lines,
@@ -68,7 +68,7 @@ def stop_remarks(geometries: SegmentGeometries) -> list[str]:
 
 
 def blend_remarks(goal: Goal, geometries: SegmentGeometries, timings: SegmentTimings) -> list[str]:
-    """Return by how much the end may be off its planned time, if the goal has blends."""
+    """Return the remark on the error of the planned end time, if the goal has blends."""
     if not geometries.path.has_blend_after.any() or geometries.is_optimized.any():
         return []
     planned, (least, greatest) = timings.durations.sum(), timings.bounds()

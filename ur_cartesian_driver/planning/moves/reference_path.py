@@ -16,7 +16,7 @@ from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
 
 #: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8
-#: Rows at a time, so that intermediate arrays stay in the CPU cache.
+#: Rows that are computed at a time, so that intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
 
 
@@ -25,8 +25,8 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     Return the path that the robot is expected to follow, blends included.
 
     Lines are sampled at their ends and where their acceleration changes, other curves so that
-    their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); no two rows
-    differ by more than 10 degrees.
+    their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); successive
+    rows differ by at most 10 degrees.
 
     :param begin: index of the waypoint at the end of the first segment.
     """
@@ -36,7 +36,7 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
     poses = np.concatenate([[start.row()], path.rows(number, at)])
     keep_hemisphere(poses)
-    # Half of a blend counts to each of its segments.
+    # Each half of a blend belongs to one of its segments.
     behind = np.append(path.u_join[1:], 0.0)[row]
     rounded = np.where(
         at > 0.5, (2.0 * at - 1.0) * behind, 1.0 - (1.0 - 2.0 * at) * (1.0 - path.u_leave[row])
@@ -52,11 +52,11 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
 
 
 def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
-    """Return the curves (n,) of all rows but the start, by number, and the places on them (n,)."""
+    """Return the curve numbers (n,) of all rows but the start, and the parameters there (n,)."""
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
     n = np.maximum(1, np.ceil(curves.samples * span)).astype(np.intp)
-    # Joint moves evenly: preview finds the joint positions by counting.
+    # Joint moves are sampled evenly, because preview finds the joint positions by counting rows.
     n = np.where(curves.is_joint_line, np.maximum(n, _MIN_JOINT_SAMPLES), n)
     row, k = counted(n - 1)
     between = begin[row] + span[row] * k / n[row]
@@ -70,7 +70,7 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
         order = np.lexsort((at_knots, own))
         own, at_knots = own[order], at_knots[order]
     blends = np.flatnonzero(path.has_blend_after)
-    # One of them at the point.
+    # An even number of pieces puts one sample at the point.
     n = path.blend_samples[blends] + path.blend_samples[blends] % 2
     blend, k = counted(n)
     number = np.concatenate([2 * own, 2 * rows, 2 * blends[blend] + 1])
@@ -87,9 +87,9 @@ def _times(
     at: Floats,
 ) -> Floats:
     """
-    Return when each row is expected (n,) [s].
+    Return the expected time of each row (n,) [s].
 
-    :param number: (n,) of its segment; rows in a blend count to the segment behind it.
+    :param number: segment of each row (n,); rows in a blend belong to the segment after it.
     """
     found, span = times.begins[number], np.maximum(path.u_leave - path.u_join, 1e-300)
     between = np.flatnonzero(~on_blend)

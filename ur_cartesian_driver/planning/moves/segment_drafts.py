@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Segment drafts: the segments as the goal alone defines them, before the kinematics is known.
+Segment drafts: the segments as the goal alone defines them, without the arm's kinematics.
 
 Lines and arcs follow from the points; joint moves do not, because they begin in the configuration
 in which the path before them arrives.
@@ -37,16 +37,16 @@ _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _IN_JOINT_SPACE = type_table(JOINT_SPACE_TYPES)
-#: The rest of a segment between blends that touch, or that reach its end [m]: more than the
-#: rounding of two poses and two radii to micrometres.
+#: Smallest length that blends leave of a segment [m]: more than the rounding of two poses and two
+#: radii to micrometres.
 _MIN_BLEND_GAP = 5e-6
-#: Motions that only some others can be blended into; all others stop before them.
+#: By type of motion: the only types from which the robot can blend into it.
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
     SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
     SegmentType.OPTIMIZED_JOINT: (_LINEAR, _JOINT, *_OPTIMIZED),
 }
-#: By the types of two segments, whether the robot can blend from the one into the other.
+#: Whether the robot can blend from one type of segment (row) into another (column).
 _CAN_BLEND = np.array(
     [
         [first in _BLENDS_FROM.get(second, SegmentType) for second in SegmentType]
@@ -62,7 +62,7 @@ class SegmentDrafts:
     :param targets: poses of all waypoints in base (n, 7).
     :param begin: index of the first waypoint with a motion.
     :param start: pose of the tool in base.
-    :param remarks: on ignored or changed fields; added to.
+    :param remarks: list to which remarks on ignored or changed fields are appended.
     :raises InvalidGoal: the points define no line or arc, or the first blend is too large.
     """
 
@@ -75,18 +75,18 @@ class SegmentDrafts:
         options: PlanningOptions,
         remarks: list[str],
     ) -> None:
-        """Draw lines and arcs."""
+        """Construct the lines and arcs."""
         self._goal, self._options, self._remarks = goal, options, remarks
         self.begin, self.targets = begin, targets[begin:]
         self.segments = goal.motions[begin:]
         types = self.segments.types
-        #: (n,) numbers of types: AUTO resolved, JOINT where that replaces a line or an arc.
+        #: (n,) numbers of types: AUTO is resolved, JOINT also if it replaces a line or an arc.
         self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
-        #: (n,) which are straight lines in joint space.
+        #: (n,) whether each segment is a straight line in joint space.
         self.is_joint_move: Flags = _IN_JOINT_SPACE[self.kinds]
-        # By row, so that they can be put in order.
+        # Remarks with their rows, so that they can be put in order.
         found: list[tuple[int, str]] = []
-        #: (n,) [m]
+        #: (n,) blend radii [m].
         self.radii = self._radii(found)
         self.path = BlendedPath(self._curves(start, found))
         remarks += [text for _, text in sorted(found, key=lambda remark: remark[0])]
@@ -107,8 +107,9 @@ class SegmentDrafts:
 
     def _find_blends(self) -> None:
         can_blend = np.append(_CAN_BLEND[self.kinds[:-1], self.kinds[1:]], True)
-        wants_blend = self.radii > SAME_POSITION  # the wire rounds such a radius to 0
-        #: (n,) which are blended into the next one, and which stop because the robot cannot.
+        wants_blend = self.radii > SAME_POSITION  # the wire rounds smaller radii to 0
+        #: (n,) whether each segment is blended into the next one, or stops because the robot
+        #: cannot blend these two.
         self.is_blended, self.stops_instead = wants_blend & can_blend, wants_blend & ~can_blend
 
     def stop_at(self, row: int) -> None:
@@ -117,7 +118,7 @@ class SegmentDrafts:
         self._find_blends()
 
     def make_joint_move(self, row: int) -> None:
-        """Replace a line or an arc by a joint move; what follows then begins at its waypoint."""
+        """Replace a line or an arc by a joint move; the next segment begins at its waypoint."""
         self.kinds[row], self.is_joint_move[row] = _JOINT, True
         self._find_blends()
         after = row + 1
@@ -158,7 +159,7 @@ class SegmentDrafts:
         return curves
 
     def _arc(self, row: int, start: Pose) -> tuple[ArcCurve, str]:
-        """Return the arc of a segment from a pose, and a remark on it or ''."""
+        """Return the arc of a segment that begins at a pose, and a remark on it or ''."""
         segments, index, target = self.segments, self.begin + row, self.target(row)
         mode = ArcMode(int(segments.arc_modes[row]))
         if mode != ArcMode.FIXED:
@@ -208,7 +209,7 @@ class SegmentDrafts:
         """
         Shorten blends that touch each other or the end of a segment.
 
-        Rounded to micrometres they would overlap on the wire, and the robot would skip a point.
+        Rounded to micrometres they could overlap on the wire, and the robot would skip a point.
         """
         radii = self.radii
         positions = np.concatenate([[start.position], self.targets[:, :3]])

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The geometry of all segments in columns: curves, blends, joints, and what bounds the speed."""
+"""The geometry of all segments in columns: curves, blends, joints, and speed bounds."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ _IS_OPTIMIZED = type_table(OPTIMIZED_TYPES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentGeometries:
-    """The segments of a goal with their curves and joints, still without speed; a row for each."""
+    """The segments of a goal with curves and joints, still without speeds; a row for each."""
 
-    #: Index of the waypoint at the end of the first.
+    #: Index of the waypoint at the end of the first segment.
     begin: int
-    #: (n,) the numbers of the types that are sent: AUTO resolved, JOINT where that replaces a line
-    #: or an arc.
+    #: (n,) the numbers of the types that are sent: AUTO is resolved, JOINT also if it replaces a
+    #: line or an arc.
     kinds: Int64s
     waypoints: WaypointRows
     segments: SegmentRows
     #: The curves with their blends: ``path.curves``, ``path.u_join``, ``path.u_leave``, ...
     path: BlendedPath
-    #: (n, 6) configurations at the ends [rad].
+    #: (n, 6) configurations at the ends of the segments [rad].
     joints: Floats
-    #: (n,) times from the goal [s]; NaN = by speed.
+    #: (n,) durations from the goal [s]; NaN = the segment has a speed instead.
     times: Floats
-    #: What limits their speeds, and their distances from singularities and joint limits.
+    #: Joint speed bounds of the segments; their distances from singularities and joint limits.
     speed_bounds: JointSpeedBounds
     tightest_margins: TightestMargins
-    #: Whether the arm stands at the first point already, and waits until its time.
+    #: Whether the arm is already at the first point, and waits there until the point's time.
     waits: bool = False
 
     def __len__(self) -> int:
@@ -46,11 +46,11 @@ class SegmentGeometries:
 
     @property
     def is_optimized(self) -> Flags:
-        """(n,) whether speeds are fractions of the robot's limits."""
+        """(n,) whether a segment's speed is a fraction of the robot's limits."""
         return _IS_OPTIMIZED[self.kinds]
 
     @property
     def unblended_fractions(self) -> Floats:
-        """(n,) the fractions of them between their blends; blends that touch leave nearly none."""
+        """(n,) the fraction of each segment between its blends; touching blends leave almost 0."""
         fractions: Floats = np.maximum(self.path.u_leave - self.path.u_join, 1e-9)
         return fractions

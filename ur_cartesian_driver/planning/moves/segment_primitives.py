@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Choose the primitives of segments: one for each row.
+Choose the primitive of each segment.
 
-Nearly all are their row of numbers. Arcs, moves to a posture, and moves that older robot programs
-take in another form are objects beside the rows.
+Nearly all primitives are rows of numbers. Arcs, moves to a posture, and moves that older robot
+programs expect in another form are separate objects.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _CLASSES = {
     SegmentType.OPTIMIZED_JOINT: OptimoveJ,
     SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
-#: The kind of the primitive's row, by type; without meaning for an arc.
+#: Kind of the row of numbers, by type of segment; without meaning for an arc.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
 _HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
@@ -70,9 +70,9 @@ def segment_primitives(
     """
     Return the primitive of each segment.
 
-    :param paths: has planned their joints; its remarks and reasons are added to.
-    :raises NotAvailable: the robot program does not know one.
-    :raises InvalidPosture: the arm passes a via in another configuration.
+    :param paths: planner of the segments' joints; gets further remarks and reasons.
+    :raises NotAvailable: the robot program does not support a primitive.
+    :raises InvalidPosture: the arm passes a via in a configuration other than its posture's.
     """
     kinds = geometries.kinds
     moves = MoveRows(
@@ -90,7 +90,7 @@ def segment_primitives(
 
 
 class _SpecialPrimitives:
-    """Makes the primitives that are more than their row of numbers."""
+    """Makes the primitives that a row of numbers cannot express."""
 
     def __init__(
         self, paths: JointPathPlanner, geometries: SegmentGeometries, moves: MoveRows
@@ -100,7 +100,7 @@ class _SpecialPrimitives:
         self._postures = geometries.waypoints.postures
 
     def by_row(self) -> Mapping[int, Primitive]:
-        """Return them by row."""
+        """Return these primitives by row."""
         geometries = self._geometries
         special = geometries.kinds == SegmentType.CIRCULAR
         special |= not takes_q_near(self._options)
@@ -113,7 +113,7 @@ class _SpecialPrimitives:
         point, kind = geometries.begin + row, geometries.kinds[row]
         joints = vector6(geometries.joints[row].tolist())
         primitive: Primitive
-        if geometries.waits and row == 0:  # no move of the robot does: a spline that rests
+        if geometries.waits and row == 0:  # by a spline that rests, as no move of the robot waits
             primitive = Spline(
                 target=self._paths.q_start,
                 velocities=ZERO6,
@@ -133,7 +133,7 @@ class _SpecialPrimitives:
         return primitive
 
     def _q_near(self, row: int, joints: Joints) -> Joints:
-        """Return the chosen solution; a full posture itself where it selects the same one."""
+        """Return the chosen solution, or a full posture itself if it selects that solution."""
         posture = self._postures.get(row)
         wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
         if wanted:
@@ -147,7 +147,7 @@ class _SpecialPrimitives:
         return pose_from_row(self._moves.targets[row].tolist())
 
     def _arc(self, row: int, joints: Joints) -> MoveC:
-        """Return the arc, with joint fields where target or via carry a posture."""
+        """Return the arc, with joint positions for a target or via that has a posture."""
         point, segments = self._geometries.begin + row, self._geometries.segments
         segment_via = segments.via(row)
         assert segment_via is not None
@@ -189,7 +189,7 @@ class _SpecialPrimitives:
         location = segment_field(point, 'via')
         first, last = np.searchsorted(samples.segment, (point, point + 1))
         nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - arc.u_via)))
-        # The orientation of the via does not shape the arc: continue from the arc to its pose.
+        # The via's orientation does not shape the arc, so solve its pose from the arc's joints.
         q = self._kinematics.nearest(via, vector6(samples.q[nearest].tolist()), location)
         chosen, clause = self._kinematics.compare_posture(
             via, geometries.segments.via_postures[row], q, location, self._options.tf_prefix

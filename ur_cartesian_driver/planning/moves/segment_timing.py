@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The speed of each segment, so that times are met within the limits.
+Find the speed of each segment that meets its time within the limits.
 
-``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
-derived so that the time is met. :mod:`~.move_chain` computes how moves and blends follow each
-other; :mod:`~.speed_requests` finds the speeds and times that the goal asks of them.
+``movel`` and ``movej`` accept a time on the wire. ``movec`` and ``movep`` do not: their speed is
+chosen so that they meet the time. :mod:`~.move_chain` computes the times of moves and blends in
+sequence; :mod:`~.speed_requests` finds the speeds and times that the goal requests.
 """
 
 from __future__ import annotations
@@ -31,17 +31,18 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     type_table,
 )
 
-#: Times that differ by less than this factor are the same. One that comes out longer by less than
-#: the second is kept.
+#: Times that differ by less than the first factor are the same. A time that is exceeded by less
+#: than the second factor counts as met.
 _NEARLY, _KEPT = 1.0 + 1e-5, 1.002
-#: Minimum speed that the wire carries accurately enough: it counts in millionths.
+#: Smallest speed that the wire carries accurately enough: it transmits millionths.
 MIN_SPEED = 1e-5
-#: Motions whose blends the robot leaves out if it passes their radius within a control cycle.
+#: Motions whose blend the robot skips if it would cover the blend radius in one control cycle.
 _NEEDS_A_CYCLE = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
-#: What exceeds a limit by less than this factor keeps to it. Faster moves are slowed so often.
+#: A limit exceeded by less than this factor counts as kept. Greatest number of rounds in which
+#: moves that are too fast are slowed.
 _WITHIN = 1.0 + 1e-6
 _MAX_ROUNDS = 40
-#: A point that is passed no earlier than this is in time [s].
+#: A point that is passed early by at most this is in time [s].
 _EARLY = 0.001
 
 
@@ -49,11 +50,11 @@ def shortest_duration(
     length: Floats, speed: Floats, acceleration: Floats, ramps: Floats | float
 ) -> Floats:
     """
-    Return the shortest times of motions that are sent with speeds [s].
+    Return the shortest times of motions that are sent with a speed instead of a time [s].
 
     From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a).
 
-    :param ramps: from and to rest, 0 to 2.
+    :param ramps: number of ramps from or to rest, 0 to 2.
     """
     peak = np.minimum(speed, np.sqrt(2.0 * acceleration * length / np.maximum(ramps, 1e-9)))
     time: Floats = length / peak + 0.5 * ramps * peak / acceleration
@@ -62,18 +63,18 @@ def shortest_duration(
 
 class SegmentTimings:
     """
-    The speeds of segments over time, so that times are met within the limits; columns (n,).
+    The speeds of segments that meet the times within the limits; columns (n,).
 
-    :param running: the first segment as it was planned, where it has been sent.
+    :param running: the first segment as it was planned before, if it has already been sent.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
-    :raises InvalidGoal: a speed is too low for the wire, a blend too small.
+    :raises InvalidGoal: a speed is too low for the wire, or a blend is too small.
     """
 
-    #: Values on the wire; time 0 = speed and acceleration count.
+    #: Values on the wire; time 0 = speed and acceleration apply.
     velocities: Floats
     accelerations: Floats
     wire_times: Floats
-    #: Expected times from point to point [s]; blends are passed in their middle at points.
+    #: Expected times from point to point [s]; blended points are passed in mid-blend.
     durations: Floats
 
     def __init__(
@@ -87,25 +88,26 @@ class SegmentTimings:
         """Begin with the requested speeds and times, and change them until all limits are kept."""
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
-        # Time for a unit of the blend's parameter at the tool's speed limit, and at the arc's [s].
+        # Times per unit of the blend's parameter [s]: at the tool's speed limit, and at the
+        # speed at which the blend's arc needs the greatest linear acceleration.
         distance = blend_samples.tool_distance
         self._tool_time = distance / (options.max_tool_speed or inf)
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
         self._arc_time = distance / np.sqrt(options.max_linear_acceleration * radius)
         self._arc_leads = self._arc_time > np.maximum(blend_samples.joint_time, self._tool_time)
-        #: Where speeds and times come from, with remarks on changes by the limits.
+        #: The requested speeds and times, with remarks on changes due to the limits.
         self.requests = requests = SpeedRequests(geometries, options, model, running)
         n = len(geometries)
         self._time, self._timed, self._rate = requests.time, requests.has_wire_time, requests.rate
         self._speed = requests.speed
         self._least, self._most = requests.acceleration, requests.max_acceleration
         self._wanted = np.maximum(self._time, requests.min_time)
-        #: So much before their times points are passed, for the sake of the next ones [s].
+        #: How long before its time each point is passed, so that the next one is in time [s].
         self._ahead = np.zeros(n)
-        #: The sample in a blend that slows a segment, where that is no limit of its own; else -1.
+        #: Index of the blend sample that slows each segment; -1 = its own limits do, if any.
         self._slowed_at: Indices = np.full(n, -1)
         self._moves = requests.moves()
-        # No time on the wire is less than the robot needs from rest to rest, however it blends.
+        # Even blended moves get no less time on the wire than they need from rest to rest.
         self._max_rate = np.where(
             np.isnan(self._time), self._rate, 1.0 / np.maximum(requests.min_time, 1e-9)
         )
@@ -113,7 +115,7 @@ class SegmentTimings:
         self._rate = np.minimum(self._rate, self._max_rate)
         self._moves = self._at_rate(np.arange(n), self._rate)
         entry = running.blend_entry if running and self._moves.tail[0] > 0.0 else None
-        #: How they follow each other.
+        #: The times of the moves in sequence.
         self.chain = MoveChain(self._moves, entry)
         if entry is not None:
             self._wanted[0] = self.chain.times.between[0] + entry.half
@@ -123,7 +125,7 @@ class SegmentTimings:
         self._remark_changes()
 
     def _solve(self) -> None:
-        """Meet the times within the limits; what cannot be met takes longer."""
+        """Meet the times within the limits; a move that cannot meet its time takes longer."""
         for _ in range(_MAX_ROUNDS):
             wanted = self._wanted - self._ahead + np.append(0.0, self._ahead[:-1])
             self.chain.meet(wanted, self._rate, self._max_rate, self._at_rate)
@@ -135,20 +137,21 @@ class SegmentTimings:
 
     def _go_ahead(self, late: Floats) -> bool:
         """
-        Let points be passed early where the next one would be late; return whether there are any.
+        Pass points early if the next one would be late otherwise; return whether any changed.
 
-        Where a slow move is blended into a fast one they share the speed in the blend.
+        In the blend between a slow move and a fast one, both have the same speed.
         """
         moves = self._moves
         if not late.any():
             return False
-        # What cannot be passed as early as that is not: its time at rest has changed since.
+        # Points that cannot be passed as early as planned get a shorter lead: their moves have
+        # been slowed since.
         back = np.minimum(late, self._ahead)
         self._ahead -= back
         alone = shortest_duration(moves.length, self._speed, self._most, 2.0)
         late = late - back
         late = np.where(self._timed | (self._wanted > alone), late, 0.0)
-        # By how much moves can take less time, so that their own points are passed early.
+        # How much shorter each move can be, so that its own point is passed early.
         spare = np.where(
             self._timed,
             1.0 / self._rate - 1.0 / self._max_rate,
@@ -166,7 +169,7 @@ class SegmentTimings:
     def _set_wire_values(self) -> None:
         requests, moves = self.requests, self._moves
         on_wire = moves.time > 0.0
-        # A third each of speeding up, cruising and braking.
+        # Speeding up, cruising and braking take a third of the time each.
         time = np.where(on_wire, moves.time, 1.0)
         cruise = requests.length / time / (1.0 - RAMP_SHARE)
         sent = moves.acceleration / requests.acceleration_unit
@@ -175,7 +178,7 @@ class SegmentTimings:
         self.wire_times = moves.time
 
     def _at_rate(self, rows: Indices, rate: Floats) -> Moves:
-        """Return moves at rates; a rate beyond the greatest speed stands for more acceleration."""
+        """Return moves at given rates; a rate beyond the greatest speed adds acceleration."""
         moves, speed = self._moves.take(rows), self._speed[rows]
         asked = rate * moves.length
         more = np.maximum(asked / speed, 1.0) ** 2
@@ -185,7 +188,7 @@ class SegmentTimings:
         return moves
 
     def _allow_acceleration(self) -> None:
-        """Let moves that meet a time by their speed accelerate as hard as they may."""
+        """Extend the rates of moves that meet a time by speed, up to their acceleration limit."""
         self._max_rate = np.where(
             self._timed | np.isnan(self._time),
             self._max_rate,
@@ -193,7 +196,7 @@ class SegmentTimings:
         )
 
     def _slow_down(self) -> bool:
-        """Slow moves that are too fast when blended; return whether there are any."""
+        """Slow down the moves that exceed limits when blended; return whether there are any."""
         times = self.chain.times
         over = np.maximum(
             np.maximum(times.cruise, times.enter) / self._speed,
@@ -221,7 +224,7 @@ class SegmentTimings:
         return bool(len(rows))
 
     def _slow_blends(self, rate: Floats, speed: Floats) -> None:
-        """Lower rates and speeds of the moves whose blends are too fast for tool or joints."""
+        """Lower the rates and speeds of moves whose blends are too fast for tool or joints."""
         samples, times = self._samples, self.chain.times
         after = samples.index - self._geometries.begin + 1
         begin, end = times.begin_rate[after], times.end_rate[after]
@@ -242,12 +245,12 @@ class SegmentTimings:
         self._slowed_at[row] = worst
 
     def _is_slowed_in_arc(self) -> Flags:
-        """Tell which segments are slowed because of the arc of a blend (n,)."""
+        """Return whether each segment is slowed because of the arc of a blend (n,)."""
         slowed: Flags = np.append(self._arc_leads, False)[self._slowed_at]  # -1 = none
         return slowed
 
     def _limit_name(self, row: int) -> str:
-        """Return what slows a segment."""
+        """Return the name of the limit that slows a segment."""
         sample, samples = int(self._slowed_at[row]), self._samples
         if sample < 0:
             return self.requests.limits.name(row)
@@ -268,10 +271,10 @@ class SegmentTimings:
 
     def bounds(self) -> tuple[Floats, Floats]:
         """
-        Return bounds of the times of segments, whatever the law by which blends are passed [s].
+        Return the least and greatest times of segments, for any law of passing blends [s].
 
-        At most the arm rests at each point; at least it cruises between the blends and passes each
-        straight across, at the faster of its two speeds.
+        In the greatest times the arm rests at each point. In the least ones it cruises between the
+        blends and crosses each blend in a straight line, at the faster of the segments' speeds.
         """
         times, moves, path = self.chain.times, self._moves, self._geometries.path
         before, after = path.has_blend_before, path.has_blend_after
@@ -284,7 +287,7 @@ class SegmentTimings:
         least = shortest_duration(between, speed, acceleration, ramps)
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
         tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
-        # Legs of the radius r with a chord c between them: no blend is longer than r + c / 2.
+        # With legs of length r and a chord c, no blend is longer than r + c / 2: this bounds c.
         across = np.where(after, 2.0 * np.maximum(path.blend_length - path.radius, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
@@ -296,7 +299,7 @@ class SegmentTimings:
 
     def _remark_changes(self) -> None:
         """
-        Remark on moves that are slower than requested, or early.
+        Remark on moves that are slower than requested, and on points that are passed early.
 
         :raises GoalRefused: a time is too short, a speed too low, a blend too small.
         """
@@ -310,10 +313,10 @@ class SegmentTimings:
         slowest = np.minimum(self.velocities, self.accelerations)
         too_slow = by_speed & (slowest < MIN_SPEED)
         needs_a_cycle = _NEEDS_A_CYCLE[self._geometries.kinds] & path.has_blend_after
-        # A blend that is too small for the speed asked for is refused, not passed slowly.
+        # A blend that is too small for the requested speed is refused, not passed slowly.
         asked = np.where(self._is_slowed_in_arc(), requests.speed, self.velocities)
         too_small = needs_a_cycle & (path.radius < asked * self._model.control_cycle)
-        # Half a turn takes less than a control cycle, even as slow as its acceleration may be.
+        # At the acceleration limit, half a turn on such an arc takes less than a control cycle.
         turns_back = path.has_blend_after & (
             path.arc_radius
             < self._options.max_linear_acceleration * (self._model.control_cycle / pi) ** 2
@@ -372,7 +375,7 @@ class SegmentTimings:
         )
 
     def _too_small(self, row: int, speed: float) -> InvalidGoal:
-        """Return the refusal of a blend that the robot would skip, and stop (C171)."""
+        """Return the refusal of a blend that the robot would skip, to stop instead (its C171)."""
         return InvalidGoal(
             segment_field(self._geometries.begin + row, 'blend_radius'),
             f'is {1e3 * self._geometries.path.radius[row]:g} mm, less than the '
@@ -383,7 +386,7 @@ class SegmentTimings:
         )
 
     def _too_slow(self, row: int) -> InvalidGoal:
-        """Return the refusal of a speed too small for the wire."""
+        """Return the refusal of a speed or acceleration that is too small for the wire."""
         unit, value = self.requests.limits.unit(row), self.velocities[row]
         if value >= MIN_SPEED:
             unit, value = f'{unit}^2', self.accelerations[row]
@@ -400,7 +403,7 @@ class SegmentTimings:
         """
         Return the remark on a time that is too short.
 
-        :raises TooFast: it is refused.
+        :raises TooFast: the options do not allow the planner to extend the time that far.
         """
         requests, limits, options = self.requests, self.requests.limits, self._options
         point, min_time = self._geometries.begin + row, float(self._wanted[row])

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find the lines, arcs and PROCESS motions that are slower than requested, from their times.
+Find the lines, arcs and PROCESS motions that are planned slower than requested.
 
-Only motions that carry the tool along a path count: not joint moves and OPTIMIZED ones, whose tool
-speed nobody asks for, and no turns on the spot. In a blend the planned path gives the speed, by a
-law that is assumed (:mod:`~.move_chain`).
+Only motions that carry the tool along a path are examined. Joint moves and OPTIMIZED moves have no
+requested tool speed, and turns on the spot have no path. In a blend, the speed is that of the
+planned path, which follows an assumed law (:mod:`~.move_chain`).
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
 
 _IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
-#: Directions with a smaller product reverse.
+#: Unit directions whose dot product is at most this reverse.
 _REVERSAL = -0.98
-#: How much of the allowance chords of a blend may use, whose speed is a mean.
+#: Fraction of the allowance for a blend that consists of chords, because their speed is a mean.
 _CHORD_PART = 0.5
 _TINY = 1e-12
-#: Rows of the reference path that are closer have the same time [s].
+#: Rows of the reference path less than this apart have the same time [s].
 _SAME_TIME = 1e-6
 
 
@@ -52,8 +52,8 @@ def slow_move_stretches(
     """
     Return the slow stretches of a plan of moves, in the order of the path.
 
-    :param reference: without rests.
-    :param slower_by: fraction of the speed that counts as slower.
+    :param reference: the reference path, without rests.
+    :param slower_by: the fraction of the requested speed by which a slow stretch falls short.
     """
     with np.errstate(over='ignore', invalid='ignore'):  # any speeds may be asked for
         return _SlowMoves(geometries, timings, reference, slower_by).stretches()
@@ -69,16 +69,16 @@ class _SlowMoves:
         reference: ReferencePath,
         slower_by: float,
     ) -> None:
-        """Compare the speeds of the profiles with those asked for."""
+        """Compare the speeds of the profiles with the requested speeds."""
         self._geometries, self._timings, self._reference = geometries, timings, reference
         self._slower_by = slower_by
         requests, times = timings.requests, timings.chain.times
         curves = geometries.path.curves
         self._free: Flags = _IS_FREE[geometries.kinds]
-        #: (n,) whether the tool is carried along a path; asked for [m/s]; NaN elsewhere.
+        #: (n,) whether the tool is carried along a path; the requested speed [m/s], else NaN.
         self._carries = ~self._free & requests.limits.translates
         self._asked = np.where(self._carries, requests.asked, np.nan)
-        #: Way of the tool for a unit of the length that the robot counts.
+        #: Distance that the tool moves per unit of the length that the robot uses.
         self._ratio = curves.length / np.maximum(timings.chain.moves.length, _TINY)
         self._wanted = (1.0 - slower_by) * self._asked / np.maximum(self._ratio, _TINY)
         self._too_slow = self._carries & (times.cruise < self._wanted)
@@ -92,21 +92,21 @@ class _SlowMoves:
 
     @cached_property
     def _is_short(self) -> Flags:
-        """Whether segments end before the tool has its speed, (n,)."""
+        """(n,) whether each segment ends before the tool reaches its speed."""
         moves = self._timings.chain.moves
         untimed = (moves.time <= 0.0) & ~self._turns
         return self._too_slow & untimed & (moves.speed >= self._wanted)
 
     @cached_property
     def _turns(self) -> Flags:
-        """Whether the turn of the tool makes segments slow, and no limit, (n,)."""
+        """(n,) whether the turn of the tool, not a limit, makes each segment slow."""
         requests = self._timings.requests
         turns = self._too_slow & requests.limits.is_turn
         turns[list(requests.limited)] = False
         return turns
 
     def _ramps(self) -> tuple[Floats, Floats]:
-        """Return how far each move speeds up below its speed, and from where it brakes (n,)."""
+        """Return the distances at which each move's slow start ends and slow end begins (n,)."""
         times = self._timings.chain.times
         full = times.length - times.tail
         slow = (1.0 - self._slower_by) * times.cruise
@@ -139,7 +139,7 @@ class _SlowMoves:
         )
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(brakes), self._fractions(speeds_up)
-        # The segments that begin and end what lies between joint moves.
+        # Whether each segment is the first one after a joint move, and the last one before one.
         opens, closes = self._runs()
         heads, tails = speeds_up > 0.0, brakes < times.length - times.tail
         entering, leaving = times.enter * self._ratio, times.leave * self._ratio
@@ -176,7 +176,7 @@ class _SlowMoves:
             yield self._stretch((*start, *end), 0.0, cause, reason, begin + row)
 
     def _runs(self) -> tuple[Flags, Flags]:
-        """Return which segments (n,) are first and last between joint moves."""
+        """Return whether each segment is the first, and the last, between joint moves (n,)."""
         run, carries = np.cumsum(self._free), self._carries
         opens, closes = np.zeros((2, len(run)), dtype=np.bool_)
         rows = np.flatnonzero(carries)
@@ -185,7 +185,7 @@ class _SlowMoves:
         return opens, closes
 
     def _reverses(self, row: int) -> bool:
-        """Tell whether the path goes back where a segment ends."""
+        """Return whether the path reverses at the end of a segment."""
         curves = self._geometries.path.curves
         at = np.array([row, row, row + 1, row + 1]), np.array([0.999, 1.0, 0.0, 0.001])
         before, here, _, after = curves.rows(*at)[:, :3]
@@ -223,7 +223,7 @@ class _SlowMoves:
     # -- in blends -------------------------------------------------------------------------------
 
     def _blends(self) -> list[SlowStretch]:
-        """Return the blends in which the planned path is slower than asked."""
+        """Return the blends in which the planned path is slower than requested."""
         path, times, reference = self._geometries.path, self._timings.chain.times, self._reference
         ratio = self._ratio
         rows = np.flatnonzero(path.has_blend_after)
@@ -239,11 +239,11 @@ class _SlowMoves:
         middle = 0.5 * (reference.time[1:] + reference.time[:-1])
         first, last = np.searchsorted(middle, begin), np.searchsorted(middle, end)
         asked = np.fmin(self._asked[rows], self._asked[rows + 1])
-        # The end of the last blend may be the end of all speeds.
+        # The last blend may end with the last speed; reduceat needs one element more.
         lowest = np.minimum.reduceat(
             np.append(speeds, np.inf), np.stack((first, last), axis=1).ravel()
         )[::2]
-        # The rate of a fillet changes evenly, and so does its speed.
+        # The speed in a fillet changes linearly over time, so it is lowest at one end.
         ends = np.fmin(times.leave[rows] * ratio[rows], times.enter[rows + 1] * ratio[rows + 1])
         lowest = np.where(path.fillet[rows], ends, lowest)
         part = np.where(path.fillet[rows], 1.0, _CHORD_PART)

@@ -3,9 +3,9 @@
 """
 The leading quantities of segments and their speed limits.
 
-The robot has one speed for the translation [m/s] and the turn [rad/s] of the tool, which neither
-may exceed; so the larger of both numbers *leads* a segment (for joint moves the joint that turns
-farthest). Tool, joints and accelerations bound it.
+A move of the robot has a single number as its speed, which limits both the translation [m/s] and
+the turn [rad/s] of the tool. So the larger of length and turn *leads* a segment; in a joint move,
+the joint that turns farthest leads. Tool, joints and accelerations limit the leading quantity.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.geometry.curves import SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometries import SegmentGeometries
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: Length of a segment to a first point where the robot already is.
+#: Smallest length, for a segment to a first point where the robot already is.
 _MIN_LENGTH = 1e-9
 
 
@@ -42,13 +42,13 @@ class SpeedLimits:
         turns_with_arc = (kinds == SegmentType.CIRCULAR) & (
             geometries.segments.arc_modes == ArcMode.FIXED
         )
-        #: Whether the turn of the tool, or of a joint, is the larger number.
+        #: Whether the turn of the tool, or of a joint, leads.
         self.is_turn: Flags = ~self.is_optimized & (
             curves.is_joint_line | ((curves.length < curves.angle) & ~turns_with_arc)
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # For an OPTIMIZED move: its time with some joint at its limit everywhere.
+        # For an OPTIMIZED move, the time if some joint is always at its limit leads.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
         #: Length of the leading quantity [m], [rad], or [s] of an OPTIMIZED move.
         self.length: Floats = np.maximum(length, _MIN_LENGTH)
@@ -63,7 +63,7 @@ class SpeedLimits:
         #: Maximum speed and acceleration of the leading quantity.
         self.speed: Floats = np.minimum(joint_speed, tool_speed)
         self.acceleration = self._acceleration(curves)
-        # Where the robot turns the tool faster than it moves it, it gets ahead of the turn.
+        # Lower limits, so that they hold even if the robot turns the tool faster than it moves it.
         turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by its angle
         counted = np.maximum(curves.length, turn / options.turn_ratio) / self.length
         ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
@@ -80,7 +80,7 @@ class SpeedLimits:
         return 'of the limits' if self.is_optimized[row] else f'{self.length_unit(row)}/s'
 
     def name(self, row: int) -> str:
-        """Return what limits the speed of a segment."""
+        """Return the name of the limit on the speed of a segment."""
         if not self._is_joint_limit[row]:
             return f'max_tool_speed = {self._options.max_tool_speed:g} m/s'
         joint, fraction = int(self._joint[row]), self._bounds.fractions[row]
@@ -93,14 +93,14 @@ class SpeedLimits:
         )
 
     def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
-        """Return how fast joint moves may be (m,), and the joints that limit them."""
+        """Return the greatest speeds of joint moves (m,), and the joints that limit them."""
         travel = np.array([curves.joint_line(row).travel for row in rows.tolist()])
         speeds = np.array(self._model.max_joint_speed) * self.length[rows, None]
         speeds = np.where(travel > 0.0, speeds / np.maximum(travel, 1e-300), inf)
         return speeds.min(axis=1), speeds.argmin(axis=1)
 
     def _tool_speed(self, curves: CurveRows) -> Floats:
-        """Return how fast the leading quantities may be for the sake of the tool."""
+        """Return the greatest speeds of the leading quantities that max_tool_speed allows."""
         if self._options.max_tool_speed <= 0.0:
             return np.full(len(self.length), inf)
         # The tool of an OPTIMIZED move is fastest where the joints turn least.
@@ -114,7 +114,7 @@ class SpeedLimits:
 
     def _acceleration(self, curves: CurveRows) -> Floats:
         options, length = self._options, self.length
-        # Lengths that count, for a unit of the leading quantity.
+        # Translation and turn of the tool per unit of the leading quantity.
         linear = np.where(self.translates, curves.length, 0.0) / length
         angular = curves.angle / length
         bound = np.minimum(

@@ -3,7 +3,7 @@
 """
 The speeds and times requested of moves: by the goal's times or speeds, or by the defaults.
 
-All numbers are about the leading quantity of a segment, see :mod:`~.speed_limits`.
+All numbers refer to the leading quantity of a segment, see :mod:`~.speed_limits`.
 """
 
 from __future__ import annotations
@@ -26,27 +26,28 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
-#: A move with a time stretches the trapezoid of the speed and acceleration beside it (recorded on
-#: a UR3). We send 1.5 d/T and 4.5 d/T^2: a third of the time each for accelerating, cruising and
-#: braking, which is also what robots would do that ignore the two.
+#: The robot stretches the trapezoid given by speed and acceleration to the time of the move, if it
+#: has one (recorded on a UR3). We send 1.5 d/T and 4.5 d/T^2, for which accelerating, cruising and
+#: braking take a third of the time each; we assume the same of robots that ignore the two.
 RAMP_SHARE = 1.0 / 3.0
 #: Assumed acceleration of an OPTIMIZED move at fraction 1 [rad/s^2]; the robot's own limits are
 #: not published. It only serves to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
-#: Motions that take a time on the wire.
+#: Motions that accept a time on the wire.
 _TIMED_ON_WIRE = type_table((SegmentType.LINEAR, SegmentType.JOINT))
-#: Motions that take none, whose turn has never been measured.
+#: Motions that accept no time, and whose speed has not been measured if the turn leads.
 _UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
-#: Peak over mean of the speed of a timed move: in thirds, and in the triangle that a line whose
-#: turn leads makes of the same numbers if the robot turns the tool faster than it moves it.
+#: Ratio of peak speed to mean speed of a timed move: of the trapezoid in thirds; and of the
+#: triangle to which the same numbers lead on a line whose turn leads, if the robot turns the tool
+#: faster than it moves it.
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
-#: Of a segment without any motion no acceleration is too much.
+#: Greatest acceleration of a segment without any motion, which has no limit.
 _UNLIMITED = 1e9
-#: A time that is longer by less than this factor is not remarked.
+#: Times that are longer by less than this factor get no remark.
 _NOTICEABLY = 1.001
-#: Limits that are lower by less than this factor are the speed asked for.
+#: Speeds that limits lower by less than this factor get no remark.
 _ROUNDED = 1.0 - 1e-9
-#: The least speeds and accelerations that are computed with; 1 / 1e-310 is no number.
+#: Smallest speed and acceleration in computations; 1 / 1e-310 overflows.
 _TINY = 1e-300
 #: Where a speed comes from, for the report.
 _BOTH = 'speed from linear_velocity and angular_velocity, as the turn leads'
@@ -65,7 +66,8 @@ def min_duration(length: Floats, speed: Floats, acceleration: Floats, peak: Floa
     """
     Return the shortest times on the wire that keep the peaks from rest to rest within bounds [s].
 
-    :param peak: speed over mean speed; 2 where it might be a triangle, whose acceleration is less.
+    :param peak: ratio of peak speed to mean speed; 2 if the profile might be a triangle, whose
+        acceleration is lower.
     """
     ramps = np.sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE)))
     return np.maximum(peak * length / speed, ramps)
@@ -73,21 +75,22 @@ def min_duration(length: Floats, speed: Floats, acceleration: Floats, peak: Floa
 
 class SpeedRequests:
     """
-    The requests to moves, in the lengths that the robot counts; columns (n,).
+    The requested speeds and times of moves, in the lengths that the robot uses; columns (n,).
 
-    :param running: the first segment as it was planned, where it has been sent.
-    :raises InvalidGoal: nobody knows how fast the robot would run a segment.
+    :param running: the first segment as it was planned before, if it has already been sent.
+    :raises InvalidGoal: it is not known how fast the robot would run a segment.
     """
 
     #: Greatest speeds; accelerations, and the greatest ones that may follow from a time.
     speed: Floats
     acceleration: Floats
     max_acceleration: Floats
-    #: The greatest ones as the goal and the limits give them, for lengths in full.
+    #: Greatest accelerations that goal and limits allow, for full lengths instead of those that
+    #: the robot uses.
     allowed_acceleration: Floats
-    #: 1 / time on the wire, or speed / length [1/s]. Faster only as their limits allow.
+    #: Rates: 1 / time on the wire, or speed / length [1/s].
     rate: Floats
-    #: Their times; NaN = none. At least the time that the limits allow from rest to rest.
+    #: Requested times, NaN = none; shortest times on the wire that the limits allow, 0 = any.
     time: Floats
     min_time: Floats
 
@@ -104,18 +107,18 @@ class SpeedRequests:
         self.length: Floats = limits.length
         self._turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
         self.peak = np.where(self._turn_leads_line, _PEAK_OF_TURN, _PEAK)
-        # Part of the length that the robot counts, by the turn ratio.
+        # Fraction of the length that the robot uses, according to the turn ratio.
         counted = np.maximum(self._curves.length, self.length / options.turn_ratio) / self.length
         self._counted = np.where(self._turn_leads_line, counted, 1.0)
-        #: The acceleration that the robot makes of the one that is sent.
+        #: Acceleration of the leading quantity for a unit of the acceleration that is sent.
         self.acceleration_unit = np.where(
             limits.is_optimized, _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed), 1.0
         )
         #: Whether the wire carries a time.
         self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & takes_times(options)
-        #: By row, on changes by the limits.
+        #: Remarks on changes due to the limits, by row.
         self.remarks: dict[int, str] = {}
-        #: By row, what limits the speed to less than is asked for.
+        #: Names of the limits that make a segment slower than requested, by row.
         self.limited: dict[int, str] = {}
         self._wanted = np.full(len(geometries), nan)
         self._source = np.zeros(len(geometries), dtype=np.intp)
@@ -130,7 +133,7 @@ class SpeedRequests:
             self._request_again(running)
 
     def source(self, row: int) -> str:
-        """Return where speed or time of a segment come from."""
+        """Return the source of a segment's speed or time."""
         point = self.geometries.begin + row
         if self._is_running and row == 0:
             return ''
@@ -143,9 +146,9 @@ class SpeedRequests:
     @property
     def asked(self) -> Floats:
         """
-        Speeds of the tool (n,) that the goal asks for [m/s], where segments carry it.
+        Requested speeds of the tool (n,) [m/s], valid for segments that carry it.
 
-        With times the mean that these leave.
+        If the goal has times: the mean speeds that result from them.
         """
         if not self.is_timed:
             return self._wanted
@@ -157,13 +160,13 @@ class SpeedRequests:
         before, after = path.has_blend_before, path.has_blend_after
         head = np.where(before, counted * path.u_join, 0.0)
         tail = np.where(after, np.maximum(counted * (1.0 - path.u_leave), 1e-12), 0.0)
-        # Of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that counts.
+        # Ramps of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that the robot uses.
         ramp = np.where(
             self._turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
         )
         fillet, arc = path.fillet & after, path.blend_length
         at_radius = after & (self._kinds == SegmentType.PROCESS)
-        # Lengths for a unit of ``s``.
+        # Lengths per unit of ``s``.
         leaving = np.maximum(2.0 * tail, 1e-12)
         joining = np.maximum(2.0 * head, 1e-12)
         per_metre = self.length / np.maximum(self._curves.length, 1e-300)
@@ -184,7 +187,7 @@ class SpeedRequests:
         )
 
     def _request_again(self, running: PlannedSegment) -> None:
-        """Ask for what has been sent already."""
+        """Request the values that have already been sent for the running segment."""
         sent, time = running.primitive, getattr(running.primitive, 'duration', 0.0)
         assert not isinstance(sent, Spline | Stop)
         acceleration = sent.acceleration * self.acceleration_unit[0]
@@ -199,7 +202,7 @@ class SpeedRequests:
     # -- speeds ----------------------------------------------------------------------------------
 
     def _by_speed(self) -> None:
-        """Ask for speeds."""
+        """Request speeds."""
         options, limits = self._options, self.limits
         at_speed_of_tool = self._turn_leads_line & limits.translates
         bound = np.where(at_speed_of_tool, options.max_tool_speed or inf, limits.speed)
@@ -237,7 +240,8 @@ class SpeedRequests:
                 np.linalg.norm(twists[:, :3], axis=1),
                 np.linalg.norm(twists[:, 3:], axis=1),
             )
-        # One number for both: the turn may be faster [rad/s], but no faster than the tool [m/s].
+        # A single speed limits translation and turn: as the turn leads, it may be the default of
+        # the turn [rad/s], but no more than the greatest tool speed [m/s].
         fastest = options.max_tool_speed or options.angular_velocity
         both = max(options.linear_velocity, min(options.angular_velocity, fastest))
         choices = (
@@ -266,11 +270,11 @@ class SpeedRequests:
 
     def _turning_lines(self, velocity: Floats, acceleration: Floats) -> None:
         """
-        Ask for the times of lines on which the turn leads.
+        Request times for lines on which the turn leads.
 
-        The robot may turn the tool as slowly as it moves it, or several times as fast: a time is
-        sent instead, in which the tool keeps its speed [m/s] and turns no faster than the default
-        (without a way: than was asked for), whichever it is.
+        At a given speed, the robot may turn the tool as slowly as it moves it, or several times as
+        fast. So a time is sent instead. In either case, the tool then keeps to its speed [m/s] and
+        turns no faster than the default (on a turn on the spot: than requested).
         """
         rows = np.flatnonzero(self._turn_leads_line)
         if not len(rows):
@@ -298,7 +302,7 @@ class SpeedRequests:
                 f'{before}point {self.geometries.begin + row}: turns in {time[k]:.3f} s instead '
                 f'of {wanted[k]:.3f} s, because of {self.limits.name(row)}'
             )
-        # Without a time on the wire: a third each of speeding up, cruising and braking.
+        # If no time is sent, speeding up, cruising and braking take a third of the time each.
         speed = length / time * np.where(timed, peak, _PEAK)
         self.speed[rows] = speed * counted
         self.acceleration[rows] = counted * np.where(timed, turn_rate, 4.5 * length / time**2)
@@ -307,7 +311,7 @@ class SpeedRequests:
     # -- times -----------------------------------------------------------------------------------
 
     def _by_time(self) -> None:
-        """Ask for times."""
+        """Request times."""
         geometries, limits, timed = self.geometries, self.limits, self.has_wire_time
         unmeasured = ~timed & limits.is_turn & _UNMEASURED_TURNS[self._kinds]
         for row in rows_where(unmeasured)[:1]:
@@ -322,7 +326,8 @@ class SpeedRequests:
         own = self._own_accelerations()
         most = np.minimum(np.where(own > 0.0, own, inf), limits.acceleration)
         self.allowed_acceleration, most = most, np.minimum(most, _UNLIMITED)
-        # A third each of speeding up, cruising and braking; and no braking before a blend.
+        # Speeding up, cruising and braking take a third of the time each, and braking for the
+        # point begins only in the blend.
         brakes = path.has_blend_after & (self._kinds != SegmentType.PROCESS)
         tail = np.where(brakes, self.length * (1.0 - path.u_leave), inf)
         needed = np.maximum(4.5 * length / self.time**2, (length / self.time) ** 2 / tail)
@@ -331,11 +336,11 @@ class SpeedRequests:
         self.speed = limits.speed * self._counted
         self.acceleration, self.max_acceleration = least * self._counted, most * self._counted
         self.rate = 1.0 / self.time
-        # A move with a time is planned to rest at its waypoint, also where it is blended.
+        # A move with a time is planned to rest at its waypoint even if it is blended.
         alone = min_duration(self.length, limits.speed, limits.acceleration, self.peak)
         self.min_time = np.where(timed, alone, 0.0)
 
     def _own_accelerations(self) -> Floats:
-        """Return the accelerations that the goal gives timed segments; 0 = none."""
+        """Return the goal's accelerations; 0 = none, or a motion that accepts a time instead."""
         timed = _TIMED_ON_WIRE[self._kinds]
         return np.where(timed, 0.0, self.geometries.segments.accelerations)

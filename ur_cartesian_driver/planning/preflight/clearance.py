@@ -6,8 +6,8 @@ Check the clearance of the arm from itself and from the workspace planes along i
 Cylinders are checked in every row; where they come close, meshes measure exactly, for the models
 that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether less than
 `min_clearance` refuses or warns depends on `self_collision` and the model, never on installed
-meshes. An arm that starts too close can move away: rows pass as long as a pair that is too
-close at the start only separates, until it is clear; from then on it is treated like all others.
+meshes. An arm that starts too close can move away: a pair that is too close at the start passes
+while its distance only grows. Once it is clear, it is treated like all other pairs.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Rows that are checked together: bounds memory, and ends early where a goal is refused.
+# Rows that are checked together: blocks bound the memory, and a refusal ends the check early.
 _BLOCK = 4096
-# A distance may shrink by this and still count as receding [m]: samples are not exact.
+# A pair still separates if its distance shrinks by no more than this [m]: samples are not exact.
 _RECEDING_TOLERANCE = 1e-4
-# Rounding of a tool that works on a plane with no margin [m].
+# Rounding that is allowed to a tool that works on a plane without a margin [m].
 _ON_PLANE = 1e-6
 
 
@@ -55,14 +55,14 @@ class Violation:
 class ClearanceResult:
     """The clearance of a path."""
 
-    #: What refuses the goal ...
+    #: The violation for which the goal is refused.
     violation: Violation | None
-    #: ... and what only warns.
+    #: The violation of which the report only warns.
     warning: Violation | None
     #: The smallest distance of all rows [m], negative where cylinders overlap or a plane is
     #: crossed, infinite where nothing is checked; between cylinders it is a lower bound.
     margin: float
-    #: The pair with that distance, and the shapes that it was measured between.
+    #: The pair with that distance, and the shapes between which it was measured.
     description: str
 
 
@@ -70,7 +70,7 @@ class Clearance:
     """
     The clearance of one arm with one tool.
 
-    :param T_flange_tcp: the TCP of the goal; from the flange to it goes the cylinder of the tool.
+    :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
     :param options: self_collision, min_clearance, tool_radius, workspace_planes.
     """
 
@@ -84,7 +84,7 @@ class Clearance:
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
 
     def too_close(self, q: Floats) -> Flags:
-        """Tell which configurations (n, 6) [rad] are too close, wherever the arm starts."""
+        """Return which configurations (n, 6) [rad] are too close, wherever the arm starts."""
         close = np.zeros(len(q), dtype=np.bool_)
         for checker in self._checkers:
             exact = np.zeros(len(checker.bounds), dtype=np.bool_)
@@ -101,7 +101,7 @@ class Clearance:
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
         :param q_start: the start; pairs that are too close there may separate.
         """
-        #: By whether they refuse.
+        #: The first violations, by whether they refuse the goal.
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -130,7 +130,7 @@ class Clearance:
 
 @lru_cache(maxsize=8)
 def _bodies(arm: Arm, T_flange_tcp: Pose, tool_radius: float) -> CollisionBodies:
-    """Return the bodies of an arm, which is planned for again and again."""
+    """Return the bodies of an arm; cached, because the same arm is planned for repeatedly."""
     return CollisionBodies(arm, T_flange_tcp, tool_radius)
 
 
@@ -199,8 +199,8 @@ class _InitialViolations:
         """
         Return which (rows, columns) are refused.
 
-        :param lower: distances of cylinders, which keep changing while meshes touch.
-        :param distances: those that count.
+        :param lower: the distances of the cylinders, which still change while the meshes touch.
+        :param distances: the distances to compare with the bounds.
         """
         near = distances < self._bounds
         if not (near.any() or self.pending.any()):
@@ -215,7 +215,7 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return the largest values so far, and where a value is no smaller; by columns."""
+    """Return the largest value of each column so far, and which values are no smaller."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -236,16 +236,16 @@ class _SelfCollisionChecker:
 
     @cached_property
     def _meshes(self) -> CollisionMeshes | None:
-        """The meshes, loaded where cylinders first come close: most goals need none."""
+        """The meshes, loaded when cylinders first come close: most goals need none."""
         if missing_meshes(self._name):
             return None
         try:
             return CollisionMeshes(self._bodies.arm, self._tcp, self._options.tool_radius)
-        except ImportError:  # pinocchio is there and broken: built for another numpy, say
+        except ImportError:  # pinocchio is installed but broken: built for another numpy, say
             return None
 
     def description(self, column: int, lower: float) -> str:
-        """Return the pair of a column, and the shapes, given the distance of its cylinders."""
+        """Return the words for a pair and its shapes, given the distance of its cylinders."""
         a, b = self._bodies.pairs[column]
         exact = lower < self._bound and self._meshes is not None
         return f'{a} and {b} ({self._mesh_name if exact else "cylinders"})'
@@ -256,10 +256,10 @@ class _SelfCollisionChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return distances (n, columns) of the cylinders, and those that count.
+        Return the distances (n, columns) of the cylinders, and those to compare with the bounds.
 
-        :param pending: the columns that need exact distances; the others only need to be known as
-            below the bound (then they are 0), which is faster.
+        :param pending: the columns that need exact distances; in the others a distance below the
+            bound is returned as 0, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -277,7 +277,7 @@ class _SelfCollisionChecker:
         return lower, distances
 
     def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
-        """Return the words for a row, whose joints are ``q`` (1, 6)."""
+        """Return the violation at a row, whose joints are ``q`` (1, 6)."""
         a, b = self._bodies.pairs[column]
         if self._meshes is not None:
             distance = float(self._meshes.distances((a, b), q)[0])
@@ -295,18 +295,18 @@ class _SelfCollisionChecker:
 
 
 def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
-    """Tell whether a goal is refused where an arm of a model comes too close to itself."""
+    """Return whether a goal is refused if an arm of a model comes too close to itself."""
     choice = options.self_collision
     return choice == 'refuse' or (choice == 'auto' and name in MODELS_WITH_MESHES)
 
 
 def self_collision_remark(name: str, options: PlanningOptions) -> str:
-    """Return a sentence on the meshes that the check of a model lacks; '' where none count."""
+    """Return a sentence on the meshes that the check of a model lacks; '' if none are needed."""
     missing, refuses = missing_meshes(name), refuses_self_collision(name, options)
     if not missing or options.self_collision == 'off':
         return ''
     if name not in MODELS_WITH_MESHES and not refuses:
-        return ''  # nobody has them, and nothing is refused
+        return ''  # there are none to install, and nothing is refused
     verdict = 'refuse' if refuses else 'warn of'
     return (
         f'{missing[0].upper()}{missing[1:]}: cylinders that contain the arm {verdict} '
@@ -315,7 +315,7 @@ def self_collision_remark(name: str, options: PlanningOptions) -> str:
 
 
 class _PlaneChecker:
-    """All of the arm beyond its base, the tool and the TCP against the workspace planes."""
+    """The links beyond the base, the tool and the TCP, against the workspace planes."""
 
     def __init__(
         self, bodies: CollisionBodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
@@ -334,12 +334,12 @@ class _PlaneChecker:
         self.refuses = True
 
     def description(self, column: int, lower: float) -> str:
-        """Return the pair of a column."""
+        """Return the words for the pair of a column."""
         number, which = divmod(column, len(self._names))
         return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
-        """Return the heights of all links and the TCP above the planes, (n, columns), twice."""
+        """Return the heights of links and TCP above the planes (n, columns), as both results."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
         tcp = np.array(self._arm.frames_rows(q).point(self._tcp))
@@ -348,7 +348,7 @@ class _PlaneChecker:
         return distances, distances
 
     def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
-        """Return the words for a row."""
+        """Return the violation at a row."""
         number, which = divmod(column, len(self._names))
         plane, name = self._planes[number], self._names[which]
         name = 'the TCP' if name == 'TCP' else name
@@ -372,7 +372,7 @@ def _first(
     q: Floats,
     begin: int,
 ) -> Violation | None:
-    """Return the closest pair in the first row that is refused."""
+    """Return the violation by the closest pair in the first refused row, or None."""
     rows = np.flatnonzero(refused.any(axis=1))
     if not len(rows):
         return None

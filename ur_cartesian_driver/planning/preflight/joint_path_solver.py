@@ -3,11 +3,11 @@
 """
 Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
-All samples of a goal are solved together. Between two of them the arm may do more than they show:
-beside a singularity joints swing round within a millimetre, and the solution closest after a long
-step then belongs to another branch. So where a joint turns far from one sample to the next, where
-the branch changes, or where there is no solution, samples are added in between, down to 2 um: a
-jump that remains is real.
+All samples of a goal are solved together. Between two samples the arm may move more than these
+show: near a singularity joints swing round within a millimetre, and after a long step the closest
+solution then belongs to another branch. So where a joint turns far from one sample to the next,
+where the branch changes, or where there is no solution, samples are added in between, down to
+2 um apart. A jump that then remains is real.
 """
 
 from __future__ import annotations
@@ -36,17 +36,18 @@ from ur_cartesian_driver.planning.geometry.samples import (
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Samples are added until no joint turns more than this from one to the next [rad] ...
+#: Samples are added until no joint turns farther than this from one to the next [rad].
 _MAX_STEP = 0.1
-#: ... or they are this close [m], [rad]: a joint that then turns more than _MAX_JUMP jumps.
+#: No samples are added between two that are this close [m], [rad]. If a joint still turns farther
+#: than _MAX_JUMP [rad] from one to the other, it jumps.
 _MIN_LENGTH = 2e-6
 _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
-#: Configurations that differ by less are the same [rad].
+#: Configurations that differ by less than this [rad] are the same.
 _SAME = 1e-6
 #: Samples solved at a time after a refinement; each later block is _GROWTH times as long.
 _FIRST_BLOCK = 64
-#: Samples that measure how far a joint would go beyond its range.
+#: Number of samples that measure how far a joint would go beyond its range.
 _SAMPLES_BEYOND = 16
 _GROWTH = 8
 
@@ -56,12 +57,12 @@ class JointPath:
     """The samples on consecutive pieces that the arm reaches, with their joint positions."""
 
     pieces: CurvePieces
-    #: (n,) number of the piece, not decreasing; (n,); (n, 7); (n, 6).
+    #: (n,) the number of the piece, not decreasing; (n,) the parameter; (n, 7); (n, 6) [rad].
     piece: Indices
     t: Floats
     poses: Floats
     q: Floats
-    #: Why it does not reach all of them, and on which segment; None = it does.
+    #: Why the arm does not reach all samples, None = it does; and the segment of the refusal.
     refusal: GoalRefused | None = None
     refused_segment: int = -1
     #: (n,) segment of each sample, and the fraction (n,) of it.
@@ -92,7 +93,8 @@ class _Refinement:
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: Parameter at which no configuration follows; the one that would jump there, if any.
+    #: The parameter at which the path cannot go on, and the solution there to which the arm would
+    #: have to jump, if there is one.
     stop: float | None = None
     jump: Joints | None = None
 
@@ -152,7 +154,7 @@ def solve_joint_path(kinematics: TcpKinematics, pieces: CurvePieces, q_start: Jo
             if refinement.stop is not None:
                 return joint_path(*_refusal_at(kinematics, pieces, k, refinement, q))
             row += 1
-            if not np.abs(solved[index] - q).max() < _SAME:  # NaN if there was none
+            if not np.abs(solved[index] - q).max() < _SAME:  # NaN if there was no solution
                 block = _FIRST_BLOCK
                 break
     return joint_path()
@@ -179,7 +181,7 @@ def _refine(
     row: int,
     q: Joints,
 ) -> _Refinement:
-    """Return the samples from the row before to a row, as dense as the joints need them."""
+    """Return the samples from the row before up to a row, as dense as the joints require."""
     k = int(samples.piece[row])
     length, turn = pieces.extent(k)
     is_first = row == 0 or samples.piece[row - 1] != k
@@ -207,7 +209,7 @@ def _refine(
 def _refusal_at(
     kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
-    """Return why the arm cannot continue from a configuration, and on which segment."""
+    """Return the refusal of a path that cannot go on from a configuration, and its segment."""
     stop = refinement.stop
     assert stop is not None
     index, fraction = pieces.locate_one(k, stop)
@@ -221,7 +223,7 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
-        # Here the value is just beyond its bound; the one at the point says how far beyond.
+        # Here the value is just beyond its bound; at the waypoint it shows how far beyond it gets.
         end = pieces.pose(k, 1.0)
         at_end = kinematics.no_solution_error(end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:
@@ -241,10 +243,10 @@ def describe_location(index: int, fraction: float) -> str:
 
 def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> bool:
     """
-    Tell whether the arm may do more than turn straight from one configuration to the other.
+    Return whether the arm may do more than turn straight from one configuration to the other.
 
-    Beside a singularity another branch may be closer after a long step, while in small steps the
-    arm swings round and stays on its own.
+    Near a singularity another branch may be closer after a long step, while in small steps the
+    arm swings round and stays on its branch.
     """
     if max_joint_change(q, q_next) > _MAX_STEP:
         return True

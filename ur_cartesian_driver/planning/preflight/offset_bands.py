@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The band in which a path may give way (``path_offset``): its frame, its gaps, and its checks.
+The band in which path offsets may move the tool (``path_offset``): frame, gaps, and checks.
 
-The frame of the path turns with it. Where it turns so fast that a displaced tool would be faster,
-or accelerated more, than an offset may be, the path does not give way: in corners where the arm
-stops, and in arcs that are too tight. The offset fades out before them, and before the end.
+The frame of the path turns with the path. Where it turns so fast that the turn alone would move or
+accelerate a displaced tool more than an offset is allowed to, no offset is possible: in corners
+where the arm stops, and in arcs that are too tight. The offset fades out before these places, and
+before the end.
 
 All corners of the band are checked along the whole path, as the path itself was.
 """
@@ -47,22 +48,23 @@ from ur_cartesian_driver.planning.request.path_offset import offset_motion
 
 #: Time between two frames [s].
 STEP = 0.01
-#: Frames are the mean of those within twice this time [s], so that none turns at once.
+#: Each frame is a mean over twice this time [s], so that no frame turns abruptly.
 SMOOTHING = 0.08
-#: Edges of the path that are shorter have no direction [m].
+#: An edge of the path that is shorter than this [m] has no direction.
 _MIN_EDGE = 1e-7
-#: Where sin of the angle between path and tool is less, the frame stays as it was.
+#: If the sine of the angle between path and tool axis is less than this, an edge has no frame of
+#: its own: frames are interpolated between the edges around it.
 _MIN_ANGLE_SINE = 0.05
-#: How much longer than the law of the offset needs it has to fade out.
+#: The time for fading out is longer by this factor than the law of the offset needs.
 _FADE_MARGIN = 1.1
-#: How much later an offset is gone that the robot program moves and the controller filters [s]:
-#: five times the time constant of the filter, a packet to the robot and back, and the lag of the
+#: Additional time until an offset is gone that the robot program moves and the controller filters
+#: [s]: five time constants of the filter, a packet to the robot and back, and the lag of the
 #: program after a change of the speed scaling.
 FILTER_SETTLING = 0.2
-#: The paths of the robot's own motions have few samples: time between two for the checks [s].
+#: Time between two samples for the checks [s]; the paths of the robot's own motions have fewer.
 _CHECK_STEP = 0.02
-#: A corner is reached from the path in steps that are no longer [m], in which a joint that turns
-#: farther would change the branch [rad].
+#: The joints at a corner of the band are found from those on the path in steps of at most _STRIDE
+#: [m]. A joint that turns farther than _MAX_CHANGE [rad] in one step would change the branch.
 _STRIDE, _MAX_CHANGE = 0.02, 0.5
 
 
@@ -75,9 +77,9 @@ def offset_band(
     """
     Return the band of a path.
 
-    :param T_tcp_controlled: the controlled frame, whose path it is.
-    :param settling_time: how much later than its law an offset is gone [s].
-    :raises InvalidGoal: the path gives way nowhere.
+    :param T_tcp_controlled: the controlled frame, whose path is offset.
+    :param settling_time: additional time after the law of an offset until the offset is gone [s].
+    :raises InvalidGoal: no offset is possible anywhere on the path.
     """
     speed, acceleration, timeout = offset_motion(wanted)
     frames = _frames(reference, T_tcp_controlled)
@@ -109,7 +111,7 @@ def offset_band(
 
 
 def dense_path(path: ReferencePath) -> ReferencePath:
-    """Return a path with samples between those that it has, for the checks."""
+    """Return a path with more samples in between, for the checks."""
     first, last = path.time[0], path.time[-1]
     times = np.union1d(path.time, np.arange(first, last, _CHECK_STEP))
     row = np.clip(np.searchsorted(path.time, times, side='right') - 1, 0, len(path.time) - 2)
@@ -131,10 +133,10 @@ def path_joints(
     path: ReferencePath, kinematics: TcpKinematics, start: Joints
 ) -> tuple[Floats, Floats]:
     """
-    Return the joints along a path (n, 6) [rad], and their speeds [rad/s].
+    Return the joint positions along a path (n, 6) [rad], and their speeds [rad/s].
 
-    :param start: the joints before it.
-    :raises GoalRefused: there is none somewhere.
+    :param start: the joint positions before the path.
+    :raises GoalRefused: a pose has no solution.
     """
     solved = solve_path(kinematics.arm, compose_rows(path.poses, kinematics.T_tcp_flange), start)
     if not solved.found.all():
@@ -147,8 +149,8 @@ def path_joints(
 
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:
-    """Return how long an offset at its limit takes to be gone, at most [s]."""
-    # It brakes, comes back from where it then is, and brakes again with less than the bound.
+    """Return the longest time in which an offset at its limit fades out [s]."""
+    # The offset brakes, comes back from where it stopped, and brakes again, by less than allowed.
     return _FADE_MARGIN * (2.2 * speed / acceleration + limit / speed) + 2.0 * STEP
 
 
@@ -199,7 +201,7 @@ def _smoothed(vectors: Floats) -> Floats:
 
 
 def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: float) -> Flags:
-    """Tell where a tool at a distance from the path is moved too much by its turning (n,)."""
+    """Return whether the turning of each frame moves a tool at a distance too fast (n,)."""
     change = np.diff(frames, axis=0)
     rates = _sizes(change) / STEP
     bends = _sizes(np.diff(change, axis=0)) / STEP**2
@@ -214,7 +216,7 @@ def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: fl
 
 
 def _sizes(changes: Floats) -> Floats:
-    """Return by how much each of some frames changes (n,): for small turns, the angle."""
+    """Return the sizes of changes of frames (n,): for small turns, the angle [rad]."""
     sizes: Floats = np.linalg.norm(changes, axis=(1, 2)) / np.sqrt(2.0)
     return sizes
 
@@ -224,8 +226,8 @@ class OffsetBandCheck:
     """
     The checks of a band along a path.
 
-    :param reference: the path, whose samples are as near to each other as they are to be checked.
-    :param q: (n, 6) the joints there [rad]; ``qd``: their speeds [rad/s].
+    :param reference: the path; the band is checked at each of its samples.
+    :param q: (n, 6) the joint positions at the samples [rad]; ``qd``: the speeds [rad/s].
     """
 
     kinematics: TcpKinematics
@@ -240,7 +242,7 @@ class OffsetBandCheck:
         """
         Check all corners of the band, and return the warnings about them.
 
-        :raises GoalRefused: the arm cannot be there; the text names corner, point and bound.
+        :raises GoalRefused: the arm cannot be at a corner; the text names corner, point and bound.
         """
         path, band = self.reference, self.band
         self._check_tool_speeds()
@@ -263,7 +265,7 @@ class OffsetBandCheck:
         return warnings
 
     def _check_tool_speeds(self) -> None:
-        """Refuse a tool that offsets which change as fast as they may make too fast."""
+        """Refuse a path on which offsets at their full speed would make the tool too fast."""
         path, band, bound = self.reference, self.band, self.options.max_tool_speed
         if bound <= 0.0:
             return
@@ -282,7 +284,7 @@ class OffsetBandCheck:
             )
 
     def _joint_speeds_of_offsets(self, q: Floats, axes: Floats) -> Floats:
-        """Return how fast joints have to be for offsets that change as fast as they may (n, 6)."""
+        """Return the joint speeds (n, 6) [rad/s] that offsets at their full speed need."""
         arm, T_flange_tcp = self.kinematics.arm, self.kinematics.T_flange_tcp
         speeds = np.zeros_like(q)
         for k in np.flatnonzero(self.band.limits).tolist():
@@ -309,7 +311,7 @@ class OffsetBandCheck:
         return list(dict.fromkeys(warnings))
 
     def _joints_at(self, corner: Vector3, axes: Floats, q: Floats) -> Floats:
-        """Return the joints along a corner, as they are reached from those on the path (n, 6)."""
+        """Return the joint positions along a corner (n, 6), reached in steps from the path."""
         kinematics, path = self.kinematics, self.reference
         steps = max(1, ceil(norm(corner) / _STRIDE))
         shift, before = np.einsum('k,nkx->nx', np.array(corner), axes), q
@@ -335,7 +337,7 @@ class OffsetBandCheck:
         on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
         for k, measure in enumerate(SINGULARITY_MEASURES):
             bound = float(getattr(self.options, measure.option))
-            # Where the path itself is nearer, it may be: at its begin.
+            # If the path itself is within the bound, it was accepted, as it may be at its start.
             near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
             if near.any():
                 row = int(np.argmax(near))
@@ -349,7 +351,7 @@ class OffsetBandCheck:
     def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
         times = self.reference.time
         steps = np.maximum(np.diff(times), 1e-6)[:, None]
-        # Beside its path the arm may have to turn faster; where that turns too fast it is on it.
+        # Off its path the arm may have to turn faster. Without an offset, it is on its path.
         is_open = np.array([self.band.opens(time) for time in times[1:].tolist()])
         extra = np.abs(np.diff(there - q, axis=0) / steps) * is_open[:, None]
         speeds = joint_speeds.copy()
@@ -372,7 +374,7 @@ class OffsetBandCheck:
 
 
 def offset_remarks(band: OffsetBand, duration: float) -> list[str]:
-    """Return the line of the report on a band of a motion that takes a time [s]."""
+    """Return the line of the report about the band of a motion with a duration [s]."""
     limits = ', '.join(
         f'{1e3 * limit:g} mm {name}'
         for name, limit in zip(OFFSET_AXES, band.limits, strict=True)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of where the robot is when a goal begins."""
+"""Check the pose of the robot when a goal begins."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration shifts
-#: it by some millimetres; another model or another TCP shifts it much more.
+#: Largest difference of the reported TCP from the one by the kinematics [m], [rad]. Calibration
+#: shifts the TCP by some millimetres; another model or another TCP shifts it much more.
 MAX_MISMATCH_POSITION = 0.015
 MAX_MISMATCH_ANGLE = 0.05
 
@@ -53,7 +53,7 @@ def check_start(
     options: PlanningOptions,
 ) -> None:
     """
-    Refuse a first point at time 0 at which the robot is not.
+    Refuse a goal whose first point is at time 0 if the robot is not at that point.
 
     :raises InvalidGoal: the robot is elsewhere.
     :raises InvalidPosture: the arm has another posture.

@@ -3,10 +3,10 @@
 """
 Kinematics of an arm with a tool, with refusals that say why a pose cannot be reached.
 
-The robot gets poses; which of up to eight configurations it takes depends on the one before. So
-the configuration is predicted segment by segment: along a line or an arc by following the inverse
-kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the solution that is sent as
-``q_near``.
+The robot receives poses; which of up to eight configurations it takes depends on its previous one.
+So the configuration is predicted segment by segment: along a line or an arc by following the
+inverse kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the solution that is
+sent as ``q_near``.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: How far a named joint may arrive from the chosen solution, turns included [rad].
+#: Largest distance from the chosen solution at which a named joint may arrive, with turns [rad].
 ARRIVAL_TOLERANCE = 0.01
 #: A solution continues a configuration if no joint turns farther than this [rad].
 _MAX_CONTINUED_STEP = 0.5
 #: Rounding of a configuration [rad].
 _ROUNDING = 1e-6
-# Scale of the shoulder measure, to compare it with the angles of the others [m].
+# Scale of the shoulder measure [m], to compare it with the other measures, which are sines.
 _ARM_LENGTH = 0.3
 
 
@@ -63,7 +63,7 @@ class TcpKinematics:
         self.T_tcp_flange = T_flange_tcp.inverse()
 
     def flange(self, T_base_tcp: Pose) -> Pose:
-        """Return where the flange is when the TCP is there."""
+        """Return the flange pose for a TCP pose."""
         return T_base_tcp @ self.T_tcp_flange
 
     def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
@@ -74,9 +74,9 @@ class TcpKinematics:
         """
         Return the solution nearest to a configuration.
 
-        :param where: how a refusal begins, ``trajectory.points[2].pose``.
-        :raises Unreachable: there is none.
-        :raises JointLimitExceeded: each of them is outside the range of a joint.
+        :param where: the begin of a refusal, such as ``trajectory.points[2].pose``.
+        :raises Unreachable: there is no solution.
+        :raises JointLimitExceeded: each solution is outside the range of a joint.
         """
         q = self.solution(T_base_tcp, q_near)
         if q is None:
@@ -89,10 +89,10 @@ class TcpKinematics:
         """
         Return the solution that a posture selects.
 
-        Of all solutions those nearest in the named joints, of these the one nearest to the
-        configuration before. Raises as :meth:`nearest`.
+        It is the nearest in the named joints; of several that are equally near, it is the nearest
+        to the configuration before. Raises as :meth:`nearest`.
         """
-        # If the arm is already within the tolerance, it stays.
+        # If the arm is already within the tolerance, it keeps its configuration.
         if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL_TOLERANCE:
             here = self.solution(T_base_tcp, q_before)
             if here is not None and dist(here, q_before) < _ROUNDING:
@@ -104,9 +104,9 @@ class TcpKinematics:
 
     def no_solution_error(self, T_base_tcp: Pose, where: str, there: str = '') -> GoalRefused:
         """
-        Return why a pose has no solution: out of reach, or beyond joint limits.
+        Return the refusal of a pose without a solution: out of reach, or beyond joint limits.
 
-        :param there: where the pose is, if not at ``where``.
+        :param there: words for the place of the pose if it is not ``where``.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -128,9 +128,9 @@ class TcpKinematics:
         poses_beyond: Iterable[Pose] = (),
     ) -> GoalRefused:
         """
-        Return why a configuration cannot be continued: a joint limit, or a singularity.
+        Return the refusal of a path that the arm cannot continue: a joint limit, or a singularity.
 
-        :param poses_beyond: how the path continues, in small steps.
+        :param poses_beyond: the poses of the path after this one, in small steps.
         """
         goes_on = self._continue_branch(T_base_tcp, q)
         for k, (low, high) in enumerate(self.arm.model.position_limits):
@@ -164,7 +164,7 @@ class TcpKinematics:
         return min(distances, key=lambda name: distances[name])
 
     def describe_flips(self, q: Joints, q_other: Joints) -> str:
-        """Return what has to flip between two configurations; '' if nothing does."""
+        """Return the words for the flips between two configurations; '' if there are none."""
         first, second = branch_measures(self.arm, np.array([q, q_other])).branch
         flipped = [
             f'a flip of the {name}'
@@ -179,7 +179,7 @@ class TcpKinematics:
         self, T_base_tcp: Pose, posture: Posture, q: Joints, where: str, tf_prefix: str
     ) -> tuple[Joints, str]:
         """
-        Return the solution that a posture selects, and a clause on how ``q`` misses it or ''.
+        Return the solution that a posture selects, and a clause on how ``q`` misses it, or ''.
 
         Raises as :meth:`nearest`.
         """
@@ -203,7 +203,7 @@ class TcpKinematics:
     def _joint_positions_beyond(
         self, k: int, q: Joints, poses_beyond: Iterable[Pose]
     ) -> Iterator[float]:
-        """Yield the positions of a joint [rad] along poses, as far as the arm can follow."""
+        """Yield the positions of a joint [rad] along poses, until the arm cannot follow."""
         yield q[k]
         for pose in poses_beyond:
             goes_on = self._continue_branch(pose, q)
@@ -228,7 +228,7 @@ class TcpKinematics:
 
 
 def max_joint_change(a: Joints, b: Joints) -> float:
-    """Return how far the joint turns that turns farthest between two configurations [rad]."""
+    """Return the largest change of a joint between two configurations [rad]."""
     return max(abs(y - x) for x, y in zip(a, b, strict=True))
 
 

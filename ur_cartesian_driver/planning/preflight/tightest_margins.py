@@ -28,10 +28,10 @@ from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath
 
-#: This close to a start at rest the arm may be singular [m], [rad] ...
+#: Within this distance of a start at rest [m], [rad] the arm may be singular.
 START_LENGTH = 0.001
 START_ANGLE = 0.01
-#: ... and beyond as long as it moves away, but for rounding.
+#: Beyond it, the arm may be singular while its distance only grows, but for this rounding.
 _ROUNDING = 1e-9
 
 
@@ -41,14 +41,14 @@ class SingularityMeasure:
 
     name: str
     unit: str
-    #: The configuration, for a reader.
+    #: The singular configuration, in words.
     meaning: str
-    #: Distances are compared as fractions of this.
+    #: Distances are compared as fractions of this scale.
     scale: float
 
     @property
     def option(self) -> str:
-        """Its parameter."""
+        """The name of its parameter."""
         return f'singularity_margin_{self.name}'
 
 
@@ -58,7 +58,7 @@ SINGULARITY_MEASURES = (
     SingularityMeasure('shoulder', 'm', 'wrist centre above or below the shoulder', 0.3),
 )
 _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
-#: What a margin is to, and its unit: the singularities, and the limits of the joints.
+#: The words for what a margin is measured to, and its unit: singularities, then joint limits.
 _QUANTITIES = (
     *((f'the {measure.name} singularity', measure.unit) for measure in SINGULARITY_MEASURES),
     *((f'the limit of {name}', 'rad') for name in JOINT_NAMES),
@@ -114,7 +114,7 @@ def joint_limit_distances(arm: Arm, q: Floats) -> Floats:
 
 
 def normalized_margins(arm: Arm, q: Floats) -> Floats:
-    """Return the smallest distances (n,) of configurations (n, 6), as parts of their scales."""
+    """Return the smallest distances (n,) of configurations (n, 6), as fractions of the scales."""
     measures = singularity_distance_rows(arm, q) / _SCALES
     nearest: Floats = np.minimum(measures.min(axis=1), joint_limit_distances(arm, q).min(axis=1))
     return nearest
@@ -126,11 +126,11 @@ def first_refusal(
     """
     Return the first reason why the arm cannot follow, and the index of its segment.
 
-    :param measures: (n, 3) of the samples solved.
+    :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
     refusal, index = joint_path.refusal, joint_path.refused_segment
     near = near_singularity_refusal(joint_path, measures, options)
-    # Beside a singularity joints swing to a limit: the singularity is the cause.
+    # Near a singularity joints swing to a limit: the singularity is the cause.
     if near is not None and (
         refusal is None
         or near[1] < index
@@ -146,7 +146,7 @@ def near_singularity_refusal(
     """
     Return the refusal of the first segment too close to a singularity, and its index.
 
-    :param measures: (n, 3) of the samples solved.
+    :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
     segments = joint_path.segments
     bounds = np.array(
@@ -183,10 +183,10 @@ def _format_below(value: float, bound: float) -> str:
 
 def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags:
     """
-    Tell which samples (n, 3) of a segment lead out of a singularity in which it starts.
+    Return which samples (n, 3) of a segment lead out of a singularity in which it starts.
 
-    The goal does not choose where the robot is: close to a start at rest no distance counts, nor
-    does one that only grows from there.
+    The goal does not choose where the robot is. So no distance is too small close to a start at
+    rest, nor farther on while it only grows.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
@@ -200,7 +200,7 @@ def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags
 
 def is_leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool) -> Flags:
     """
-    Tell which samples (n, 3) of a whole motion lead out of a singularity in which it starts.
+    Return which samples (n, 3) of a whole motion lead out of a singularity in which it starts.
 
     :param length: (n,) the path length since its start [m], and ``angle`` the turn [rad].
     :param rests: whether it starts at rest.
@@ -217,7 +217,7 @@ def tightest_margins(
     """
     Return the tightest margin of each segment.
 
-    :param measures: (n, 3), inf where they do not count.
+    :param measures: (n, 3) the distances from singularities, inf where they do not matter.
     :param segments: (n,) not decreasing.
     """
     # Singularities, and joint limits.

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The bounds of a blend radius: both blends of a segment fit into it.
+The bounds on blend radii: both blends of a segment must fit into the segment.
 
-A negative radius is refused by :mod:`~.field_rules`, one in a spline by :mod:`~.spline_rules`.
+Negative radii are refused by :mod:`~.field_rules`, radii in splines by :mod:`~.spline_rules`.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_blends_fit(index: int, length: float, before: float, after: float) -> None:
     """
-    Refuse blends that overlap within a segment: the controller skips such a waypoint (C171).
+    Refuse blends that overlap within a segment: the controller would skip a waypoint (its C171).
 
-    :param length: distance of its two points [m].
-    :param before: blend radius at its start [m], and ``after`` at its end.
+    :param length: distance between the two points of the segment [m].
+    :param before: blend radius at the first point [m].
+    :param after: blend radius at the second point [m].
     """
-    # Rounding must not refuse blends that touch.
+    # Blends that touch must not be refused because of rounding.
     if before + after > length * (1.0 + 1e-9) + 1e-9:
         if index == 0:
             raise InvalidGoal(
@@ -57,8 +58,8 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
     """
     Refuse blends that overlap on the curve of a segment.
 
-    :param u_join: where the curve is joined after the blend before, and ``u_leave`` where it is
-        left for the blend after, in [0, 1].
+    :param u_join: parameter of the curve at which the blend before it ends, in [0, 1].
+    :param u_leave: parameter of the curve at which the blend after it begins, in [0, 1].
     """
     if u_join > u_leave + 1e-9:
         raise InvalidGoal(

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals that control another frame than the robot's active TCP.
+Goals that control a frame other than the robot's active TCP.
 
-When the tool turns, a straight line of one of its points is a curve of another one. So the robot's
-TCP is set to the controlled frame for the goal (temporary TCP), and planning assumes it from here
-on. Where that is not allowed, the goal is converted to the active TCP, which is exact as long as
-the tool does not turn.
+If the tool turns while one of its points moves on a straight line, other points move on curves. So
+the robot's TCP is set to the controlled frame for the goal (temporary TCP), and planning assumes
+that TCP from here on. If the TCP must not be changed, the goal is converted to the active TCP,
+which is exact if the tool does not turn.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
 )
 
-#: The tool counts as not turning up to this angle on a straight or circular segment [rad]: a
+#: Turns of the tool up to this angle on a straight or circular segment are neglected [rad]: a
 #: frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
 MAX_FIXED_ANGLE = 0.01
 
-#: The controlled frame is the TCP within this distance [m], [rad]: some steps of the wire, so that
-#: the reported TCP shows which of the two is set.
+#: A controlled frame within this distance [m] and angle [rad] is taken as the TCP: a few steps of
+#: the wire, so that the reported TCP reveals which of the two is set.
 SAME_TCP = 5e-6
 
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
@@ -93,7 +93,7 @@ def tool_tips(goal: GoalTable, T_flange_active: Pose) -> tuple[Pose, ...]:
     """
     Return the tool tips to check for collisions: the active TCP and the controlled frame.
 
-    A mounted tool stays mounted when a goal controls the bare flange.
+    A mounted tool can collide even if a goal controls the bare flange.
     """
     T_flange_controlled = goal.T_flange_controlled
     if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, T_flange_active):
@@ -113,7 +113,7 @@ def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
     """
     Refuse straight and circular segments that turn the tool.
 
-    :param T_base_start: where the controlled frame is.
+    :param T_base_start: pose of the controlled frame at the start.
     """
     points, segments = goal.waypoints, goal.motions
     start = goal.T_base_frame.inverse() @ T_base_start
@@ -144,7 +144,7 @@ def _check_no_rotation(goal: GoalTable, T_base_start: Pose) -> None:
 
 
 def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
-    """Refuse a point of a spline at which the tool turns; NaN stands for no turn."""
+    """Refuse a point of a spline at which the tool turns; a NaN counts as no turn."""
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values[3:]):
@@ -157,7 +157,7 @@ def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
 
 
 def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
-    """Return the same motion of the TCP; the orientation of a via does not shape its arc."""
+    """Return the same motion for the TCP; of a via, only the position matters."""
     points, segments = goal.waypoints, goal.segments
     poses = points.poses.copy()
     poses[:, 3:] = normalized_rows(poses[:, 3:])

@@ -30,7 +30,7 @@ def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tole
 
 
 def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
-    """Return the goal with parameters instead of zeros; a tolerance still zero has no limit."""
+    """Return the goal with its zero tolerances replaced; a remaining zero means no limit."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
     )

@@ -3,7 +3,7 @@
 """
 Rules about single fields: members of enumerations, ranges, finite numbers, unit quaternions.
 
-The table of a goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) says which field takes what.
+The table of a goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares what a field accepts.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ QUATERNION_TOLERANCE = 1e-3
 
 
 def check_fields(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse values that a field does not take, whatever the other fields say."""
+    """Refuse values that a field never accepts, regardless of the other fields."""
     check_record('', goal, Goal)
     _check_rows(goal.waypoints, point_field, nan_in_rates=is_spline(goal))
     _check_rows(goal.segments, segment_field)
 
 
 def check_frames(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse poses of frames that are no poses."""
+    """Refuse frames whose pose is not finite or has no unit quaternion."""
     for name, pose in (
         ('trajectory.header.frame_id', goal.T_base_frame),
         ('trajectory.controlled_frame', goal.T_flange_controlled),
@@ -50,11 +50,11 @@ def check_record(
     where: str, record: Any, kind: type | None = None, nan_in_rates: bool = False
 ) -> None:
     """
-    Refuse values that a field of a dataclass of the table does not take.
+    Refuse values that the fields of a record, a dataclass of the table, do not accept.
 
-    :param where: its name in the refusal.
+    :param where: name of the record in the refusal.
     :param kind: the class that declares the fields; None = the class of the record.
-    :param nan_in_rates: whether NaN lets the driver choose a rate.
+    :param nan_in_rates: whether a rate can be NaN, so that the driver chooses it.
     :raises InvalidGoal: names the field, the value and the bound.
     """
     for each in goal_fields(type(record) if kind is None else kind):
@@ -80,7 +80,7 @@ def check_record(
 
 
 def _numbers(each: GoalField, field: str, value: Any) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a field, with the names that refusals give them."""
+    """Yield the name in refusals and the value of each number of a field."""
     assert each.range is not None
     if each.form is Form.VALUES:
         yield from ((f'{field}[{k}]', number) for k, number in enumerate(value))
@@ -134,7 +134,7 @@ def check_finite(field: str, values: Iterable[float]) -> None:
 
 
 def _are_units(quaternions: Floats) -> Flags:
-    """Tell of quaternions (n, 4) whether :func:`_check_unit` has nothing to say."""
+    """Return whether quaternions (n, 4) surely pass :func:`_check_unit`."""
     squares = np.einsum('ij,ij->i', quaternions, quaternions)
     are_units: Flags = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
     return are_units
@@ -143,7 +143,7 @@ def _are_units(quaternions: Floats) -> Flags:
 def _check_unit(field: str, q: Quaternion) -> None:
     x, y, z, w = q
     square = x * x + y * y + z * z + w * w
-    if abs(square - 1.0) <= QUATERNION_TOLERANCE:  # |q| is then within half of it
+    if abs(square - 1.0) <= QUATERNION_TOLERANCE:  # |q| is within half the tolerance then
         return
     length = sqrt(square) if isfinite(square) else hypot(x, y, z, w)
     if length == 0.0:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rules about segments whose tool may turn about an axis of its own."""
+"""Rules about segments on which the tool may turn about a free axis."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
 
-#: Full turns are written with few digits [rad].
+#: Tolerance of a full turn, which clients write with few digits [rad].
 _ROUNDING = 1e-3
 
 
 def check_free_axes(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse ranges that are none, and free axes where nothing can be chosen."""
+    """Refuse invalid ranges, and free axes on segments that leave no choice."""
     segments = goal.segments
     free = segments.free_axes != FreeAxis.NONE
     low, high = segments.free_minima, segments.free_maxima

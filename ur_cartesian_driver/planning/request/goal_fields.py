@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 
-#: Motions on straight lines of the tool.
+#: Motions that move the tool on a straight line.
 STRAIGHT_TYPES = (
     SegmentType.AUTO,
     SegmentType.LINEAR,
@@ -25,7 +25,7 @@ OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:
-    """Return by the numbers of segment types which are among some: faster than numpy's isin."""
+    """Return for each number of a segment type whether it is among some; faster than np.isin."""
     return np.array([kind in types for kind in SegmentType])
 
 
@@ -40,7 +40,7 @@ def segment_field(index: int, field: str = '') -> str:
 
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
-    """Return the execution mode: AUTO is SPLINE where only that meets twists or accelerations."""
+    """Return the execution mode; AUTO is SPLINE if only that meets twists or accelerations."""
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)
     points, inner = goal.waypoints, slice(len(goal.waypoints) - (not goal.keep_open))
@@ -50,15 +50,15 @@ def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
 
 
 def is_spline(goal: GoalTable) -> bool:
-    """Tell whether a timed spline joins the points of a goal."""
+    """Return whether a timed spline connects the points of a goal."""
     return resolve_execution_mode(goal).traits.is_spline
 
 
 def is_timed(goal: GoalTable) -> bool:
-    """Tell whether the goal has times; if not, speeds count."""
+    """Return whether the goal has times; if not, its speeds apply."""
     return bool(goal.waypoints.times.any())
 
 
 def is_optimized(kind: SegmentType) -> bool:
-    """Tell whether speeds are fractions of the robot's limits."""
+    """Return whether the speeds of a type are fractions of the robot's limits."""
     return kind in OPTIMIZED_TYPES

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
 
-#: Motions whose time is on the wire, without an acceleration.
+#: Motions that are sent with a time, if the goal has times, and so ignore the acceleration.
 _TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
 
 

@@ -43,7 +43,7 @@ from ur_cartesian_driver.planning.request.validate import check_list_lengths, ch
 class CheckedJointGoal:
     """A joint goal in rows, its joints in the order of the arm."""
 
-    #: (n,) [s], increasing
+    #: (n,) times of the points [s], increasing
     times: Floats
     #: (n, 6) [rad], [rad/s], [rad/s^2]; NaN where the goal gives none.
     joints: MotionRows
@@ -115,7 +115,7 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
 
 
 def _order(names: Sequence[str], tf_prefix: str) -> list[int]:
-    """Return where each joint of the arm stands in the goal."""
+    """Return the index in the goal of each joint of the arm."""
     known = [tf_prefix + name for name in JOINT_NAMES]
     for k, name in enumerate(names):
         _check_name(f'trajectory.joint_names[{k}]', name, names[:k], known)
@@ -198,7 +198,7 @@ def _check_time(index: int, time: float, before: float, options: PlanningOptions
 
 
 def _bounds(field: str, entries: Sequence[JointTolerance], tf_prefix: str) -> JointErrorBounds:
-    """Return the tolerances of the joints, those that are not named unlimited."""
+    """Return the tolerances of all joints; joints that are not named have no limits."""
     known = [tf_prefix + name for name in JOINT_NAMES]
     names = [entry.name for entry in entries]
     for k, entry in enumerate(entries):

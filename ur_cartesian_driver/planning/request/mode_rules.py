@@ -18,16 +18,16 @@ class ModeRule:
     """A field that not every execution mode can honour."""
 
     field: str
-    #: Which modes can.
+    #: Whether a mode with given traits can honour the field.
     is_able: Callable[[ModeTraits], bool]
-    #: Why the others cannot: a clause with ``{mode}`` and ``{value}``.
+    #: Why the other modes cannot: a clause with ``{mode}`` and ``{value}``.
     problem: str
-    #: What to do besides choosing another mode.
+    #: Alternative to another mode; continues the sentence that names the able modes.
     remedy: str = ''
 
 
 def only_rests(field: str) -> ModeRule:
-    """Return the row of something that is done where the arm stops."""
+    """Return the rule for a field whose events happen where the arm stops."""
     return ModeRule(
         field,
         lambda traits: not traits.streams_setpoints,
@@ -36,7 +36,7 @@ def only_rests(field: str) -> ModeRule:
 
 
 def switches_nothing(field: str) -> ModeRule:
-    """Return the row of an output that is switched while the arm moves."""
+    """Return the rule for a field whose outputs are switched while the arm moves."""
     return ModeRule(
         field,
         lambda traits: traits.switches_outputs,
@@ -44,7 +44,7 @@ def switches_nothing(field: str) -> ModeRule:
     )
 
 
-#: Of the goal as a whole, by field; the rows of events at points are in ``point_events``.
+#: Rules for fields of the goal as a whole; those for events at points are in ``point_events``.
 GOAL_RULES = {
     rule.field: rule
     for rule in (
@@ -74,8 +74,8 @@ def check_mode(goal: GoalTable, rule: ModeRule | None) -> None:
     """
     Refuse a field that the execution mode of a goal cannot honour.
 
-    :param rule: its row; None = all modes can.
-    :raises NotAvailable: names the field, and the modes that can.
+    :param rule: the rule for the field; None = all modes can honour it.
+    :raises NotAvailable: names the field, and the modes that can honour it.
     """
     if rule is None or not (value := getattr(goal, rule.field)):
         return

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rules about offsets that come while the arm moves (``path_offset``)."""
+"""Rules about path offsets that arrive while the arm moves (``path_offset``)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RUL
 
 def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse offsets that are not possible.
+    Refuse path offsets that are not possible.
 
-    :raises InvalidGoal: they are all 0.
+    :raises InvalidGoal: the limits of the offset are all 0.
     :raises NotAvailable: the robot cannot offset the path of the goal.
     """
     wanted = goal.path_offset
@@ -78,7 +78,7 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
 
 
 def offset_motion(wanted: PathOffset) -> tuple[float, float, float]:
-    """Return speed [m/s], acceleration [m/s^2] and timeout [s], defaults filled in."""
+    """Return speed [m/s], acceleration [m/s^2] and timeout [s], with defaults filled in."""
     given = (wanted.speed, wanted.acceleration, wanted.timeout)
     speed, acceleration, timeout = (
         value or default for value, default in zip(given, DEFAULT_OFFSET_MOTION, strict=True)

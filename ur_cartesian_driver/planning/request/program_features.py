@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Features that older robot programs lack: demands that are refused, and forms that replace others.
+Features that older robot programs lack: demands that are refused, and motions that are adapted.
 
-A robot program silently skips motion types that it does not know and goes on to the next point
-from where it is. So a plan has only what its program knows. No other module of planning asks for
-the wire dialect.
+A robot program silently skips motions of a type that it does not know, and moves to the next point
+from its present position. So a plan has only motions that its program knows. No other planning
+module looks at the wire dialect.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ def _first_stop(goal: GoalTable, _: PlanningOptions) -> str:
 class Feature:
     """A demand of a goal that not every robot program can meet."""
 
-    #: The field that makes the demand, or a function that finds it ('' = there is none).
+    #: The field that makes the demand, or a function that finds the field ('' = none).
     field: str | Callable[[GoalTable, PlanningOptions], str]
-    #: Why older programs cannot: a clause with ``{mode}`` and ``{dialect}``.
+    #: Why older programs cannot meet the demand: a clause with ``{mode}`` and ``{dialect}``.
     problem: str
     remedy: str
-    #: The programs that can.
+    #: Whether a program can meet the demand.
     is_known: Callable[[Dialect], bool] = _is_own
-    #: The execution modes in which the robot program has to.
+    #: Whether the robot program has to meet the demand in an execution mode.
     applies: Callable[[ModeTraits], bool] = _sends_points
 
     def demanded_by(self, goal: GoalTable, options: PlanningOptions) -> str:
@@ -81,7 +81,7 @@ class Feature:
         return self.field if getattr(goal, self.field) else ''
 
 
-#: In the order in which they are checked.
+#: All features, in the order in which they are checked.
 FEATURES = (
     Feature(
         'keep_open',
@@ -148,7 +148,7 @@ def check_program(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_joint_spline(options: PlanningOptions) -> None:
     """
-    Refuse a joint goal where the robot program counts too coarsely.
+    Refuse a joint goal if the time unit of the robot program is too coarse.
 
     :raises NotAvailable: names the wire dialect.
     """
@@ -166,16 +166,16 @@ def check_joint_spline(options: PlanningOptions) -> None:
 
 def takes_times(options: PlanningOptions) -> bool:
     """
-    Tell whether times of moves are sent.
+    Return whether times of moves are sent.
 
-    They are not where programs count in milliseconds: one that counts in microseconds would run a
-    segment a thousand times too fast, and a program does not report how it counts.
+    Times in milliseconds are not sent: a program that expects microseconds would run a segment a
+    thousand times too fast, and programs do not report which unit they expect.
     """
     return not options.dialect.is_coarse
 
 
 def time_remarks(goal: GoalTable, options: PlanningOptions) -> list[str]:
-    """Return a remark on a goal whose times are kept by speeds."""
+    """Return a remark on a goal whose times are met by sending speeds."""
     if takes_times(options) or not is_timed(goal) or is_spline(goal):
         return []
     return [
@@ -188,7 +188,7 @@ def check_wait(time: float, options: PlanningOptions) -> None:
     """
     Refuse a wait at a first point where the robot already is.
 
-    :raises NotAvailable: no time is sent.
+    :raises NotAvailable: times are not sent in the wire dialect.
     """
     if not takes_times(options):
         raise NotAvailable(
@@ -203,7 +203,7 @@ def round_radii(
     radii: Floats, begin: int, options: PlanningOptions
 ) -> tuple[Floats, list[tuple[int, str]]]:
     """
-    Return the blend radii (n,) [m] that the wire carries, and remarks on smaller ones by row.
+    Return the blend radii (n,) [m] on the wire, and remarks by row on those rounded down.
 
     :param begin: the number of the first point.
     """
@@ -220,7 +220,7 @@ def round_radii(
 
 
 def round_down(radius: _Lengths, options: PlanningOptions) -> _Lengths:
-    """Return the largest blend radius that the wire carries and that is not larger [m]."""
+    """Return the largest blend radius on the wire that is at most the given one [m]."""
     return options.dialect.round_down_radius(radius)
 
 
@@ -228,7 +228,7 @@ def round_down(radius: _Lengths, options: PlanningOptions) -> _Lengths:
 
 
 def takes_q_near(options: PlanningOptions) -> bool:
-    """Tell whether the robot program finds the joints of a pose near others (``q_near``)."""
+    """Return whether the robot program finds the joints of a pose near given ones (q_near)."""
     return options.dialect.supports_q_near
 
 
@@ -236,9 +236,9 @@ def adapt_primitive(
     primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
 ) -> tuple[Primitive, str]:
     """
-    Return a primitive as the robot program takes it, and the reason for a change or ''.
+    Return a primitive in a form that the robot program accepts, and the reason for a change or ''.
 
-    :param joints: the joint solution at its end [rad].
+    :param joints: the joint solution at the end of the primitive [rad].
     :raises NotAvailable: the program has no such motion.
     """
     reason = ''

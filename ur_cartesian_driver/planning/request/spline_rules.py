@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rules about goals whose points a spline joins: SPLINE and SERVO."""
+"""Rules about goals whose points a spline connects: SPLINE and SERVO."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 
 #: Shortest time from point to point [s].
 MIN_SPLINE_TIME = 0.001
-#: Larger values at points are mistakes [m], [m/s, rad/s], [m/s^2, rad/s^2].
+#: Larger positions [m], twists [m/s], [rad/s] and accelerations [m/s^2], [rad/s^2] of points must
+#: be mistakes.
 MAX_POINT_COORDINATE = 1000.0
 MAX_TWIST = 100.0
 MAX_ACCELERATION = 10_000.0
@@ -52,7 +53,7 @@ def check_spline_mode(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def check_spline(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse points that no spline joins."""
+    """Refuse points that a spline cannot connect."""
     if not is_spline(goal):
         return
     name = resolve_execution_mode(goal).name

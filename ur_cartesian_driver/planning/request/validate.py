@@ -80,7 +80,7 @@ def check(goal: Goal, options: PlanningOptions) -> GoalTable:
         table = goal_table(goal)
     except WrongType as error:
         raise InvalidGoal(error.field, error.problem) from None
-    with np.errstate(over='ignore', invalid='ignore'):  # any numbers may come
+    with np.errstate(over='ignore', invalid='ignore'):  # a goal may contain any numbers
         for rule in RULES:
             rule(table, options)
     return table
@@ -106,7 +106,7 @@ def _measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse limits on accelerations that the robot does not report.
+    Refuse tolerances of accelerations if the robot does not report accelerations.
 
     :param goal: with default tolerances filled in.
     """
@@ -128,7 +128,7 @@ def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse demands that need a whole path, or a path to which points are appended."""
+    """Refuse fields that need all points at once in open goals, or that need open goals."""
     fraction, horizon = goal.min_speed_fraction, goal.replace_horizon
     if fraction and goal.keep_open:
         raise InvalidGoal(
@@ -237,12 +237,12 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
             assert via is not None
             arc_through_via(i, start, via, end, ArcMode(segments.arc_modes[i]))
         elif is_same_pose(start, end):
-            # With a posture it may become a joint move: the planner decides.
+            # With a posture, the segment may become a joint move: the planner decides.
             if not (i in points.postures and options.on_posture_change == 'movej'):
                 raise duplicate_point_error(goal, i)
 
 
-#: All rules, in order: later ones rely on what earlier ones made sure of.
+#: All rules in order: later rules rely on what earlier ones have checked.
 RULES: tuple[Rule, ...] = (
     _number_of_points,
     check_fields,
@@ -270,9 +270,9 @@ RULES: tuple[Rule, ...] = (
 
 def check_stamp(age: float | None, options: PlanningOptions) -> None:
     """
-    Check when a goal was sent.
+    Check the time at which a goal was sent.
 
-    :param age: of its stamp on receipt [s]; None = it has no stamp.
+    :param age: age of the goal's stamp on receipt [s]; None = no stamp.
     """
     if age is None:
         return
@@ -299,7 +299,7 @@ def check_list_lengths(
     if_empty: str,
     if_too_many: str,
 ) -> None:
-    """Check how many points and segments there are; two remedies end the refusals."""
+    """Check the numbers of points and segments; ``if_...`` are the remedies in refusals."""
     if points == 0:
         raise InvalidGoal(field, 'is empty', if_empty)
     if points > options.max_points:
@@ -318,8 +318,8 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
     """
     Check names and values of a posture.
 
-    :raises InvalidJoints: a name is unknown or doubled, the numbers differ, or a value is not
-        finite.
+    :raises InvalidJoints: a name is unknown or repeated, names and values differ in number, or a
+        value is not finite or too large.
     """
     names, values = posture.names, posture.values
     if len(names) != len(values):
@@ -353,7 +353,7 @@ def arc_through_via(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode
     """
     Return the arc of a CIRCULAR segment.
 
-    :raises InvalidGoal: start, via and end make no circle.
+    :raises InvalidGoal: start, via and end do not define an arc.
     """
     try:
         return ArcCurve.through(start, via.position, end, mode)

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a joint goal to a plan: the joint polynomials through its points, checked along the way.
+Plan a joint goal: joint polynomials through its points, checked along the way.
 
-The robot gets the client's points, piece by piece; a SPLINE goal differs only in where
-its pieces come from. The path of the tool follows from the joints, so that progress, limits of the
-tool and clearance are those of all goals. Joints may pass singularities.
+The robot gets the client's points as pieces of a spline; for a SPLINE goal, the driver computes
+the pieces. The path of the tool is derived from the joints, so that progress, tool limits and
+clearance are checked as for all goals. The joints are allowed to pass singularities.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, samp
 from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
-# A joint that is faster at a point than this many times the mean of a piece beside it overshoots.
+# A joint overshoots if it is faster at a point than this many times its mean on an adjacent piece.
 _MAX_MONOTONE = 3.0
 # Rounding of a joint position [rad].
 _ROUNDING = 1e-9
@@ -60,9 +60,9 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Trajectory:
-    """The joints at the ends of n pieces, from rest where the arm stands."""
+    """The joints at the ends of n pieces, from rest at the arm's position."""
 
-    #: (n + 1,) [s], whole microseconds; (n + 1, 6) each.
+    #: Times (n + 1,) [s], in whole microseconds; joint rows (n + 1, 6) each.
     times: Floats
     joints: MotionRows
     quintic: bool
@@ -76,7 +76,7 @@ class _Trajectory:
         return JointSpline.through(self.times, self.joints, quintic=self.quintic)
 
     def stretched(self, factor: float) -> _Trajectory:
-        """Return the same path with all times multiplied by a factor, of whole microseconds."""
+        """Return the same path with all times multiplied by a factor, in whole microseconds."""
         q, qd, qdd = self.joints
         return replace(
             self,
@@ -89,7 +89,7 @@ class _Trajectory:
 class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
-    #: (m,) the piece, and the fraction of its time; (m,) [s]
+    #: (m,) the piece, the fraction of its time, and the time [s]
     piece: Indices
     u: Floats
     times: Floats
@@ -156,7 +156,7 @@ def plan_joint_goal(
 def _cartesian_goal(
     checked: CheckedJointGoal, state: RobotState, arm: Arm, options: PlanningOptions
 ) -> GoalTable:
-    """Return the meaning of the goal for the tool."""
+    """Return the equivalent goal of the tool."""
     n = len(checked.times)
     table = GoalTable(
         waypoints=WaypointRows(
@@ -177,7 +177,7 @@ def _cartesian_goal(
 def _trajectory(
     checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
 ) -> _Trajectory:
-    """Return the goal from where the arm stands, without NaN."""
+    """Return the goal's trajectory from the arm's position, with NaN replaced."""
     times, joints, remarks, first = checked.times, checked.joints, [], 0
     if times[0] == 0.0:
         _check_start(checked, state, options)
@@ -229,10 +229,11 @@ def _check_start(checked: CheckedJointGoal, state: RobotState, options: Planning
 
 def _chosen_velocities(times: Floats, q: Floats) -> Floats:
     """
-    Return velocities of parabolas through the neighbours; 0 at both ends.
+    Return the velocities of parabolas through each point and its neighbours; 0 at both ends.
 
-    They are limited so that a joint moves only one way between two points, and rests for a moment
-    where it turns back (F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation).
+    They are limited so that a joint moves in only one direction between two points, and rests for
+    a moment where it reverses (F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic
+    interpolation).
     """
     h = np.diff(times)[:, None]
     mean = np.diff(q, axis=0) / h
@@ -245,7 +246,7 @@ def _chosen_velocities(times: Floats, q: Floats) -> Floats:
 
 
 def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
-    """Return samples as dense as for all goals, of the tool and of the fastest joint."""
+    """Return samples that are dense enough for the tool and for the fastest joint."""
     spline, times = trajectory.spline, trajectory.times
     piece, t = coarse_samples(times)
     q, qd, qdd = evaluate(spline.coefficients[piece], t)
@@ -292,7 +293,7 @@ def _check_ranges(samples: _Samples, arm: Arm) -> None:
 def _fit_to_limits(
     trajectory: _Trajectory, samples: _Samples, arm: Arm, options: PlanningOptions
 ) -> tuple[_Trajectory, tuple[str, ...]]:
-    """Return the trajectory in a time that keeps the limits, and a remark if that is longer."""
+    """Return the trajectory, slowed if the limits require it, and a remark on the slowing."""
     found = worst_excess_of(
         RateSamples(
             points=samples.points,

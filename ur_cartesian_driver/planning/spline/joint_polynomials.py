@@ -4,8 +4,8 @@
 Fit joint polynomials that keep the tool on a tool spline.
 
 A piece has the joint positions, velocities and accelerations of the tool spline at its ends; in
-between the tool deviates. The forward kinematics measures by how much, and a piece that deviates
-more than allowed is halved, until none does.
+between, the tool deviates from the spline. Forward kinematics gives the deviation, and pieces that
+deviate more than allowed are halved until none does.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 #: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
 TICK = 1e-6
-#: An angular tolerance of a tool spline is its linear one at this distance [m].
+#: The angular tolerance of a tool spline is the linear one divided by this radius [m].
 ANGLE_TOLERANCE_RADIUS = 0.1
-#: Pieces are not halved below this [s]: one cycle of the fastest controllers.
+#: Pieces are not halved below this time [s]: one cycle of the fastest controllers.
 _MIN_PIECE_TIME = 0.002
-# Digits of joint rates that are more than rounding.
+# Digits of joint rates; further ones are rounding errors.
 _DIGITS = 12
 #: Minimum and maximum number of samples inside a piece at which the tool is compared.
 _COMPARED_SAMPLES = 7, 23
@@ -47,11 +47,11 @@ _COMPARED_SAMPLES = 7, 23
 class JointPolynomials:
     """The joints over time, in n pieces."""
 
-    #: (n + 1,) [s], whole ticks.
+    #: (n + 1,) times of the ends [s], in whole ticks.
     times: Floats
     #: (n + 1, 6) each
     joints: MotionRows
-    #: (n,) the piece of the tool spline that each is a part of.
+    #: (n,) the piece of the tool spline to which each joint piece belongs.
     piece: Indices
     quintic: bool
     #: Maximum deviation of the tool from the tool spline [m], [rad].
@@ -68,13 +68,13 @@ def fit_joint_polynomials(
     max_time: float = inf,
 ) -> JointPolynomials:
     """
-    Return the pieces for a spline path.
+    Return the joint pieces for a spline path.
 
-    :param start: the joints at its start (1, 6).
-    :param tolerance: maximum deviation of the tool [m]; a turn counts as its arc at
-        ANGLE_TOLERANCE_RADIUS.
-    :param max_time: of a piece [s].
-    :raises TooFast: pieces as short as a controller cycle are not enough.
+    :param start: the joints at the start of the path (1, 6).
+    :param tolerance: maximum deviation of the tool [m]; for turns, the length of an arc with the
+        radius ANGLE_TOLERANCE_RADIUS.
+    :param max_time: longest time of a piece [s].
+    :raises TooFast: even pieces of one controller cycle deviate too much.
     """
     bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
     refinement = _PieceRefinement(kinematics, path, start, quintic)
@@ -83,7 +83,7 @@ def fit_joint_polynomials(
 
 
 class _PieceRefinement:
-    """The pieces so far, in order of time, and which of them are not compared yet."""
+    """The pieces so far, in order of time, with flags for those that are not compared yet."""
 
     def __init__(
         self, kinematics: TcpKinematics, path: SplinePath, start: MotionRows, quintic: bool
@@ -92,7 +92,7 @@ class _PieceRefinement:
         self._sample_times = path.times
         spline = path.spline
         n = len(spline.positions)
-        #: Ends by the piece of the tool spline they lie on, and the exact time there.
+        #: The piece of the tool spline on which each joint piece lies, and the times of all ends.
         self.piece = np.arange(n)
         self.times = np.concatenate([spline.times[:1], to_ticks(spline.times[1:])])
         joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
@@ -103,12 +103,12 @@ class _PieceRefinement:
         self.deviation = np.zeros((n, 2))
 
     def halve_longer_than(self, time: float) -> None:
-        """Halve pieces until none takes longer [s]."""
+        """Halve pieces until none takes longer than a time [s]."""
         while len(rows := np.flatnonzero(np.diff(self.times) > time + TICK)):
             self._halve(rows)
 
     def refine_within(self, bounds: Floats) -> JointPolynomials:
-        """Halve pieces until the tool keeps within (distance [m], angle [rad])."""
+        """Halve pieces until the tool keeps within bounds (distance [m], angle [rad])."""
         while True:
             rows = np.flatnonzero(self.pending)
             self.deviation[rows] = self._deviations(rows)
@@ -128,7 +128,7 @@ class _PieceRefinement:
         )
 
     def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:
-        """Return the joints at times ``t`` since pieces of the tool spline began."""
+        """Return the joints at times ``t`` since the beginnings of pieces of the tool spline."""
         tool = self.path.spline.rows(piece, t)
         near = self.path.q[
             np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
@@ -139,7 +139,7 @@ class _PieceRefinement:
         qd, qdd = joint_rates(
             self.kinematics.arm, self.kinematics.T_flange_tcp, q, tool.twists, tool.accelerations
         )
-        # At rest is exactly at rest.
+        # Rounded, so that rates at rest are exactly 0.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
     def _coefficients(self, rows: Indices) -> Floats:

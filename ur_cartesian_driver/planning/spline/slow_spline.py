@@ -1,9 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find where a spline is slower than requested: than the mean speed by its times on a segment.
+Find the stretches on which a spline is slower than requested.
 
-Where the twists of its points are lower, they count. Speeds come from the joint polynomials.
+The requested speed is the mean speed that the times give a segment, or near a point the speed of
+its twist, if that is lower. Speeds are computed from the joint polynomials.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointPolynomials
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
-#: A shorter segment carries the tool nowhere [m]; a slower tool rests [m/s].
+#: A segment shorter than this does not move the tool [m]; a tool slower than this rests [m/s].
 _MIN_LENGTH = 1e-6
 _REST = 1e-9
-#: Directions with a smaller product reverse.
+#: Unit directions whose dot product is below this reverse.
 _REVERSAL = -0.5
-#: How many places are compared for each sample of the path.
+#: Number of places that are compared for each sample of the path.
 _PER_SAMPLE = 4
 
 
@@ -39,9 +40,9 @@ def slow_spline_stretches(
     """
     Return the slow stretches of a spline from rest to rest.
 
-    :param twists: (n, 6) those that the goal gives its points; NaN and 0 = none.
+    :param twists: (n, 6) the twists that the goal gives its points; NaN and 0 = none.
     :param stretch: the factor by which the times of the goal were stretched because of a limit.
-    :param slower_by: fraction of the speed that counts as slower.
+    :param slower_by: the fraction of the requested speed by which a slow stretch falls short.
     """
     piece, u, times = _places(path)
     joints = JointSpline.through(
@@ -55,7 +56,7 @@ def slow_spline_stretches(
     edges = np.flatnonzero(np.diff(speeds < wanted, prepend=False, append=False))
     found = []
     for first, stop in edges.reshape(-1, 2).tolist():
-        # Slower from a sample on: it may be since the sample before it.
+        # The tool may have been slower since the last sample before the first slow one.
         begin, end = max(first - 1, 0), min(stop, len(speeds) - 1)
         slowest = first + int(np.argmin(speeds[first:stop] / asked[first:stop]))
         is_ramp = (first == 0 or stop == len(speeds)) and piece[first] == piece[stop - 1]
@@ -101,7 +102,7 @@ def _places(path: SplinePath) -> tuple[Int64s, Floats, Floats]:
 def _asked_speeds(
     path: SplinePath, piece: Int64s, u: Floats, twists: Floats, stretch: float
 ) -> Floats:
-    """Return the speeds asked for at places [m/s]; 0 where the tool is carried nowhere."""
+    """Return the requested speeds at places [m/s]; 0 on segments that do not move the tool."""
     n = len(twists)
     ends = np.searchsorted(path.piece, np.arange(n), side='right') - 1
     lengths = np.diff(path.length[ends], prepend=0.0)

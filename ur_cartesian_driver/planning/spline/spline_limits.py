@@ -28,8 +28,8 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 _ROUNDING = 1e-6
 
 
-#: A quantity along a spline: what, its values (m,), limit, power (1 for speeds, 2 for
-#: accelerations), unit and name of the limit.
+#: A quantity along a spline: what needs it (tool or joint), values (m,), limit, power (1 for
+#: speeds, 2 for accelerations), unit and name of the limit.
 _Quantity: TypeAlias = tuple[str, Floats, float, int, str, str]
 
 
@@ -41,9 +41,9 @@ class LimitExcess:
     limit: float
     unit: str
     name: str
-    #: Times multiplied by this keep the limit.
+    #: The factor by which all times must be multiplied to keep the limit.
     factor: float
-    #: The segment, the fraction of its time, and the value there.
+    #: The point at the end of the segment, the fraction of the segment's time, and the value.
     point: int
     fraction: float
     needed: float
@@ -57,8 +57,8 @@ class LimitExcess:
         """
         Return the refusal of the goal.
 
-        :param may_slow: whether the driver could give it more time.
-        :param rates: what its points call their velocities.
+        :param may_slow: whether the driver could stretch the times itself.
+        :param rates: the word for velocities in the goal's points.
         """
         return TooFast(
             point_field(self.point, 'time_from_start'),
@@ -70,14 +70,14 @@ class LimitExcess:
 
     @property
     def reason(self) -> str:
-        """The limit, and where it is exceeded."""
+        """The limit, and the place where it is exceeded."""
         return f'{self.limit_text} ({self.what}, on the segment to point {self.point})'
 
     def check_slowed(self, times: Floats, first: int, options: PlanningOptions) -> None:
         """
         Check times (n,) that are stretched by the factor.
 
-        :param first: the point to which the first of their pieces leads.
+        :param first: the point to which the first piece leads.
         :raises InvalidGoal: a piece takes too long.
         """
         durations = np.diff(times)
@@ -92,7 +92,7 @@ class LimitExcess:
 
 
 def stretch_remark(factor: float, reason: str, duration: float) -> str:
-    """Return the line of the report on times that are stretched, to a duration [s]."""
+    """Return the remark on times that are stretched, with the total duration [s]."""
     return (
         f'all times are stretched by {factor:.4g}, because of {reason}: {duration:.3f} s in total'
     )
@@ -100,7 +100,7 @@ def stretch_remark(factor: float, reason: str, duration: float) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateSamples:
-    """Tool and joints in samples of a spline."""
+    """The rates of tool and joints at samples of a spline."""
 
     #: (m,) the point to which the sample's piece leads, and the fraction of the piece's time.
     points: Int32s
@@ -133,7 +133,7 @@ def worst_excess(
 def worst_excess_of(
     samples: RateSamples, model: RobotModel, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return the quantity of some samples that exceeds its limit most, None if none does."""
+    """Return the quantity in samples that exceeds its limit most, None if none does."""
     worst: LimitExcess | None = None
     for what, values, limit, power, unit, name in _quantities(samples, model, options):
         row = int(np.argmax(values))

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The spline path: the arm along a tool spline, sampled in time, or why it cannot follow.
+The spline path: the arm along a tool spline, sampled in time, or the refusal.
 
-Samples are evenly spaced in time on each piece, so densely that the tool moves at most 2 mm and
-turns at most a degree where it is fastest, and that the chords between them stay within some
+Samples are evenly spaced in time on each piece, so densely that between two samples the tool moves
+at most 2 mm and turns at most a degree where it is fastest, and that chords stay within some
 micrometres of the curve.
 """
 
@@ -51,12 +51,12 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Samples of a piece that estimate its peak speed, and how much faster it may be in between.
+# Number of samples that estimate the peak speed of a piece, and factor for the peak between them.
 _COARSE_SAMPLES = 9
 _SPEED_MARGIN = 1.05
 #: Maximum turn within a piece [rad]: rotation vectors are ambiguous beyond.
 _MAX_TURN = 2.0 * pi
-#: Maximum number of samples of a goal; each takes a quarter of a kilobyte while it is checked.
+#: Maximum number of samples of a goal; each needs a quarter of a kilobyte while it is checked.
 MAX_SAMPLES = 2_000_000
 
 
@@ -70,13 +70,13 @@ class SplinePath:
     #: (m,) the piece of each sample and the fraction of the piece's time; row 0 is the start.
     piece: Indices
     u: Floats
-    #: (m, 7) the TCP in base, (m, 6) [rad].
+    #: (m, 7) poses of the TCP in base; (m, 6) joint positions [rad].
     poses: Floats
     q: Floats
     #: (m,) path length and turn of the tool since the start [m], [rad].
     length: Floats
     angle: Floats
-    #: Of the segments to the points.
+    #: The tightest margin of each segment.
     tightest_margins: TightestMargins
 
     @property
@@ -109,11 +109,11 @@ def solve_spline_path(
     """
     Return the path of the arm along a spline.
 
-    :param postures: those at the ends of its pieces, by their number.
-    :param first: the number of the first of them.
-    :param rests: whether the arm is at rest at its begin.
-    :param q_start: the configuration at its begin [rad].
-    :raises GoalRefused: the arm cannot follow.
+    :param postures: the postures at the ends of pieces, by the number of the piece.
+    :param first: the number of the point at the end of the first piece.
+    :param rests: whether the arm is at rest at the start of the spline.
+    :param q_start: the configuration at the start of the spline [rad].
+    :raises GoalRefused: the arm cannot follow the spline.
     """
     coarse = coarse_samples(spline.times)
     _check_sizes(kinematics, spline, coarse, first)
@@ -164,7 +164,7 @@ def _check_path(
     postures: Mapping[int, Posture],
     options: PlanningOptions,
 ) -> None:
-    """Raise the first reason why the arm cannot follow."""
+    """Raise the first refusal along the path, if there is one."""
     refusal, index = first_refusal(joint_path, measures, options)
     for k, posture in postures.items():
         point = int(joint_path.pieces.index[k])
@@ -241,8 +241,8 @@ def sample_count(
     """
     Return the number of samples of each piece.
 
-    :param speed: of the tool in the coarse samples [m/s]; ``turn_rate`` [rad/s] and
-        ``acceleration`` [m/s^2] likewise.
+    :param speed: speed of the tool at the coarse samples [m/s]; likewise ``turn_rate`` [rad/s]
+        and ``acceleration`` [m/s^2].
     :param first: the number of the point at the end of the first piece.
     """
     h = np.diff(times)

@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From points with times, twists and accelerations to joint spline pieces: SPLINE and SERVO.
+Plan the joint spline pieces of SPLINE and SERVO goals.
 
-Points -> the tool over time (:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm
-along it (:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A
-motion may be planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, also a
-moving one, and :func:`plan_stop` brings such a motion to rest.
+The steps: points with times, twists and accelerations -> the tool over time
+(:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm along that motion
+(:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion can be
+planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, even a moving one, and
+:func:`plan_stop` brings such a motion to rest.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, wo
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
-# Samples of a stopping piece, and how much shorter the next try is.
+# Samples of a stopping piece, factor on its time for the next try, and number of tries.
 _SAMPLES = 17
 _SHORTENING = 0.8
 _TRIES = 20
@@ -66,9 +67,9 @@ _TRIES = 20
 class SplineState:
     """State of the joints at the end of a spline piece, as the robot program continues from it."""
 
-    #: From the start of the motion [s].
+    #: Time since the start of the motion [s].
     time: float = 0.0
-    #: [rad], [rad/s], [rad/s^2]; after a cubic piece the acceleration counts as 0.
+    #: Joints [rad], [rad/s], [rad/s^2]; after a cubic piece, the acceleration is taken as 0.
     q: Joints
     qd: Vector6 = ZERO6
     qdd: Vector6 = ZERO6
@@ -92,7 +93,7 @@ class SplineState:
         return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
 
     def tool(self, arm: Arm, T_flange_tcp: Pose) -> ToolPoints:
-        """Return the TCP in base, one row."""
+        """Return the motion of the TCP in base, as one row."""
         q, qd, qdd = self.rows()
         twist, acceleration = tool_rates(arm, T_flange_tcp, q, qd, qdd)
         return ToolPoints(
@@ -108,13 +109,13 @@ class SplineState:
 class SplinePieces:
     """A part of a motion that passed all checks."""
 
-    #: One for each piece; the last piece to a point carries its report line.
+    #: One row for each piece; the last piece to a point carries the point's report line.
     segments: PlannedRows
     #: Row 0 is the start; times are from the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
     find_slow_stretches: Callable[[], tuple[SlowStretch, ...]]
-    #: At the last point.
+    #: State at the last point.
     end: SplineState
     #: Factor by which all times were stretched.
     stretch: float = 1.0
@@ -133,11 +134,11 @@ def plan_spline(
     """
     Return the pieces from a state to points.
 
-    :param goal: its waypoints come after the state, and their times count from the start of the
-        motion. With ``keep_open`` it may end moving; then the stop of :func:`plan_stop` is checked
-        as well.
+    :param goal: the goal, whose waypoints come after the state, with times since the start of the
+        motion. With ``keep_open``, the pieces can end in motion; then the stop by
+        :func:`plan_stop` is checked as well.
     :param T_flange_tcp: the TCP of the motion.
-    :param first: the index of its first waypoint in the whole goal.
+    :param first: the index of the first of these waypoints in the whole goal.
     :param tool_tips: the TCPs to check for collisions; empty = the TCP.
     :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
@@ -204,8 +205,8 @@ def _max_piece_time(goal: GoalTable) -> float:
     """
     Return the longest duration of a piece [s].
 
-    The robot gets whole pieces. A goal with a replaceable tail therefore has pieces of at most a
-    third of its horizon; set-points have no such limit.
+    The robot gets whole pieces only, so the pieces of a goal with a replaceable tail take at most
+    a third of its horizon; set-points have no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
         return inf
@@ -213,7 +214,7 @@ def _max_piece_time(goal: GoalTable) -> float:
 
 
 def end_state(plan: Plan) -> SplineState:
-    """Return where a plan of spline pieces ends."""
+    """Return the state at the end of a plan of spline pieces."""
     return SplineState.after(plan.segments[-1], float(plan.reference.time[-1]))
 
 
@@ -221,11 +222,11 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
-    Velocities fall as cubics to rest without acceleration, so the peak deceleration of the fastest
-    joint is 1.5 times its mean. It brakes harder if it would otherwise leave the range of a joint
-    or, while it still accelerates, exceed its speed limit.
+    Velocities are cubics of time that end at 0 without acceleration, so the peak deceleration of
+    the fastest joint is 1.5 times its mean. The arm brakes harder if a joint would otherwise leave
+    its range or, while still accelerating, exceed its speed limit.
 
-    :param deceleration: peak of the fastest joint [rad/s^2].
+    :param deceleration: peak deceleration of the fastest joint [rad/s^2].
     :raises JointLimitExceeded: the end of a range is too close.
     """
     v, a = np.array(state.qd), np.array(state.qdd)
@@ -267,7 +268,7 @@ def _fit_to_limits(
     goal: GoalTable,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, str]:
-    """Return the path in a time that keeps the limits, the factor, and the limit; '' = none."""
+    """Return the path, slowed if the limits require it, the factor, and the limit ('' = none)."""
     found = worst_excess(kinematics, path, options)
     if found is None:
         return path, 1.0, ''
@@ -286,7 +287,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
     n = len(durations)
 
     def lines() -> list[str]:
-        """Connect the last pieces to the points."""
+        """Return a line for the last piece to each point, and '' for the other pieces."""
         last = np.flatnonzero(np.diff(polynomials.piece, append=-1))
         count = np.diff(last, prepend=-1)
         done = np.add.reduceat(
@@ -319,7 +320,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
 
 
 def _segment_line(goal: GoalTable, first: int, k: int, count: int, done: Sequence[float]) -> str:
-    """Return what a segment does to its point: ``done`` are its length, turn and time."""
+    """Return the report line of a segment; ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
     speed = (
@@ -346,7 +347,7 @@ def _clearance_remarks(
     start: SplineState,
     options: PlanningOptions,
 ) -> list[str]:
-    """Return the remarks on clearance; the stop after a moving end counts as well."""
+    """Return the remarks on clearance, including the stop after a moving end."""
     q, points, u = path.q[1:], path.points[1:], path.u[1:]
     if end.is_moving:
         on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]

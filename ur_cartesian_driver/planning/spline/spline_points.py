@@ -3,9 +3,9 @@
 """
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-A point whose twist is 0 is a stop. NaN is chosen: a velocity from the parabola through the point
-and its neighbours, an acceleration as the mean of its values on the cubics before and after the
-point.
+The tool stops at a point whose twist is 0. For NaN the driver chooses a velocity from the parabola
+through the point and its neighbours, and an acceleration as the mean of those that the cubics
+before and after the point have there.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
-# A shorter step is none: the tool rests at both of its points [m], [rad].
+# If the step between two points is shorter than this [m], [rad], the tool rests at both.
 _MIN_DISTANCE = 1e-9
 
 
 def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     """
-    Return the points of a checked goal in base, behind the start.
+    Return the start and the points of a checked goal after it, in base.
 
-    :param goal: its waypoints are those behind the start.
+    :param goal: the goal, whose waypoints come after the start.
     :param start: the tool at the start in base, one row.
     """
     given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
     if goal.replace_horizon and not given.accelerations.any():
-        # A tail begins anywhere: the acceleration goes on there, and at every point.
+        # A new tail can begin anywhere on the path, so the acceleration must not jump at points.
         given = replace(given, accelerations=np.full_like(given.accelerations, np.nan))
     poses = np.concatenate([start.poses, given.poses])
     poses[:, 3:] = normalized_rows(poses[:, 3:])
@@ -93,7 +93,7 @@ def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
 
 
 def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
-    """Return the points without NaN."""
+    """Return the points with chosen values in place of NaN."""
     twists, accelerations = points.twists, points.accelerations
     if np.isnan(twists).any():
         twists = np.where(np.isnan(twists), _chosen_twists(points, ends_moving), twists)
@@ -106,10 +106,10 @@ def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
 
 def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
     """
-    Return velocities of parabolas through the neighbours; 0 at the start.
+    Return the velocities of parabolas through each point and its neighbours; 0 at the start.
 
-    The angular ones by the rotation vectors from the point to its neighbours: in these coordinates
-    the angular velocity at the point is their derivative.
+    Angular velocities come from the rotation vectors from the point to its neighbours, as the
+    derivative of these vectors at the point is the angular velocity.
     """
     h = np.diff(points.times)[:, None]
     displacement = np.concatenate(
@@ -132,7 +132,7 @@ def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
 
 
 def _chosen_accelerations(points: ToolPoints, twists: Floats) -> Floats:
-    """Return the means of what cubics before and after each point have there; 0 at both ends."""
+    """Return the mean accelerations of the cubics before and after each point; 0 at both ends."""
     h = np.diff(points.times)[:, None]
     inner = slice(1, -1)
     poses, zero = points.poses, np.zeros((len(points.times) - 2, 3))

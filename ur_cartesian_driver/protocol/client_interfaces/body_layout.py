@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Bodies of the primary interface whose values stand one after the other, big-endian.
+Bodies of the primary interface: big-endian values, one after the other.
 
 A layout names one item for each value: the ``struct`` code of a number (``d``), the counted code
-of a vector (``6d``), ``text`` for a text up to the end of the body, or ``B:text`` for a text after
-its length.
+of a vector (``6d``), ``text`` for a text that extends to the end of the body, or ``B:text`` for a
+text that follows its length, here of the code ``B``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def pack(layout: struct.Struct, *values: Any) -> bytes:
 
 def unpack(layout: struct.Struct, body: bytes, what: str, offset: int = 0) -> tuple[Any, ...]:
     """
-    Return the values at an offset of a body, which may be longer.
+    Return the values at an offset in a body; bytes after the values are ignored.
 
     :raises RemoteProtocolError: the body is too short.
     """
@@ -54,7 +54,7 @@ class BodyLayout:
         Compile the layout.
 
         :param what: the name of the body, for error texts.
-        :param padding: zero bytes behind the values [bytes]; a body that is read may lack them.
+        :param padding: zero bytes after the values [bytes]; a body that is read may lack them.
         """
         self._what = what
         self._padding = bytes(padding)
@@ -63,14 +63,14 @@ class BodyLayout:
             (struct.Struct(f'>{codes}'), item.endswith(_TEXT))
             for codes, item in zip(pairs, items.split(), strict=True)
         ]
-        #: Bytes of all items, texts not counted.
+        #: Size of all items without the characters of texts [bytes].
         self.size = sum(layout.size for layout, _ in self._items)
 
     def pack(self, values: Iterable[Any]) -> bytes:
         """
         Return the body.
 
-        :param values: one for each item; vectors are tuples, also nested ones.
+        :param values: one for each item; vectors are tuples, possibly nested.
         :raises LocalProtocolError: a value does not fit.
         """
         parts = []

@@ -23,9 +23,9 @@ From the controller: frames, big-endian. ``int32`` size of the whole frame, ``ui
 
 * every other type becomes a :class:`RawFrame`.
 
-To the controller: text. A line is a command; ``def`` or ``sec`` begins a program, which replaces
-the running one (``sec``: runs beside it) when its ``end`` has arrived. The simulator's
-`script_upload` decodes it.
+To the controller: text. A line is a command, unless ``def`` or ``sec`` begins a program. When its
+``end`` has arrived, a ``def`` program replaces the running one, and a ``sec`` program runs
+concurrently. The simulator's `script_upload` decodes this text.
 
 Obligations of a controller towards the manufacturer's library: send the version message first on
 each connection; send a frame in one piece of at most 4091 bytes (checked here); never send a
@@ -126,7 +126,7 @@ class VersionMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyModeMessage(_Message):
-    """The safety mode changed, to a number of :class:`SafetyMode` or a newer one."""
+    """The safety mode changed to a :class:`SafetyMode` or a newer number."""
 
     message_type: ClassVar = 5
     layout: ClassVar = BodyLayout('i i B I 4s', 'safety mode message')
@@ -199,7 +199,7 @@ class RuntimeExceptionMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawMessage:
-    """A message of another type, as it came."""
+    """A message of any other type, undecoded."""
 
     message_type: int
     timestamp: int = 0
@@ -231,7 +231,7 @@ class RobotStateFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawFrame:
-    """A frame of another type, as it came."""
+    """A frame of any other type, undecoded."""
 
     frame_type: int
     body: bytes
@@ -285,7 +285,7 @@ class PrimaryDecoder:
 
     def feed(self, data: bytes) -> list[PrimaryFrame]:
         """
-        Take bytes from the controller (none at all = its end) and return the frames in them.
+        Take bytes from the controller (``b''`` = end of stream) and return the frames in them.
 
         :raises RemoteProtocolError: a size is impossible, something is too short, or the stream
             ended inside a frame.
@@ -318,7 +318,7 @@ _MESSAGES: Mapping[int, type[_TypedMessage]] = {
 
 
 class PrimaryCommand(Enum):
-    """Commands of one line, outside programs."""
+    """One-line commands, outside programs."""
 
     POWER_ON = 'power on'
     POWER_OFF = 'power off'

@@ -4,8 +4,8 @@
 The sub-packages of a robot state frame on the primary interface.
 
 Each is ``uint32`` size (including these five bytes), ``uint8`` type, body; big-endian. A UR5e
-sends them in the order and sizes of this table, 1386 bytes with the frame's header. We decode the
-known part at the front of a body: newer software appends to it, but never sends less.
+sends them in the order and with the sizes of this table, 1386 bytes with the frame's header. We
+decode the known front part of a body: newer software appends fields, but never sends fewer.
 
 ====  ====================  ====  ===============================================================
 type  class                 size  body
@@ -68,7 +68,7 @@ _BOARD_TAIL = BodyLayout('I B ? B', 'masterboard data')
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawSubPackage:
-    """A sub-package as it came."""
+    """A sub-package that is not decoded."""
 
     sub_type: int
     body: bytes
@@ -101,7 +101,7 @@ class RobotModeData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointData:
-    """Joint positions [rad], speeds [rad/s], currents [A], voltages [V], motor heat [deg C]."""
+    """Joint positions [rad], speeds [rad/s], currents [A], voltages [V], temperatures [deg C]."""
 
     sub_type: ClassVar = 1
     q_actual: Vector6
@@ -130,7 +130,7 @@ class JointData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolData(Body):
-    """Tool connector: inputs [V or A, by range], voltages [V], current [A], heat [deg C]."""
+    """Tool connector: inputs [V or A by range], voltages [V], current [A], temperature [deg C]."""
 
     sub_type: ClassVar = 2
     layout: ClassVar = BodyLayout('2B 2d f B f f B', 'tool data')
@@ -213,7 +213,7 @@ class MasterboardData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianInfo(Body):
-    """TCP in the base and in the flange: ``x y z rx ry rz`` [m, rad]."""
+    """TCP in the base frame and in the flange frame: ``x y z rx ry rz`` [m, rad]."""
 
     sub_type: ClassVar = 4
     layout: ClassVar = BodyLayout('6d 6d', 'Cartesian info')
@@ -263,9 +263,9 @@ class ConfigurationData:
     alpha: Vector6
     theta: Vector6
     masterboard_version: int = 6
-    #: 4 = of a UR5, 5 = UR10, 6 = UR3, 10 = UR20, 11 = UR30, 16 = UR16.
+    #: Controller box for: 4 = UR5, 5 = UR10, 6 = UR3, 10 = UR20, 11 = UR30, 16 = UR16.
     controller_box_type: int = 4
-    #: 1 = UR5 (UR7e, too), 2 = UR10 (UR12e, too), 3 = UR3, 4 = UR16, 5 = UR18, 6 = UR8 Long,
+    #: 1 = UR5 (also UR7e), 2 = UR10 (also UR12e), 3 = UR3, 4 = UR16, 5 = UR18, 6 = UR8 Long,
     #: 7 = UR20, 8 = UR30, 9 = UR15.
     robot_type: int
     #: 2 = CB3, 3 = e-Series.
@@ -291,7 +291,7 @@ class ConfigurationData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceModeData(Body):
-    """Force [N] and torque [Nm] at the TCP, and a measure of distance to singularities."""
+    """Force [N] and torque [Nm] at the TCP, and a measure of the distance to singularities."""
 
     sub_type: ClassVar = 7
     layout: ClassVar = BodyLayout('6d d', 'force mode data')
@@ -345,7 +345,7 @@ class ToolModeInfo(Body):
     digital_output_mode_1: int = 1
 
 
-#: The content is for the manufacturer only; we know its size.
+#: The safety data, whose content is for the manufacturer only; its size is known.
 SAFETY_DATA = RawSubPackage(sub_type=10, body=bytes(38))
 
 SubPackage: TypeAlias = (

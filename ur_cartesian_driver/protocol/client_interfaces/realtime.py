@@ -3,9 +3,9 @@
 """
 The packet of the real-time interface (port 30003), which the controller sends in every cycle.
 
-``int32`` size (including these four bytes), then big-endian doubles only, also for integers:
-modes, and the bits of inputs and outputs as one number. Newer software appended fields and never
-changed earlier ones, so one table describes all versions, and the size tells where a packet ends::
+``int32`` size (including these four bytes), then only big-endian doubles, even for integers: for
+modes, and for the bits of all inputs or all outputs. Newer software appended fields and never
+changed earlier ones, so one table describes all versions; the size determines the last field::
 
     size [bytes]   from PolyScope    the last field
     1060           3.2               program_state
@@ -14,7 +14,7 @@ changed earlier ones, so one table describes all versions, and the size tells wh
     1140           3.14, 5.9         three values for the manufacturer only
     1220           5.10              payload_inertia
 
-From the manufacturer's public tables of the client interfaces.
+Source: the manufacturer's public tables of the client interfaces.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.protocol.framing import FrameBuffer, hex_text
 
-#: Size of the packet [bytes] from a version (major, minor) on, oldest first.
+#: First version (major, minor) with a size of the packet, and this size [bytes]; oldest first.
 _PACKET_SIZES: Final = (
     ((3, 2), 1060),
     ((3, 5), 1108),
@@ -46,13 +46,13 @@ _SIZE = struct.Struct('>i')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealtimeData:
     """
-    One packet, its fields in the order of the wire; fields that an older packet lacks are 0.
+    One packet, with its fields in wire order; fields that an older packet lacks are 0.
 
-    Joints in rad, rad/s, rad/s^2, A, Nm, V; poses of the TCP and twists in the base frame in m,
-    rad (rotation vector), m/s, rad/s. ``reserved_*`` are for the manufacturer only.
+    Joints in rad, rad/s, rad/s^2, A, Nm, V; poses and twists of the TCP, in the base frame, in m
+    and rad (rotation vector), m/s and rad/s. ``reserved_*`` are for the manufacturer only.
     """
 
-    #: Since the start of the controller [s].
+    #: Time since the start of the controller [s].
     time: float
     q_target: Vector6 = ZERO6
     qd_target: Vector6 = ZERO6
@@ -97,7 +97,7 @@ class RealtimeData:
     elbow_velocity: Vector3 = ZERO3
     safety_status: float = 0.0
     reserved_5: Vector3 = ZERO3
-    #: [kg], [m], [kg m^2]: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+    #: Mass [kg], centre of gravity [m], inertia [kg m^2] as Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
     payload_mass: float = 0.0
     payload_cog: Vector3 = ZERO3
     payload_inertia: Vector6 = ZERO6
@@ -122,7 +122,7 @@ def packet_size(version: tuple[int, ...]) -> int:
     """
     Return the size of a controller's packets [bytes].
 
-    :param version: of PolyScope: major, minor; further numbers are ignored.
+    :param version: PolyScope version: major, minor; further numbers are ignored.
     """
     found = _PACKET_SIZES[0][1]
     for first, size in _PACKET_SIZES:
@@ -133,7 +133,7 @@ def packet_size(version: tuple[int, ...]) -> int:
 
 def decode_packet(data: bytes) -> RealtimeData:
     """
-    Decode one packet with its size; fields of newer packets after our last one are ignored.
+    Decode one packet, including its size; fields after the last one that we know are ignored.
 
     :raises RemoteProtocolError: the size is wrong.
     """
@@ -166,7 +166,7 @@ class RealtimeDecoder:
 
     def feed(self, data: bytes) -> list[RealtimeData]:
         """
-        Take bytes from the controller (none at all = its end) and return the packets in them.
+        Take bytes from the controller (``b''`` = end of stream) and return the packets in them.
 
         :raises RemoteProtocolError: a size is impossible, or the stream ended inside a packet.
         """
@@ -181,7 +181,7 @@ def _count(size: int) -> int:
     return (size - _SIZE.size) // 8
 
 
-#: Count of numbers in each field, and in all fields up to its end.
+#: Count of numbers in each field, and in all fields up to and including this one.
 _LENGTHS: Final = [
     len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
     for field in fields(RealtimeData)

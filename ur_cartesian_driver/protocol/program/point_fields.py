@@ -3,9 +3,9 @@
 """
 The 21 numbers of a trajectory point: motion primitives and outputs to SI numbers and back.
 
-The table is that of URCL since 2.12; the order velocity, acceleration is the wire's, not
-URScript's. S = 1,000,000 and T, which is the same except for very old programs, are the factors on
-the wire. :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and
+This is the table of URCL since 2.12. Velocity comes before acceleration on the wire, unlike in
+URScript. The factors on the wire are S = 1,000,000 and T, which equals S except for very old
+programs. :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and
 arranges them for older programs.
 
 =======  =====================================================================  =====
@@ -23,9 +23,9 @@ index    meaning                                                                
 20       motion type                                                            1
 =======  =====================================================================  =====
 
-SWITCH_OUTPUT is not a motion and not part of the library: only our own robot program knows it. The
-program reads it when the previous motion returns, at its stop or where its blend begins. It takes
-no time:
+SWITCH_OUTPUT is not a motion and not part of URCL: only our own robot program knows it. The
+program reads it when the previous motion returns: at rest, or at the beginning of the blend.
+SWITCH_OUTPUT takes no time:
 
 =======  =====================================================================  =====
 0 - 5    trigger pose, x y z rx ry rz [m, rad]; zeros without one               S
@@ -36,20 +36,21 @@ no time:
 20       motion type                                                            1
 =======  =====================================================================  =====
 
-The kind of output 5 is an analog output that begins to follow the speed of the tool; it does until
-the output is switched again. The kind 4 is the law for the next one of these, with no trigger pose
-and a word 16 of 1; words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum and the time constant
-of the filter [s].
+The output kind 5 makes an analog output follow the speed of the tool until the output is switched
+again. The output kind 4 gives the law for the next record of kind 5: it has no trigger pose
+although word 16 is 1, and words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum and the time
+constant of the filter [s].
 
-These are of our own program, too, and motions that go nowhere. WAIT lets the arm rest: word 18 is
-the time from the end of the motion before until the next one may begin. AWAIT_INPUT rests until an
-input has a level, CHANGE_PAYLOAD sets a payload, CALL_FUNCTION calls a function of the prelude.
-PRESS_LAW, BEGIN_PRESS and END_PRESS are the controller's force mode. The other words are zeros:
+The stops, which only our own program knows, are motions during which the arm stands still.
+WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
+AWAIT_INPUT waits until an input has a level, CHANGE_PAYLOAD sets a payload, CALL_FUNCTION calls a
+function of the prelude. PRESS_LAW, BEGIN_PRESS and END_PRESS control the controller's force mode.
+Words that the table does not list are zeros:
 
 =======  =====================================================================  =====
 12, 13   AWAIT_INPUT: kind of input, pin                                        S
-14, 15   AWAIT_INPUT: threshold [A], [V] or 0 to 1; 1 = wait until below it     S
-16       AWAIT_INPUT: 1 = go on after the time-out, 0 = end                     S
+14, 15   AWAIT_INPUT: threshold [A, V, or 0 to 1]; 1 = wait until below it      S
+16       AWAIT_INPUT: after the time-out, 1 = go on, 0 = end                    S
 0 - 3    CHANGE_PAYLOAD: mass [kg], centre of gravity x y z in the flange [m]   S
 0 - 5    CALL_FUNCTION: arguments                                               S
 12       CALL_FUNCTION: number of the function                                  S
@@ -58,7 +59,7 @@ PRESS_LAW, BEGIN_PRESS and END_PRESS are the controller's force mode. The other 
 6 - 11   PRESS_LAW: limits [m/s, rad/s; m, rad]; BEGIN_PRESS: 1 = compliant     S
 12, 13   PRESS_LAW: damping, gain scaling                                       S
 14, 15   PRESS_LAW: 1 = zero the force sensor; what contact ends                S
-12       BEGIN_PRESS: 1 = the frame is that of the tool                         S
+12       BEGIN_PRESS: 1 = the task frame follows the tool                       S
 18       WAIT: the time; AWAIT_INPUT: longest wait [s]                          T
 20       motion type                                                            1
 =======  =====================================================================  =====
@@ -106,7 +107,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class MotionType(IntEnum):
-    """Word 20: which URScript function the robot calls, and with which kind of target."""
+    """Word 20: the URScript function that the robot calls, and the kind of its target."""
 
     #: movej to joint positions
     MOVEJ = 0
@@ -140,17 +141,17 @@ class MotionType(IntEnum):
     SPLINE = 51
     #: not a motion: switches an output at a trigger pose; our own robot program only
     SWITCH_OUTPUT = 200
-    #: the arm stands for a time; our own robot program only
+    #: the arm stands still for a time; our own robot program only
     WAIT = 201
-    #: the arm stands until an input has a level; our own robot program only
+    #: the arm stands still until an input has a level; our own robot program only
     AWAIT_INPUT = 202
     #: sets the payload; our own robot program only
     CHANGE_PAYLOAD = 203
-    #: how force mode presses when it begins next; this and the rest: our own robot program only
+    #: parameters of the force mode that begins next; our own robot program only
     PRESS_LAW = 204
-    #: force mode begins
+    #: force mode begins; our own robot program only
     BEGIN_PRESS = 205
-    #: force mode ends
+    #: force mode ends; our own robot program only
     END_PRESS = 206
     #: calls a function of the prelude; our own robot program only
     CALL_FUNCTION = 207
@@ -164,14 +165,14 @@ class SplineKind(IntEnum):
 
 
 class FollowKind(IntEnum):
-    """Word 12 of a SWITCH_OUTPUT that is no plain switch; the others are those of OutputKind."""
+    """Word 12 of a SWITCH_OUTPUT for an output that follows the speed; others: OutputKind."""
 
     LAW = 4
     BEGIN = 5
 
 
 class PointField(IntEnum):
-    """Index of a field in the 21 words; of a group, its first word."""
+    """Index of a field in the 21 words; for a group, the index of its first word."""
 
     TARGET = 0
     SECOND = 6
@@ -240,7 +241,7 @@ _OUTPUT_NAMES = (
     'motion type',
 )
 
-#: Class -> motion type with joint positions, with a pose as target.
+#: Class -> motion types for a target in joint positions, and for a pose.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
     MoveJ: (MotionType.MOVEJ, MotionType.MOVEJ_POSE),
     MoveL: (MotionType.MOVEL_JOINT, MotionType.MOVEL),
@@ -256,7 +257,7 @@ _ARC_TYPES = {
     (True, True): MotionType.MOVEC,
 }
 _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
-#: The kinds of rows up to this one take a duration.
+#: Last index into ``MOVES`` of a move with a duration; the moves after it have none.
 _LAST_TIMED = MOVES.index(MoveL)
 _POSE_TYPES = np.array([_TYPES[move][1] for move in MOVES])
 _STOPS: dict[type[Stop], MotionType] = {
@@ -268,7 +269,7 @@ _STOPS: dict[type[Stop], MotionType] = {
     BeginPress: MotionType.BEGIN_PRESS,
     EndPress: MotionType.END_PRESS,
 }
-#: Records whose word 18 is no duration of a move.
+#: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 #: The types of arcs, and of the other moves with a velocity and an acceleration.
@@ -280,9 +281,9 @@ _OPTIMOVES = frozenset(
 
 def motion_type(primitive: Instruction) -> MotionType:
     """
-    Return the motion type of a primitive: its class and the kind of its target (and via).
+    Return the motion type for the class of a primitive and the kind of its target (and via).
 
-    :raises LocalProtocolError: it is neither a primitive nor an output.
+    :raises LocalProtocolError: the instruction is neither a primitive nor an output.
     """
     if isinstance(primitive, SwitchOutput | SpeedLaw):
         return MotionType.SWITCH_OUTPUT
@@ -302,7 +303,7 @@ def to_fields(primitive: Instruction) -> PointFields:
     """
     Return the 21 numbers of a primitive, in SI units.
 
-    :raises LocalProtocolError: the target is joint positions and has a q_near.
+    :raises LocalProtocolError: the target is in joint positions although there is a q_near.
     """
     kind = motion_type(primitive)
     if isinstance(primitive, SwitchOutput):
@@ -332,7 +333,7 @@ def move_fields(moves: MoveRows) -> Floats:
     """
     Return the 21 numbers of each row of moves (n, 21), in SI units.
 
-    The rows of ``others`` have no meaning.
+    The rows that ``moves.others`` names have no meaning.
     """
     fields = np.zeros((len(moves), 21))
     fields[:, 0:3] = moves.targets[:, :3]
@@ -390,7 +391,7 @@ def _output_fields(output: SwitchOutput) -> PointFields:
 
 def _law_fields(law: SpeedLaw) -> PointFields:
     numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
-    # A value that is not 0: nothing is to be switched off.
+    # The value is 1: in a stop, the robot program still switches waiting outputs whose value is 0.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 
@@ -458,9 +459,9 @@ def _spline_fields(piece: Spline) -> PointFields:
 
 def from_fields(fields: Sequence[float]) -> Instruction:
     """
-    Return the primitive or output of 21 numbers.
+    Return the primitive or output that 21 numbers encode.
 
-    :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
+    :raises RemoteProtocolError: the motion type, or another enumerated number, is unknown.
     """
     kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
     if kind is MotionType.SPLINE:
@@ -535,9 +536,9 @@ def _move(fields: Sequence[float], kind: MotionType) -> Primitive:
 
 def check_fields(fields: PointFields) -> None:
     """
-    Refuse what URCL refuses to send: the robot would misunderstand or ignore it.
+    Refuse fields that URCL refuses to send: the robot would misunderstand or ignore them.
 
-    :raises LocalProtocolError: names the field, its value and the bound.
+    :raises LocalProtocolError: a value is out of bounds; the text names field, value and bound.
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
     if kind in _WITH_DELAY and not duration >= 0.0:

@@ -4,8 +4,8 @@
 The RTDE registers between the driver and the robot program.
 
 The controller reserves the numbers from 24 for external clients and the lower ones for fieldbuses.
-The servo numbers follow the manufacturer's guide to buffered ``servoj``, so a program after that
-guide works, too.
+The servo numbers follow the manufacturer's guide to buffered ``servoj``, so a program that follows
+this guide works, too.
 
 =================  ==========  =========  ====================================================
 direction          kind        number     meaning
@@ -15,32 +15,32 @@ to the program     int         25         sequence number, changes with every me
 to the program     int         26         external error (:class:`ExternalError`)
 to the program     int         27         synchronization (:class:`SyncState`)
 to the program     double      24 - 29    joint positions [rad]
-to the program     double      30 - 35    max deviation of the joints from them [rad]
+to the program     double      30 - 35    max deviation of the joints from these [rad]
 to the program     double      46         time of these joint positions [s]
 to the program     double      24 - 41    path offset of a trajectory (:class:`OffsetInput`)
 from the program   int         24         actual mode
 from the program   int         25         last sequence number that the program read
 from the program   int         26         points begun of the running trajectory
 from the program   double      24         lag: motion time in the buffer [s]
-from the program   double      25 - 30    path offset as it is now (:class:`OffsetOutput`)
+from the program   double      25 - 30    present path offset (:class:`OffsetOutput`)
 from the program   int         27         set-points carried out
 from the program   int         28         repetitions of set-points that the arm was not near
 from the program   int         29         sequence numbers skipped
 from the program   int         30         set-points in the buffer
 from the program   int         31         set-points lost to a full buffer
 from the program   int         32         version of the program (:data:`PROGRAM_VERSION`)
-from the program   int         33         number that was drawn when it was rendered
-from the program   int         34         count of connections, changes with each of them
+from the program   int         33         random number, drawn when the program was rendered
+from the program   int         34         count of connections, changes with each connection
 from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
 =================  ==========  =========  ====================================================
 
-The ints from 26 are ours; a program after the guide does not write them. The counts 27 to 31 start
-at 0 when the program enters the control mode ``BUFFERED_SERVO``. The doubles of path offsets are
-ours, too; a trajectory and the servo never run at once.
+The program's ints from 26 are ours; a program that follows the guide lacks them. The counts
+27 to 31 start at 0 when the program enters the control mode ``BUFFERED_SERVO``. The doubles of
+path offsets are ours, too. They share numbers with the servo, which never runs in a trajectory.
 
-The ints 32 to 34 show the driver that the program is its own: it writes them when it has read the
-first message on the reverse socket, the count last. Registers survive programs. So version and
-number count only after the count has changed on this connection.
+The ints 32 to 34 prove to the driver that the program is its own. The program writes them, the
+count last, when it has read the first message on the reverse socket. Register values outlive
+programs, so version and number are valid only after the count has changed on this connection.
 """
 
 from __future__ import annotations
@@ -91,26 +91,26 @@ class OutputDouble(IntEnum):
 
 
 class OffsetInput(IntEnum):
-    """Double registers that the driver writes in a trajectory whose path may give way."""
+    """Double registers that the driver writes during a trajectory with path offsets."""
 
-    #: Where the offset shall go: along, across, normal [m].
+    #: Wanted offset along, across, normal [m].
     TARGET = 24
-    #: How fast the time of the motion runs, 0 to 1.
+    #: Rate at which the time of the motion runs, 0 to 1.
     RATE = 27
-    #: The axes of the frame of the path, in the base.
+    #: The axes of the path's frame, in base axes.
     ALONG = 28
     ACROSS = 31
     NORMAL = 34
-    #: Bounds of the goal: along, across, normal [m]; of each [m/s], [m/s^2].
+    #: Bounds of the goal: offset along, across, normal [m]; speed, acceleration [m/s, m/s^2].
     LIMITS = 37
     SPEED = 40
     ACCELERATION = 41
 
 
 class OffsetOutput(IntEnum):
-    """Double registers that the robot program writes in such a trajectory."""
+    """Double registers that the robot program writes during a trajectory with path offsets."""
 
-    #: Along, across, normal [m]; the offset that the controller applies, in the base [m].
+    #: Present offset along, across, normal [m]; offset that the controller applies, in base [m].
     VALUE = 25
     SHIFT = 28
 
@@ -139,7 +139,7 @@ class ExternalError(IntEnum):
     HALT = 1
 
 
-#: Grows when the robot program learns a feature that the driver relies on.
+#: Incremented when the robot program gains a feature that the driver relies on.
 PROGRAM_VERSION = 1
 
 Register: TypeAlias = (
@@ -154,7 +154,7 @@ def register_name(register: Register, offset: int = 0) -> str:
     """
     Return the name of a register in an RTDE recipe.
 
-    :param offset: within a group of registers, 0 for the first.
+    :param offset: index within a group of registers, 0 for the first.
     """
     inputs = InputInteger | InputDouble | OffsetInput
     direction = 'input' if isinstance(register, inputs) else 'output'
@@ -202,7 +202,7 @@ OFFSET_INPUTS = (
         for i in range(OffsetInput.ACCELERATION - OffsetInput.TARGET + 1)
     ),
 )
-#: Reports of the program about them, in this order.
+#: The program's reports about path offsets, in this order.
 OFFSET_OUTPUTS = (
     register_name(OutputInteger.LAST_SEQUENCE_ID),
     *(register_name(OffsetOutput.VALUE, i) for i in range(6)),

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The reverse interface: what the robot program shall do, and how long it may wait for news.
+The reverse interface: what the robot program shall do, and how long it waits for the next message.
 
 One message is 8 big-endian int32, 32 bytes; S = 1,000,000. The robot sends nothing back.
 
@@ -15,7 +15,7 @@ index  mode          meaning
 1 - 6  POSE          x y z rx ry rz [m, rad] x S
 1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
-3      FORWARD       START: 1 = the path gives way to offsets (:mod:`~.registers`)
+3      FORWARD       START: 1 = the path accepts offsets (:mod:`~.registers`)
 1      FREEDRIVE     freedrive action, unscaled
 1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
@@ -27,14 +27,14 @@ The sender must
 * send the next message before the timeout in word 0, even if nothing changes (:func:`keepalive`,
   or ``TrajectoryAction.NOOP`` while a trajectory runs): a read that times out ends the robot
   program;
-* know that every FORWARD message, also NOOP, *enters* that mode and stops what ran before;
+* know that every FORWARD message, even NOOP, *enters* that mode, and so ends any other mode;
 * give START the number of points, and CANCEL of a stream the number of all points written since
   STREAM_START;
-* end or cancel a stream before the next START; otherwise the stream takes the new points.
+* end or cancel a stream before the next START; otherwise the new points extend the stream.
 
 ``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
-Word 3 of START is of our own program, too; the library's leaves it 0.
-Streams came with URCL 2.14; older programs ignore them. Everything else here has had its place
+Word 3 of START exists only in our own program, too; URCL leaves it 0.
+Streams came with URCL 2.14; older programs ignore them. All other words have had the same place
 and scale since URCL 2.0.
 """
 
@@ -100,16 +100,16 @@ class FreedriveAction(IntEnum):
 
 MESSAGE_FIELDS = 8
 MESSAGE_SIZE = 4 * MESSAGE_FIELDS
-#: Word 3 of a START whose path gives way.
+#: Word 3 of a START whose path accepts offsets.
 TAKES_OFFSETS = 1
-#: Longest time that the robot may bridge between two set-points [ms].
+#: Longest time that the robot may wait for the next set-point [ms].
 MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].
 STOPPED_TIMEOUT = 100
 #: Controller cycle of an e-Series robot [ms].
 DEFAULT_STEP_TIME = 2
 
-# A tuple: to compare a few numbers is faster than to hash one.
+# A tuple: comparing a few numbers is faster than hashing one.
 REALTIME_MODES = (
     ControlMode.SERVOJ,
     ControlMode.SPEEDJ,
@@ -127,7 +127,7 @@ _MESSAGE = struct.Struct('>8i')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReverseMessage:
     """
-    One message as it is on the wire; the functions below apply the rules.
+    One message as on the wire; the functions below apply the rules.
 
     :param read_timeout: timeout of the robot's next read [ms], 0 = none.
     :param payload: words 1 to 6, unscaled.
@@ -156,7 +156,7 @@ class ReverseMessage:
     @classmethod
     def decode(cls, data: bytes) -> ReverseMessage:
         """
-        Return the message of 32 bytes.
+        Return the message that 32 bytes encode.
 
         :raises RemoteProtocolError: the size, the mode or the read timeout is impossible.
         """
@@ -215,8 +215,8 @@ def trajectory(
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
-    :param count: number of points: START, STREAM_END, CANCEL of a stream.
-    :param takes_offsets: START: offsets of the path come through registers.
+    :param count: number of points, for START, STREAM_END, and CANCEL of a stream.
+    :param takes_offsets: for START: path offsets come through registers.
     """
     mode = ControlMode.FORWARD
     return ReverseMessage(

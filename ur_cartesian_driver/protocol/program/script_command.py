@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The script command interface: single commands to the robot program beside the motion.
+The script command interface: single commands to the robot program, independent of its motion.
 
-A command is 28 big-endian int32, 112 bytes: word 0 is the number, then follow the arguments, then
-zeros. All words are scaled by 1,000,000 except those marked raw.
+A command is 28 big-endian int32, 112 bytes: word 0 is the number; the arguments and then zeros
+follow. All argument words are scaled by 1,000,000 except those marked raw.
 
 ==  =========================  =================================================================
 0   command                    words 1 ..
@@ -28,8 +28,8 @@ zeros. All words are scaled by 1,000,000 except those marked raw.
                                xx yy zz xy xz yz [kg m^2], 11 transition time [s]
 100 SET_SAFE_OUTPUTS           ours: 1 action, 2 token (both raw), 3-20 digital outputs, standard,
                                configurable, tool (raw; -1 not named, 0 off, 1 on), 21 and 23
-                               analog outputs (fractions; negative: not named), 22 and 24 what
-                               they drive (raw)
+                               analog outputs (fractions; negative: not named), 22 and 24 their
+                               domains (raw)
 ==  =========================  =================================================================
 
 Only tool contact has an answer: one int32, 0 = contact, 1 = ended before a contact.
@@ -61,7 +61,7 @@ from ur_cartesian_driver.protocol.framing import (
 
 
 class ScriptCommand(IntEnum):
-    """Word 0."""
+    """Word 0: the number of the command."""
 
     ZERO_FTSENSOR = 0
     SET_PAYLOAD = 1
@@ -80,24 +80,24 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """The lifetime of a TCP; only our own robot program knows it."""
+    """The lifetime of a TCP; only our own robot program supports it."""
 
     #: Until another TCP is set.
     PERMANENT = 0
-    #: Until RESTORE: the program remembers the TCP before it, and restores it before it ends.
+    #: Until RESTORE: the program remembers the previous TCP, and restores it before it ends.
     TEMPORARY = 1
-    #: End of TEMPORARY: the program restores the remembered TCP, or sets the one given here.
+    #: End of TEMPORARY: the program restores the remembered TCP, or else sets the given one.
     RESTORE = 2
 
 
 class SafeOutputsAction(IntEnum):
-    """The use of safe outputs by the robot program, which then reports the token."""
+    """What the robot program does with safe outputs; it then reports the token."""
 
-    #: Forget them.
+    #: Forget the outputs.
     DISARM = 0
-    #: Remember them, and set them once in the next stop.
+    #: Remember the outputs, and set them once in the next stop.
     ARM = 1
-    #: Set them now, and forget them.
+    #: Set the outputs now, and forget them.
     SET = 2
 
 
@@ -154,11 +154,11 @@ class SetToolVoltageCommand:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartForceModeCommand:
     """
-    Be compliant in some axes of the task frame.
+    Make the arm compliant in some axes of the task frame.
 
     :param task_frame: pose in the base.
-    :param selection: which axes are compliant.
-    :param wrench: target force [N] and torque [Nm] in these axes.
+    :param selection: the compliant axes.
+    :param wrench: target force [N] and torque [Nm] in the compliant axes.
     :param type: 1 to 3, transformation of the task frame.
     :param limits: speed [m/s, rad/s] in compliant axes, deviation [m, rad] in the others.
     :param damping: 0 to 1.
@@ -260,11 +260,11 @@ class SetTargetPayloadCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetSafeOutputsCommand:
-    """Say what outputs become in a stop; our own robot program only."""
+    """Arm, disarm or set the safe values of outputs; our own robot program only."""
 
     command: ClassVar = ScriptCommand.SET_SAFE_OUTPUTS
     action: SafeOutputsAction
-    #: By which the robot program confirms that it has done it.
+    #: Number by which the robot program confirms that it has carried out the action.
     token: Token
     outputs: SafeOutputs = ()
 
@@ -286,7 +286,7 @@ AnyScriptCommand: TypeAlias = (
     | SetSafeOutputsCommand
 )
 
-#: First software with a command: CB3 and e-Series (3 to 5), PolyScope X.
+#: First software versions with a command: PolyScope 3 to 5 (CB3 and e-Series), PolyScope X.
 MIN_VERSIONS: Mapping[ScriptCommand, tuple[SoftwareVersion, SoftwareVersion]] = {
     ScriptCommand.SET_FRICTION_COMPENSATION: ((5, 23, 0), (10, 10, 0)),
     ScriptCommand.SET_FRICTION_SCALES: ((5, 25, 1), (10, 12, 1)),
@@ -308,7 +308,7 @@ def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = No
 
 def decode(data: bytes) -> AnyScriptCommand:
     """
-    Return the command of 112 bytes; words after its arguments are ignored.
+    Return the command that 112 bytes encode; words after its arguments are ignored.
 
     :raises RemoteProtocolError: size, number or an argument is impossible.
     """
@@ -336,7 +336,7 @@ class ToolContactResultDecoder(ResultDecoder[ToolContactResult]):
 
 
 def _words(command: AnyScriptCommand) -> list[int]:
-    """Return the words after the number."""
+    """Return the words of a command after its number."""
     return [
         word
         for field in fields(command)
@@ -345,7 +345,7 @@ def _words(command: AnyScriptCommand) -> list[int]:
 
 
 def _command(number: ScriptCommand, words: Sequence[int]) -> AnyScriptCommand:
-    """Return the command of a number and the words after it."""
+    """Return the command for a number and the words after it."""
     command: type[AnyScriptCommand] = _COMMANDS[number]
     values: dict[str, Any] = {}
     start = 0
@@ -362,8 +362,8 @@ class _Words:
     An argument on the wire.
 
     :param count: number of words.
-    :param encode: value and name to words.
-    :param decode: words and name to the value.
+    :param encode: turns value and name into words.
+    :param decode: turns words and name into the value.
     """
 
     count: int
@@ -380,7 +380,7 @@ def _vector(count: int) -> _Words:
 
 
 def _raw(kind: type[int]) -> _Words:
-    """Return a word that is not scaled, of a kind of integer."""
+    """Return the conversion of one unscaled word to and from a type of integer."""
     return _Words(1, lambda value, _: [int(value)], lambda words, _: kind(words[0]))
 
 
@@ -390,7 +390,7 @@ def _as_int(value: float, field: str) -> int:
     return int(value)
 
 
-#: The first digital output of a kind on the wire; the analog ones follow the digital ones.
+#: Index of the first digital output of each kind on the wire; the analog outputs come after all.
 FIRST_DIGITAL_OUTPUT = {
     OutputKind.STANDARD_DIGITAL: 0,
     OutputKind.CONFIGURABLE_DIGITAL: 8,
@@ -412,7 +412,7 @@ def _safe_output_words(outputs: SafeOutputs) -> list[int]:
 
 
 def _safe_outputs(words: Sequence[int]) -> SafeOutputs:
-    """Return the outputs that are named; whether they are restored is not on the wire."""
+    """Return the outputs that are named; the wire does not carry whether they are restored."""
     digital = (
         SafeOutput(output=kind, pin=i - first, value=float(words[i]))
         for kind, first in FIRST_DIGITAL_OUTPUT.items()
@@ -436,7 +436,7 @@ _FLOAT = _Words(
     1, lambda value, name: [to_fixed(value, name)], lambda words, _: from_fixed(words[0])
 )
 _VECTOR6 = _vector(6)
-#: By the annotation of a field: how it is sent. Fields are in the order of the wire.
+#: Conversion of a field by its annotation. The fields of a command are in wire order.
 _ARGUMENTS: Mapping[str, _Words] = {
     'float': _FLOAT,
     'int': _Words(1, _FLOAT.encode, lambda words, name: _as_int(from_fixed(words[0]), name)),
@@ -451,7 +451,7 @@ _ARGUMENTS: Mapping[str, _Words] = {
     ),
     'Vector3': _vector(3),
     'Vector6': _VECTOR6,
-    # URCL limits these where it refuses other values; the bytes have to be the same.
+    # URCL clamps these values, although it refuses others; our bytes have to equal URCL's.
     'Fractions6': _Words(
         6,
         lambda values, name: _VECTOR6.encode([min(max(v, 0.0), 1.0) for v in values], name),

@@ -8,9 +8,9 @@ The script sender: how the External Control URCap fetches the robot program.
     robot -> driver   request_program\n                 (16 bytes)
     driver -> robot   the program, and one more \n
 
-The connection stays open and the robot may ask again. The reply contains no length; the External
-Control node takes the lines that have arrived when it finds nothing more to read, so the reply
-must leave without a pause.
+The connection stays open and the robot may ask again. The reply contains no length: when the
+External Control node finds nothing more to read, it takes the lines that have arrived. So the
+reply must be sent without a pause.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class RequestDecoder:
 
     def feed(self, data: bytes) -> int:
         """
-        Take bytes from the robot (none at all = its end) and return the number of requests.
+        Take bytes from the robot (``b''`` = end of stream) and return the number of requests.
 
-        :raises RemoteProtocolError: the bytes are no request, or the stream ended inside one.
+        :raises RemoteProtocolError: the bytes are not requests, or the stream ended inside one.
         """
         if not data:
             if self._rest:

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The trajectory point interface: motion primitives to the robot program, one result back.
+The trajectory point interface: motion primitives go to the robot program, one result comes back.
 
 A point is 21 big-endian int32, 84 bytes: the numbers of
 :mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
 :func:`decode_point` convert primitives, :func:`encode_fields` and :func:`decode_fields` bare
-numbers; :func:`encode_points` is faster for many, and :func:`encode_plan` for a whole plan. The
-:class:`Dialect` checks the numbers, and arranges their words for older robot programs.
+numbers. For many primitives :func:`encode_points` is faster, for a whole plan :func:`encode_plan`.
+The :class:`Dialect` checks the numbers, and arranges their words for older robot programs.
 
 The sender must
 
@@ -15,10 +15,10 @@ The sender must
   or ``STREAM_START``), and send no more than announced;
 * send the next point in time: the robot waits 0.5 s for it, but only one controller step while a
   spline moves. A late point means ``TrajectoryResult.FAILURE``;
-* send reverse messages all the while, or the program halts;
+* keep sending reverse messages meanwhile, or the program halts;
 * end at rest. The robot sets the blend radius of the last point of a counted trajectory to 0.
 
-The result is one int32: 0 success, 1 canceled, 2 failure. It comes in a segment of its own.
+The result is one int32: 0 success, 1 canceled, 2 failure. It comes in a TCP segment of its own.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def encode_point(instruction: Instruction, dialect: Dialect = NEWEST_DIALECT) ->
 
 def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     """
-    Return the primitive or output of 84 bytes.
+    Return the primitive or output that 84 bytes encode.
 
     :raises RemoteProtocolError: the size is wrong, or a type, kind or mode is unknown.
     """
@@ -93,9 +93,9 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
 
 def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of many primitives and outputs: as :func:`encode_point`, but faster.
+    Return the bytes of many primitives and outputs, like :func:`encode_point` but faster.
 
-    :raises LocalProtocolError: names the point (from 0), the field and the bound.
+    :raises LocalProtocolError: a value cannot be sent; the text names point (from 0) and bound.
     """
     fields = [_checked_fields(each, i, dialect) for i, each in enumerate(instructions)]
     return _encode_rows(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
@@ -103,18 +103,18 @@ def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST
 
 def encode_plan(plan: Plan) -> bytes:
     """
-    Return the bytes of a plan, for the robot program for which it was made.
+    Return the bytes of a plan, for the robot program for which the plan was made.
 
-    :raises LocalProtocolError: names the record (from 0), the field and the bound.
+    :raises LocalProtocolError: a value cannot be sent; the text names record (from 0) and bound.
     """
     return encode_rows(plan.rows, DIALECTS.get(plan.older_program, NEWEST_DIALECT))
 
 
 def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of the segments of a plan: as :func:`encode_points`, from columns.
+    Return the bytes of a plan's segments, like :func:`encode_points` but from columns.
 
-    :raises LocalProtocolError: names the record (from 0), the field and the bound.
+    :raises LocalProtocolError: a value cannot be sent; the text names record (from 0) and bound.
     """
     moves, records = rows.primitives, rows.records
     first = np.cumsum(records) - records
@@ -151,7 +151,7 @@ def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> byt
 
 def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
     """
-    Return the 21 numbers of 84 bytes, in SI units.
+    Return the 21 numbers that 84 bytes encode, in SI units.
 
     :raises RemoteProtocolError: the size is wrong.
     """
@@ -184,7 +184,7 @@ def _encode_rows(fields: Floats, dialect: Dialect) -> bytes:
     """
     Return the bytes of rows (n, 21).
 
-    :raises LocalProtocolError: names the first number that does not fit.
+    :raises LocalProtocolError: a number does not fit; the text names the first one.
     """
     return b''.join(
         _encode_chunk(fields[first : first + _CHUNK], first, dialect)
@@ -193,7 +193,7 @@ def _encode_rows(fields: Floats, dialect: Dialect) -> bytes:
 
 
 def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:
-    """Return the bytes of some rows, the first of which is point ``first``."""
+    """Return the bytes of consecutive rows, the first of which is point ``first``."""
     scales = np.where(
         fields[:, [PointField.TYPE]] == MotionType.SPLINE,
         _scales(MotionType.SPLINE, dialect),
@@ -201,7 +201,7 @@ def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:
     )
     with np.errstate(over='ignore'):  # infinite values are refused below
         scaled = fields * scales
-    fits = (scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5)  # NaN fits nowhere
+    fits = (scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5)  # NaN does not fit
     if not fits.all():
         row, column = (int(i) for i in np.argwhere(~fits)[0])
         name = field_names(fields[row, PointField.TYPE])[column]
@@ -211,15 +211,15 @@ def _encode_chunk(fields: Floats, first: int, dialect: Dialect) -> bytes:
 
 
 def _scales(motion_type: float, dialect: Dialect) -> tuple[int, ...]:
-    """Return the wire's factor of each of the 21 numbers."""
+    """Return the factor on the wire for each of the 21 numbers."""
     time = dialect.time_scale
-    # Word 19 of a spline is its kind, of all others the blend radius.
+    # Word 19 is the kind of a spline, but the blend radius of other motions.
     word19 = 1 if motion_type == MotionType.SPLINE else time
     return (*_MOVE_SCALES, time, word19, 1)
 
 
 def _round_half_away(values: Floats) -> Floats:
-    """Return whole numbers, ties rounded away from zero as by :func:`to_fixed`."""
+    """Return the values rounded to whole numbers, ties away from zero like :func:`to_fixed`."""
     size = np.abs(values)
     whole = np.floor(size)
     # The difference is exact; adding 0.5 first would round 0.49999999999999994 up.

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Wire dialects: the messages of robot programs of different ages, one row for each.
+Wire dialects: the messages of robot programs of different ages, one row for each dialect.
 
 A program that was saved on a pendant keeps the messages of the library version it came with, and
-nothing on the sockets tells which one that is. So the dialect is a setting. A message has the same
-number of words and the same size in all dialects. Everything that differs is defined here:
+nothing on the sockets reveals this version. So the dialect is a setting. A message has the same
+number of words and the same size in all dialects. All differences are defined here:
 
 =======  =============  ==========  ===================  =====================  =======
 dialect  library        time scale  motion types         words 6 - 17 of moves  streams
@@ -16,20 +16,20 @@ dialect  library        time scale  motion types         words 6 - 17 of moves  
 2.14     since 2.14     1,000,000   0 - 13, 51, from 200 q_near, v, a, flag     yes
 =======  =============  ==========  ===================  =====================  =======
 
-Types from 200 on switch outputs and do what is done while the arm stands. Only our own robot
-program knows them; the library's programs skip them silently.
+Types from 200 on switch outputs, or act while the arm stands still. Only our own robot program
+knows them; the library's programs skip them silently.
 
-"Moves" are all types except MOVEC* and SPLINE, whose words never changed. But programs before
-2.12 take the velocity of an arc for its acceleration and the reverse, though the library of their
-time wrote them in the order of today; so the driver sends them as these programs read them. Blend
-radii have the time scale, too. With a scale of 1000, times are whole milliseconds and radii whole
-millimetres. (The library of that time truncated times; we round them, which no program can
+"Moves" are all types except MOVEC* and SPLINE, whose words never changed. However, programs before
+2.12 swap velocity and acceleration of an arc when they read them, although the library of their
+time wrote them in today's order; the driver sends them in the order in which these programs read.
+Blend radii have the time scale, too. With a scale of 1000, times are whole milliseconds and radii
+whole millimetres. (The library of that time truncated times; we round them, which no program can
 notice.)
 
-Types 4 and 5 came with 2.2, so 2.0 omits them: a program silently skips a type that it does not
-know. On the reverse socket only the stream actions differ. It is not recorded which library
-version introduced which script command, and a program skips unknown commands, too. So only the
-newest dialect sets a temporary TCP for a goal.
+Types 4 and 5 came with 2.2, so dialect 2.0 omits them: a program silently skips a type that it
+does not know. On the reverse socket only the stream actions differ. It is not recorded which
+library version introduced which script command, and a program skips unknown commands, too. So only
+the newest dialect sets a temporary TCP for a goal.
 
 Three modules ask a :class:`Dialect` for more than whether the program is our own:
 :mod:`~.trajectory_points` for the points,
@@ -65,7 +65,7 @@ _Lengths = TypeVar('_Lengths', float, Floats)
 _FIRST_TYPES = frozenset((*map(MotionType, range(4)), MotionType.SPLINE))
 _OPTIMOVES = frozenset((MotionType.OPTIMOVEJ, MotionType.OPTIMOVEL))
 _LIBRARY_TYPES = ARC_TYPES | MOVE_TYPES | {MotionType.SPLINE}
-#: Where each word of a move and of an arc comes from, for programs before 2.12.
+#: For programs before 2.12: the index in today's order of each word of a move, and of an arc.
 _OLD_MOVE = (*range(6), *(PointField.VELOCITY,) * 6, *(PointField.ACCELERATION,) * 6, 18, 19, 20)
 _OLD_ARC = (*range(12), PointField.ACCELERATION, PointField.VELOCITY, *range(14, 21))
 
@@ -89,7 +89,7 @@ class Dialect:
 
     @property
     def older_program(self) -> str:
-        """The version of a program that is not the driver's own; '' = it is."""
+        """The dialect of a program that is not the driver's own; '' = the driver's own."""
         return '' if self.is_own else self.name
 
     @property
@@ -99,19 +99,19 @@ class Dialect:
 
     @property
     def min_duration(self) -> float:
-        """The shortest duration that is not rounded to 0, which has another meaning [s]."""
+        """The shortest duration [s] that is not rounded to 0, which has another meaning."""
         return 0.5 / self.time_scale
 
     @property
     def is_coarse(self) -> bool:
-        """Whether rounding of times and radii matters."""
+        """Whether the rounding of times and radii matters."""
         return self.time_scale < FIXED_POINT
 
     def round_down_radius(self, radius: _Lengths) -> _Lengths:
-        """Return the largest radius that the wire can express and that is not larger [m]."""
+        """Return the largest radius on the wire that does not exceed the given one [m]."""
         if not self.is_coarse:
             return radius
-        # 0.029 * 1000 is a little less than 29.
+        # Without 1e-6, 29 mm would become 28 mm: 0.029 * 1000 is a little less than 29.
         rounded: _Lengths = np.floor(radius * self.time_scale + 1e-6) / self.time_scale
         return rounded
 
@@ -121,7 +121,7 @@ class Dialect:
         """
         Refuse an action that the program would ignore.
 
-        :raises LocalProtocolError: names it.
+        :raises LocalProtocolError: the program would ignore it; the text names the action.
         """
         is_stream = action in (TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END)
         if is_stream and not self.supports_append:
@@ -131,8 +131,8 @@ class Dialect:
         """
         Refuse a point that the program would skip, misunderstand or ignore.
 
-        :param fields: its 21 numbers in SI units.
-        :raises LocalProtocolError: names the field, its value and the bound.
+        :param fields: the 21 numbers of the point in SI units.
+        :raises LocalProtocolError: a value is refused; the text names field, value and bound.
         """
         duration, kind = fields[18], fields[20]
         if kind not in self.motion_types:
@@ -152,7 +152,7 @@ class Dialect:
         check_fields(fields)
 
     def accepts(self, fields: Floats) -> Flags:
-        """Return a mask (n,) of the rows (n, 21) whose motions and durations the program has."""
+        """Return a mask (n,) of the rows (n, 21) whose type and duration are surely accepted."""
         kinds, durations = fields[:, PointField.TYPE].astype(int), fields[:, PointField.DURATION]
         accepted = np.isin(kinds, list(self.motion_types))
         accepted &= (durations == 0.0) | (durations >= self.min_duration)
@@ -162,7 +162,7 @@ class Dialect:
         return accepted
 
     def arrange(self, words: Int32s) -> Int32s:
-        """Return points (n, 21) in the order in which the program reads their words."""
+        """Return points (n, 21) with their words in the order in which the program reads them."""
         if self.supports_q_near:
             return words
         kinds, words = words[:, PointField.TYPE], words.copy()
@@ -173,9 +173,9 @@ class Dialect:
 
     def restore(self, fields: PointFields) -> PointFields:
         """
-        Return the 21 numbers of a point in the order of today.
+        Return the 21 numbers of a point in today's order.
 
-        :raises RemoteProtocolError: the program does not know its motion type.
+        :raises RemoteProtocolError: the program does not know the point's motion type.
         """
         kind = fields[PointField.TYPE]
         if kind not in self.motion_types:

@@ -19,13 +19,13 @@ The RTDE client: negotiate the recipes, then decode data packages to values.
                               |
                             READY --> data packages, texts
 
-The client opens no socket and knows no time. The owner of the socket sends ``data_to_send()``
+The client opens no socket and has no clock. The owner of the socket sends ``data_to_send()``
 after each ``feed()``, and gives up when ``state`` does not change for too long (the controller
 answers within a second).
 
-Real controllers send text messages at any time, and data before the reply to S; a data package
-counts as that reply. In each state, up to five other unexpected packages are reported and
-tolerated.
+Real controllers send text messages at any time, and may send data before the reply to S; a data
+package is therefore taken as that reply. In each state, up to five other unexpected packages are
+reported and tolerated.
 
 The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
 of the connection is in `rtde_server`.
@@ -109,7 +109,7 @@ class HandshakeDone:
     """
     The handshake is done; data follow.
 
-    :param frequency: the requested one [Hz]; version 1 has only one frequency.
+    :param frequency: requested, or the highest [Hz]; protocol version 1 cannot choose it.
     :param outputs: content of the data packages.
     :param missing: optional outputs that this controller lacks.
     :param inputs: one recipe for each group, to ``pack`` values.
@@ -203,7 +203,7 @@ class RtdeClientCodec:
         return self.data_to_send()
 
     def data_to_send(self) -> bytes:
-        """Return the bytes to send, once."""
+        """Return the bytes to send and forget them."""
         data, self._to_send = self._to_send, b''
         return data
 
@@ -211,7 +211,7 @@ class RtdeClientCodec:
         """
         Return the values if the bytes are exactly one data package, as they nearly always are.
 
-        Otherwise return None: then :meth:`feed` has to take them, which is slower.
+        Otherwise return None; the bytes then have to go to :meth:`feed`, which is slower.
         """
         if self._recipe is None or self.state is not RtdeState.READY or not self._frames.is_empty:
             return None
@@ -219,7 +219,7 @@ class RtdeClientCodec:
 
     def feed(self, data: bytes) -> list[RtdeEvent]:
         """
-        Take bytes from the controller (none at all = its end) and return what happened.
+        Take bytes from the controller (``b''`` = end of stream) and return what happened.
 
         :raises RemoteProtocolError: the controller violated the protocol, closed the connection
             too early, or lacks a field (:class:`FieldsNotFound`), or another client writes an
@@ -260,7 +260,7 @@ class RtdeClientCodec:
     def _handlers(
         self,
     ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
-        """Return for each state the expected package and its handler."""
+        """Return the expected package and its handler for each state."""
         return {
             RtdeState.PROTOCOL_VERSION: (
                 PackageType.REQUEST_PROTOCOL_VERSION,
@@ -276,7 +276,7 @@ class RtdeClientCodec:
         }
 
     def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
-        """Send a request and wait for its reply."""
+        """Queue a request and expect its reply."""
         self.state = state
         self._unexpected = 0
         self._to_send += request.encode()
@@ -403,8 +403,8 @@ def _type(name: str, text: str, expected_type: DataType | None) -> DataType:
     """
     Return the type that the controller gave.
 
-    Where a controller gives anything else (the manufacturer's test server repeats the names), the
-    usual type is assumed.
+    If the text is not a type (the manufacturer's test server repeats the names), the expected type
+    is assumed.
     """
     if text in DataType.__members__:
         return DataType[text]

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Names and types of everything that RTDE can stream, in one table, and what older software lacks.
+Names and types of all RTDE fields, and the first software versions of newer fields.
 
 Software answers ``NOT_FOUND`` for a field that it does not have.
 """
@@ -35,7 +35,7 @@ class DataType(Enum):
 
     @property
     def length(self) -> int:
-        """Return how many numbers it has; 1 = not a vector."""
+        """Return the count of numbers in a value; 1 = not a vector."""
         return len(self.value)
 
 
@@ -117,8 +117,8 @@ OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     }
 )
 
-#: The first software with a field, CB3 (None = none) and e-Series, as far as the manufacturer's
-#: guide dates it. The registers that came later are for clients other than field buses.
+#: First software versions with some fields, for CB3 (None = never) and e-Series, as far as the
+#: manufacturer's guide dates them. The registers here are for clients other than field buses.
 _INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
     ((3, 5), (5, 0), r'elbow_(position|velocity)'),
     ((3, 9), (5, 3), r'\w+_bit_register_\d+|\w+_(int|double)_register_(2[4-9]|[34]\d)'),

@@ -22,8 +22,8 @@ M 77  text message        v2: u8 length, text, u8 length, source, u8 level;  v1:
 ====  ==================  ==========================================  ===========================
 
 Names and types are texts separated by commas. Instead of a type the controller writes
-``NOT_FOUND``, or ``IN_USE`` for an input that another client already writes; the recipe id is 0
-then.
+``NOT_FOUND`` for a field that it lacks, or ``IN_USE`` for an input that another client already
+writes; then the recipe id is 0.
 
 Obligations of a controller towards the manufacturer's library: send a frame in one piece of less
 than 4092 bytes; answer V and v within a second; send no text message between the reply to the
@@ -78,7 +78,7 @@ class _Package:
     type: ClassVar[PackageType]
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         return b''
 
     def encode(self) -> bytes:
@@ -94,7 +94,7 @@ class RequestProtocolVersion(_Package):
     version: int
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         return _pack_checked('>H', self.version)
 
 
@@ -114,7 +114,7 @@ class SetupOutputs(_Package):
     frequency: float | None = None
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         head = b'' if self.frequency is None else _pack_checked('>d', self.frequency)
         return head + encode_names(self.names)
 
@@ -127,7 +127,7 @@ class SetupInputs(_Package):
     names: tuple[str, ...]
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         return encode_names(self.names)
 
 
@@ -211,7 +211,7 @@ class ControllerVersion(_Package):
     build: int = 0
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         return _pack_checked('>4I', self.major, self.minor, self.bugfix, self.build)
 
     def __str__(self) -> str:
@@ -228,7 +228,7 @@ class SetupOutputsReply(_Package):
     recipe_id: int | None = 1
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         head = b'' if self.recipe_id is None else _pack_checked('>B', self.recipe_id)
         return head + encode_names(self.types)
 
@@ -242,7 +242,7 @@ class SetupInputsReply(_Package):
     recipe_id: int = 1
 
     def payload(self) -> bytes:
-        """Return what follows the type."""
+        """Return the bytes after the type."""
         return _pack_checked('>B', self.recipe_id) + encode_names(self.types)
 
 
@@ -270,7 +270,7 @@ def encode_frame(package_type: PackageType, payload: bytes = b'') -> bytes:
     """
     Return a whole frame.
 
-    :raises LocalProtocolError: it would be longer than 65535 bytes.
+    :raises LocalProtocolError: the frame would be longer than 65535 bytes.
     """
     size = HEADER.size + len(payload)
     if size > 65535:
@@ -290,7 +290,7 @@ def _pack_checked(layout: str, *values: float) -> bytes:
 
 def encode_names(names: Sequence[str]) -> bytes:
     """
-    Return names as bytes of the wire.
+    Return names as bytes for the wire.
 
     :raises LocalProtocolError: a name is empty or contains a comma.
     """
@@ -323,7 +323,7 @@ def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeR
         case PackageType.DATA_PACKAGE:
             return DataPackage(payload=_require_min_size(data, payload, 1))
         case PackageType.TEXT_MESSAGE:
-            # Clients write the same form in both versions.
+            # Clients send the same format in both protocol versions.
             return _text_message(data, payload, LATEST_PROTOCOL_VERSION)
     _require_size(data, payload, 0)
     if kind is PackageType.GET_URCONTROL_VERSION:

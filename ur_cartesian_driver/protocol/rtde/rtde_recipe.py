@@ -45,7 +45,7 @@ class Recipe:
         """
         Compile the recipe.
 
-        :param recipe_id: the byte before the values; None = none (outputs of version 1).
+        :param recipe_id: the byte before the values; None = no such byte (outputs of version 1).
         :raises ValueError: the numbers of names and types differ, or there are no names.
         """
         if len(names) != len(types) or not names:
@@ -74,9 +74,9 @@ class Recipe:
         """
         Return the values of a data package without its first three bytes; vectors are tuples.
 
-        The recipe id is not checked: some controllers send another one than agreed.
+        The recipe id is not checked: some controllers send a different one than agreed.
 
-        :raises RemoteProtocolError: the package has another size than the recipe.
+        :raises RemoteProtocolError: the size of the package is not that of the recipe.
         """
         if len(payload) != self._size:
             raise RemoteProtocolError(
@@ -89,7 +89,7 @@ class Recipe:
         return cast(RtdeValues, self._pick(flat))
 
     def unpack_frame(self, data: bytes) -> RtdeValues | None:
-        """Return the values of a whole frame; None if the bytes are anything else."""
+        """Return the values of exactly one frame; None for other bytes, or a one-field recipe."""
         if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
             return None
         return cast(RtdeValues, self._pick(self._struct.unpack_from(data, HEADER.size)))
@@ -99,7 +99,7 @@ class Recipe:
         Return the whole frame of a data package.
 
         :param values: in the order of the recipe; vectors as tuples.
-        :raises LocalProtocolError: number, length or range of the values is wrong.
+        :raises LocalProtocolError: count, length or range of the values is wrong.
         """
         flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
         value: Any  # a number has no length: caught below
@@ -159,7 +159,7 @@ class Recipe:
         return self.names, self.types, self.recipe_id
 
     def _packing_error(self, values: Sequence[RtdeValue]) -> LocalProtocolError:
-        """Return the error that names the value that cannot be packed."""
+        """Return the error that names the values that cannot be packed."""
         if len(values) != len(self.names):
             return LocalProtocolError(
                 f'An RTDE recipe of {len(self.names)} fields cannot take {len(values)} values.'

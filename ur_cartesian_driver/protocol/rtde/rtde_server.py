@@ -3,18 +3,18 @@
 """
 The RTDE server: the controller's end of one connection.
 
-It answers requests as a controller does and keeps the agreed recipes. Its owner knows the time,
-and decides when to send data packages with which values::
+The codec answers requests as a controller does and keeps the agreed recipes. Its owner has the
+clock, and decides when to send data packages, and their values::
 
     for data in socket: events = server.feed(data); socket.send(server.data_to_send())
     if server.streaming and server.output: socket.send(server.output.recipe.pack(values))
 
-* A client has one output recipe: the manufacturer's guide knows no more, in either version. A
-  new one takes its place.
+* A client has one output recipe; the manufacturer's guide mentions no more, in either version. A
+  new recipe replaces it.
 * An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
-* An input belongs to one client; the others receive ``IN_USE``. The client itself may use it in
+* An input belongs to one client; the others receive ``IN_USE``. That client may use the input in
   several recipes, one for each kind of command that it sends. All connections share the set of
-  taken names; ``close()`` releases ours.
+  taken names; ``close()`` releases those of this connection.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: Ids of input recipes are bytes and 0 means invalid.
+#: Largest number of input recipes of a client: their ids are bytes, and 0 means invalid.
 MAX_RECIPES = 255
 
 
@@ -83,9 +83,9 @@ class RtdeServerCodec:
         Wait for requests.
 
         :param taken_inputs: inputs that any client writes; shared by all connections.
-        :param frequency: rate of the controller [Hz], the highest that a client gets.
+        :param frequency: rate of the controller [Hz], the highest that a client can get.
         :param output_types: the outputs that this controller has.
-        :param input_types: its inputs.
+        :param input_types: the inputs that this controller has.
         """
         self.streaming = False
         self.output: OutputStream | None = None
@@ -105,13 +105,13 @@ class RtdeServerCodec:
         return self._protocol
 
     def data_to_send(self) -> bytes:
-        """Return the replies to send, once."""
+        """Return the replies to send and forget them."""
         data, self._to_send = self._to_send, b''
         return data
 
     def feed(self, data: bytes) -> list[InputReceived | RtdeTextMessage]:
         """
-        Take bytes from the client (none at all = its end) and return the values it wrote.
+        Take bytes from the client (``b''`` = end of stream) and return its values and texts.
 
         :raises RemoteProtocolError: the client violated the protocol; close the connection.
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Carries out one experiment: records, sends the program, and brings the tool back."""
+"""Carries out one experiment: records, runs the program, and returns the tool to its start."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ RECORDED = (
     'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'actual_TCP_pose', 'target_TCP_speed',
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
 )  # fmt: skip
-#: How long a program may take to move the arm, and to end [s].
+#: Longest time until a program moves the arm, and until it ends [s].
 START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
 #: Time recorded before and after the motion [s].
 MARGIN = 0.3
-#: The tool is back where it was [m].
+#: Largest distance from the start at which the tool need not be brought back [m].
 NEAR = 1e-4
 _SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
 async def motion_refusal(address: RobotAddress) -> str:
     """
-    Return why the arm must not be moved now, as a clause; empty if it may be.
+    Return the reason why the arm must not be moved now, as a clause; empty = it may be moved.
 
     :raises OSError: the robot does not answer.
     """
@@ -64,11 +64,11 @@ async def motion_refusal(address: RobotAddress) -> str:
 
 async def run_experiment(address: RobotAddress, experiment: Experiment) -> MotionSamples:
     """
-    Move the arm as the experiment says, and return what was recorded.
+    Run the motion of an experiment, and return the recorded samples.
 
-    However it ends, the program is stopped and the slider restored.
+    In any case, the program is stopped at the end, and the slider is restored.
 
-    :raises OSError: the robot is lost, stops, or does not do it.
+    :raises OSError: the robot is lost, stops, or does not carry out the motion.
     """
     recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
     probe = PrimaryProbe()
@@ -102,7 +102,7 @@ async def _run(
 
 
 async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe) -> float:
-    """Run the program; return when it was told to stop [s, clock of the controller]."""
+    """Run the program; return the controller's time [s] of the stop command, or NaN."""
     await asyncio.sleep(MARGIN)
     stop_sent = float('nan')
     await _start(recorder, probe, program(experiment.check, experiment.script))
@@ -169,7 +169,7 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
 
 
 def _distance(recorder: RtdeRecorder, name: str) -> Floats:
-    """Return how far a pose is from where it was at first (n,) [m]."""
+    """Return the distances of a pose from the first one (n,) [m]."""
     positions = recorder.column(name)[:, :3]
     distances: Floats = np.linalg.norm(positions - positions[0], axis=1)
     return distances

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Small motions that settle which law a controller moves by, and what their recordings show.
+Small motions that reveal the controller's laws of motion, and the analyses of their recordings.
 
-Each is slow and short and begins where the arm stands; afterwards the tool is brought back there.
-The analyses are pure: samples in, a sentence and numbers out.
+Each motion is slow and short and begins at the present pose, to which the tool then returns. The
+analyses are pure: samples in, a sentence and numbers out.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
 
-#: Speed and acceleration of the joint motion [rad/s, rad/s^2], of the tool [m/s, m/s^2].
+#: Speed and acceleration of joint motions [rad/s, rad/s^2], and of tool motions [m/s, m/s^2].
 JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
 TOOL_SPEED, TOOL_ACCELERATION = 0.05, 0.5
 WRIST_TURN, TOOL_TURN = radians(5.0), radians(10.0)
 TIMED_DISTANCE, TIMED_TIME = 0.02, 2.0
 STOP_DISTANCE = 0.06
-#: How long a path that begins with a program may take longer: one start ramp [s].
+#: Largest extra time of a motion with which a program begins: one start ramp [s].
 MAX_START_COST = 0.1
 #: The slider in its experiment.
 SLIDER = 0.5
-#: How far a path offset goes, and then a line [m]; how fast both go [m/s], and how long the arm
-#: rests after each [s].
+#: Length of the path offset, and of the line after it [m]; speed of both [m/s]; time of the rest
+#: after each [s].
 OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
-#: Two heights are the same [m]; a filtered offset is at rest when it is slower [m/s].
+#: Largest difference of equal heights [m]; speed below which a filtered offset is at rest [m/s].
 SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSamples:
     """
-    Samples of a recorded motion, a row for each cycle.
+    Samples of a recorded motion, one row per cycle.
 
     :param time: clock of the controller (n,) [s].
     :param target_q: (n, 6) [rad].
@@ -47,7 +47,7 @@ class MotionSamples:
     :param tool_speed: of the target TCP (n,) [m/s].
     :param scaling: speed_scaling (n,).
     :param fraction: target_speed_fraction (n,).
-    :param stop_sent: when the program was told to stop, on the same clock; NaN = it was not.
+    :param stop_sent: time of the stop command, by the same clock [s]; NaN = none was sent.
     """
 
     time: Floats
@@ -57,24 +57,24 @@ class MotionSamples:
     scaling: Floats
     fraction: Floats
     stop_sent: float = float('nan')
-    #: How far the target TCP and the measured one are from where they were at first (n,) [m].
+    #: Distances of the target TCP and the measured TCP from their first positions (n,) [m].
     target_distance: Floats = field(default_factory=lambda: np.empty(0))
     actual_distance: Floats = field(default_factory=lambda: np.empty(0))
 
     def as_lists(self) -> dict[str, Any]:
-        """Return everything as JSON has it, to the microradian."""
+        """Return the columns as lists for JSON, rounded to 6 decimals."""
         columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != 'stop_sent'}
         return {name: np.round(column, 6).tolist() for name, column in columns.items()}
 
     @property
     def moving(self) -> Flags:
-        """Tell for each row whether the target differs from that before, (n,)."""
+        """Return a mask (n,) of the rows whose target differs from that of the row before."""
         steps = np.abs(np.diff(self.target_q, axis=0)).max(axis=1) > 1e-9
         return np.concatenate([[False], steps])
 
     @property
     def duration(self) -> float:
-        """The time from the first to the last step of the target [s]; 0 = it did not move."""
+        """The time from the first to the last step of the target [s]; 0 = no motion."""
         rows = np.flatnonzero(self.moving)
         return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
 
@@ -84,14 +84,14 @@ class Experiment:
     """
     A motion, and the question that it settles.
 
-    :param check: its name in the report and in doc/robot_program.md.
-    :param motion: what moves, how far and how fast; a sentence for the person who is asked.
-    :param script: body of the program that moves.
+    :param check: name in the report and in doc/robot_program.md.
+    :param motion: what moves, how far and how fast; a sentence for the person who has to agree.
+    :param script: body of the program that moves the arm.
     :param analyse: derives the finding from the samples.
-    :param slider: the speed slider during the motion; None = as it is.
-    :param stop_after: the program is stopped so long after the arm begins to move [s], on the
-        clock of the controller.
-    :param feature: of ``program.render.FEATURES``, which the software has to have; empty = none.
+    :param slider: the speed slider during the motion; None = unchanged.
+    :param stop_after: time from the start of the motion to the stop command, by the controller's
+        clock [s]; None = no stop command.
+    :param feature: entry of ``program.render.FEATURES`` that the software needs; empty = none.
     """
 
     check: str
@@ -139,7 +139,7 @@ def _turn(samples: MotionSamples) -> Finding:
 
 
 def _timed_line(samples: MotionSamples) -> Finding:
-    """Tell a stretched trapezoid (peak 2 d/T where it never cruises) from thirds (1.5 d/T)."""
+    """Distinguish a stretched trapezoid (peak 2 d/T, without cruising) from thirds (1.5 d/T)."""
     peak = float(samples.tool_speed.max()) * TIMED_TIME / TIMED_DISTANCE
     law = _nearest(peak, {'t stretches the trapezoid': 2.0, 't makes thirds': 1.5})
     text = (
@@ -170,7 +170,7 @@ def _slider(samples: MotionSamples) -> Finding:
 
 
 def _program_stop(samples: MotionSamples) -> Finding:
-    """Measure the ramp of a program that is stopped in motion."""
+    """Measure the ramp with which the arm stops when its program is stopped."""
     moving = np.flatnonzero(samples.moving & (samples.time >= samples.stop_sent))
     if not len(moving):
         return note('program_stop', 'The program was stopped too late: the arm stood already.')
@@ -193,7 +193,7 @@ def _program_stop(samples: MotionSamples) -> Finding:
 
 
 def _path_offset(samples: MotionSamples) -> Finding:
-    """Tell where the tool rests with an offset, with a line beside it, and after both."""
+    """Check the heights at which the tool rests: with an offset, then a line, and after both."""
     heights = _resting_heights(samples)
     both = 2.0 * OFFSET
     off = np.abs(samples.target_distance - samples.actual_distance)
@@ -214,7 +214,7 @@ def _path_offset(samples: MotionSamples) -> Finding:
 
 
 def _resting_heights(samples: MotionSamples) -> list[float]:
-    """Return how far the target is from its start wherever it rests, in their order [m]."""
+    """Return the distances of the target from its start at its successive rests [m]."""
     speeds = np.abs(np.gradient(samples.target_distance, samples.time))
     moving = np.flatnonzero(speeds > RESTING_SPEED)
     ends = np.append(moving, len(samples.time))

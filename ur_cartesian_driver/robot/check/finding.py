@@ -14,9 +14,9 @@ class Verdict(Enum):
     """The meaning of a finding for this driver."""
 
     OK = 'ok'
-    #: Worth knowing: less works, or the robot differs from what was expected.
+    #: Worth knowing: some functions do not work, or the robot differs from expectations.
     NOTE = 'note'
-    #: The driver does not work like this.
+    #: The driver cannot work with the robot in this condition.
     PROBLEM = 'problem'
     SKIPPED = 'skipped'
 
@@ -26,9 +26,9 @@ class Finding:
     """
     The outcome of one check.
 
-    :param check: its name, as in the table of doc/robot_program.md.
+    :param check: name of the check, as in the table of doc/robot_program.md.
     :param text: one sentence.
-    :param data: numbers behind it, for the report; never who or where the robot is.
+    :param data: numbers behind the text, for the report; never the robot's identity or address.
     """
 
     check: str
@@ -49,7 +49,7 @@ class RobotAddress:
 
 
 def ok(check: str, text: str, **data: Any) -> Finding:
-    """Return a finding that is as it should be."""
+    """Return a finding that is as expected."""
     return Finding(check=check, verdict=Verdict.OK, text=text, data=data)
 
 
@@ -59,10 +59,10 @@ def note(check: str, text: str, **data: Any) -> Finding:
 
 
 def problem(check: str, clause: str) -> Finding:
-    """Return a finding that keeps the driver from working; the clause gets its full stop."""
+    """Return a finding that keeps the driver from working; a full stop is added to the clause."""
     return Finding(check=check, verdict=Verdict.PROBLEM, text=f'{clause.rstrip(".")}.')
 
 
 def skipped(check: str, reason: str) -> Finding:
-    """Return a check that could not be made, and why, as a clause."""
+    """Return the finding for a check that was not possible; the reason is a clause."""
     return Finding(check=check, verdict=Verdict.SKIPPED, text=f'{reason}.')

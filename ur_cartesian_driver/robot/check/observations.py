@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Observations of a robot that neither move it nor change anything.
+Observations of a robot that neither move it nor change its settings.
 
-Two things leave a trace for a moment: RTDE inputs are requested and released without a write, and
-a secondary program writes one line to the robot's log.
+Two of them leave a trace: RTDE inputs are requested and released without a write, and a secondary
+program writes one line to the robot's log.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ async def observe(address: RobotAddress, seconds: float) -> AsyncIterator[Findin
     """
     Yield the findings about a robot.
 
-    :param seconds: how long the stream of RTDE is recorded [s].
+    :param seconds: duration of the recording of the RTDE stream [s].
     """
     recorder = RtdeRecorder(
         [*STATE_FIELDS, *(n for n in EXTRA_OUTPUTS if n not in STATE_FIELDS)],
@@ -73,7 +73,7 @@ async def observe(address: RobotAddress, seconds: float) -> AsyncIterator[Findin
 
 
 async def _observe_remote_control(address: RobotAddress, version: ControllerVersion) -> Finding:
-    """Ask dashboard or Robot API; CB3 has no such mode."""
+    """Ask the dashboard or Robot API about remote control, which CB3 does not have."""
     check = 'remote_control'
     number = (version.major, version.minor)
     if version.major >= POLYSCOPE_X and number < FIRST_VERSION:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Observe the primary interface: model, limits, calibration, and whether it takes scripts."""
+"""Observe the primary interface: model, limits, calibration, and whether it accepts scripts."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from ur_cartesian_driver.robot.check.finding import (
 from ur_cartesian_driver.robot.link import model_names
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
 
-#: A program that runs beside any other and writes one line to the log.
+#: A line for the log, and a secondary program that only writes this line.
 RIGHTS_MARK = 'ur-cartesian check-robot'
 RIGHTS_PROGRAM = f'sec ur_check_rights():\n  textmsg("{RIGHTS_MARK}")\nend\n'.encode()
-#: The code of a refusal because the robot is in local control.
+#: Error code of a request that the robot refuses because it is in local control.
 LOCAL_CONTROL = 'C210'
-#: How long the robot may take to report its configuration, and to run that program [s].
+#: How long the robot may take to report its configuration, and to run RIGHTS_PROGRAM [s].
 CONFIGURATION_TIMEOUT, RIGHTS_TIMEOUT = 6.0, 3.0
 
 
@@ -42,7 +42,7 @@ class PrimaryProbe:
         """Prepare; :meth:`open` connects."""
         self.configuration: ConfigurationData | None = None
         self.geometry: DhTable | None = None
-        #: Texts and errors of the robot, in their order.
+        #: Texts and errors of the robot, oldest first.
         self.lines: list[str] = []
         self._failure = ''
         self._news = asyncio.Event()
@@ -61,7 +61,7 @@ class PrimaryProbe:
         """
         Connect and wait for the configuration.
 
-        :raises OSError: the robot does not answer, or does not report it.
+        :raises OSError: the robot does not answer, or does not report its configuration.
         """
         self._task = asyncio.create_task(
             self._client.stay_connected(address.host, address.primary_port)
@@ -80,12 +80,13 @@ class PrimaryProbe:
         """
         Send a program or a command; False if the connection is gone.
 
-        A read-only connection is made anew and gets it once more, before the refusal counts.
+        If the connection is read-only, the client reconnects and sends the request once more
+        before it reports a refusal.
         """
         return self._client.send(program, lambda: True)
 
     async def find_line(self, *parts: str, time: float = RIGHTS_TIMEOUT) -> str:
-        """Wait for a line with one of the parts; empty if none comes in time [s]."""
+        """Wait for a line that contains one of the parts; return '' if none comes in time [s]."""
 
         def found() -> str:
             return next((line for line in self.lines if any(p in line for p in parts)), '')
@@ -129,7 +130,7 @@ async def observe_primary(
             models = model_names(configuration.robot_type, version.major)
             yield _model(models)
             yield _limits(configuration)
-            await asyncio.sleep(0.2)  # the kinematics come in a later state
+            await asyncio.sleep(0.2)  # the kinematics come in a later state frame
             yield _calibration(models[0], probe.geometry, state)
         yield await _rights(probe)
     finally:
@@ -184,7 +185,7 @@ def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any])
 
 
 async def _rights(probe: PrimaryProbe) -> Finding:
-    """Send a program that only writes a line, and see whether the robot takes it."""
+    """Send a program that only writes a line, and find out whether the robot accepts it."""
     loop = asyncio.get_running_loop()
     begin = loop.time()
     probe.send(RIGHTS_PROGRAM)

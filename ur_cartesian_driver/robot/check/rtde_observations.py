@@ -27,29 +27,29 @@ from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 
-#: Software that the robot program needs: sums of lists came with it.
+#: Oldest software for the robot program, by major version: the first that can add lists.
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
-#: Outputs beside the driver's own recipe.
+#: Outputs to record in addition to the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
-#: Inputs that the driver writes, by what for.
+#: Inputs that the driver writes, by purpose.
 INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'speed slider': ('speed_slider_mask', 'speed_slider_fraction'),
     'outputs': ('standard_digital_output_mask', 'standard_digital_output'),
     'SERVO registers': tuple(SERVO_INPUTS),
     'path offset registers': tuple(OFFSET_INPUTS),
 }
-#: How long the inputs of a closed connection are tried for [s]; the driver tries for 0.2 s.
+#: How long to try to get the inputs of a closed connection [s]; the driver tries for 0.2 s.
 RELEASE_TIMEOUT = 2.0
 #: Longest pause between two packets that leaves margin to the timeout of the robot program [s].
 MAX_GAP = 0.1
-#: An arm whose joints are slower than that rests [rad/s]: noise of the measurement.
+#: Joint speed below which an arm is at rest [rad/s]; more than the noise of the measurement.
 REST_SPEED = 5e-3
 
 
 async def observe_rtde(
     recorder: RtdeRecorder, version: ControllerVersion, seconds: float
 ) -> list[Finding]:
-    """Return what a stream of some seconds shows."""
+    """Return the findings from a recording of the stream for some seconds."""
     await asyncio.sleep(seconds)
     findings = [_software(version), _outputs(recorder), _stream(recorder, version)]
     if recorder.rows:
@@ -172,7 +172,7 @@ def _is_idle(recorder: RtdeRecorder) -> bool:
 
 
 async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
-    """Request the inputs, write nothing, and see how soon they are free again."""
+    """Request the inputs, write nothing, and measure how soon they are free again."""
     taken = {}
     for purpose, names in INPUT_GROUPS.items():
         try:

@@ -18,7 +18,7 @@ from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 
 class RtdeRecorder:
-    """Records from its opening to its end; used once, from one event loop."""
+    """Records from :meth:`open` to :meth:`close`; used once, from one event loop."""
 
     def __init__(self, names: Sequence[str], host: str, port: int) -> None:
         """
@@ -28,7 +28,7 @@ class RtdeRecorder:
         """
         self.names: tuple[str, ...] = ()
         self.rows: list[RtdeValues] = []
-        #: When each row came in, on the clock of the event loop [s].
+        #: Arrival time of each row, by the clock of the event loop [s].
         self.arrivals: list[float] = []
         self._requested = tuple(names)
         self._address = host, port
@@ -42,14 +42,14 @@ class RtdeRecorder:
 
     async def open(self) -> ControllerVersion:
         """
-        Begin, and return the software of the controller.
+        Begin recording, and return the software version of the controller.
 
-        :raises OSError: nobody answers, or not as a robot.
+        :raises OSError: nothing answers, or something that is not a robot.
         """
         return await self._connection.open(*self._address)
 
     def close(self) -> None:
-        """End."""
+        """End recording."""
         self._connection.close()
 
     @property
@@ -71,7 +71,7 @@ class RtdeRecorder:
 
     async def wait_for(self, is_reached: Callable[[Mapping[str, Any]], bool], time: float) -> bool:
         """
-        Wait until the newest row shows something; return whether it did in time [s].
+        Wait until the newest row meets a condition; return whether it did within a time [s].
 
         :raises OSError: the connection ended.
         """

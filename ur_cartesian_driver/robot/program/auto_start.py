@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The first start of the robot program: when the arm is ready, and nothing else runs there.
+The first start of the robot program: when the arm is ready, and no other program runs.
 
-Later the driver starts nothing by itself: whoever switches the robot on, or stopped it, stands
-beside it, and says when the program may run.
+Later the driver starts nothing by itself: a person has switched the robot on, or has stopped it,
+and decides when the program may run.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ur_cartesian_driver.robot.link_settings import LinkSettings
 
 #: Modes of an arm that can be switched on.
 _UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
-#: How long it may take [s].
+#: How long the arm may take to be switched on [s].
 POWER_UP_TIMEOUT = 30.0
 
 
 class ProgramAutoStart:
-    """One upload of the program on the first connection, or none."""
+    """At most one upload of the program, on the first connection."""
 
     def __init__(
         self,
@@ -38,10 +38,10 @@ class ProgramAutoStart:
         """
         Prepare; nothing happens before :meth:`review`.
 
-        :param pending: whether the upload is still to come.
-        :param power_up: switches the arm on and releases its brakes; False = it is not connected.
+        :param pending: whether the program may be started on the first connection.
+        :param power_up: switches the arm on and releases its brakes; False = no connection.
         :param upload: sends the robot program.
-        :param warn: a line for the log.
+        :param warn: takes a line for the log.
         """
         self._settings = settings
         self._pending = pending
@@ -51,7 +51,7 @@ class ProgramAutoStart:
     def review(
         self, robot: RobotState, status: ConnectionStatus, *, program_connected: bool
     ) -> None:
-        """Start the program, or log why not, once the robot is known."""
+        """Start the program once the robot is known, or log the reason for not doing so."""
         if not self._pending or status.state not in (
             ConnectionState.CONNECTED,
             ConnectionState.STOPPED,
@@ -73,7 +73,7 @@ class ProgramAutoStart:
             self._upload()
 
     def _is_waiting_for_power(self, robot: RobotState, status: ConnectionStatus) -> bool:
-        """Switch the arm on if auto_power asks for it; tell whether the program has to wait."""
+        """Switch the arm on if auto_power is set; return whether the program has to wait."""
         s = self._settings
         if (
             not (s.auto_power and s.headless_mode)
@@ -88,7 +88,7 @@ class ProgramAutoStart:
         return True
 
     def _give_up_power(self) -> None:
-        """Give up the start, if the arm did not come up."""
+        """Give up the start if the arm is not running yet."""
         if self._pending:
             self._pending = False
             self._warn(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Start, stop and command the robot program, over whichever connection can do it."""
+"""Start, stop and command the robot program, over a connection that can do so now."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class ProgramControl:
     """
     Commands to the robot program and to the controller that runs it.
 
-    A connected program reads the reverse socket; one that is paused, stuck or gone is reached by
-    the primary interface, which takes whole programs and a few commands.
+    A connected program reads the reverse socket. If the program is paused, stuck or gone, commands
+    go to the primary interface, which accepts whole programs and a few commands.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class ProgramControl:
 
         :param robot: returns the newest state; None = the robot is not connected.
         :param warn: takes a line for the log.
-        :param may_upload: whether the first connection to the robot is the owner's first.
+        :param may_upload: whether the first connection may start the robot program.
         """
         self._sockets, self._primary = sockets, primary_client
         self._status, self._event_log = status, event_log
@@ -57,7 +57,7 @@ class ProgramControl:
         self.tcp_setter = TemporaryTcpSetter(
             sockets, primary_client, headless_mode=settings.headless_mode
         )
-        #: Whether the TCP from before the last goal is still to be restored.
+        #: Whether the TCP from before the last goal still has to be restored.
         self.tcp_restore_pending = False
         self.auto_start = ProgramAutoStart(
             settings,
@@ -87,19 +87,19 @@ class ProgramControl:
         """
         Send a command to the primary interface; False = there is no connection.
 
-        :param is_wanted: whether to send it again, if the connection was read-only.
+        :param is_wanted: returns whether to send it again, if the connection was read-only.
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 
     def send_script(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
-        """Send a script of others, as :meth:`send_primary` sends commands."""
+        """Send a user's script, like :meth:`send_primary` sends commands."""
         self._event_log.note('the driver sent a script of others')
         return self._primary.send(data, is_wanted)
 
     # ---- the program as a whole ---------------------------------------------------------------
 
     def upload(self) -> None:
-        """Upload the robot program; it replaces ours, never a foreign one."""
+        """Upload the robot program; it may replace our running program, but no foreign one."""
         if refusal := self.upload_refusal():
             self._warn(f'the robot program is not sent: {refusal}')
         elif not self._primary.send(
@@ -114,7 +114,7 @@ class ProgramControl:
             self._event_log.note('the driver sent the robot program')
 
     def upload_refusal(self) -> str:
-        """Return why no program may be sent now; empty if one may."""
+        """Return the reason why no program may be sent now; empty = a program may be sent."""
         if self._status.state in (*OUT_OF_REACH, ConnectionState.CONNECTING):
             return self._status.current.message
         if self._status.state is ConnectionState.EXECUTING:

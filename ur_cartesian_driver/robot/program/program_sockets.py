@@ -4,10 +4,11 @@
 The ports for the robot: three sockets of the robot program, and the script sender.
 
 The robot program connects to the trajectory port, the script command port and the reverse port,
-in this order, and is connected when it holds all three. A program that lost one of them has ended
-or is about to. So the others are closed, and a program that connects again finds all ports free.
+in this order, and is connected when it holds all three. A program that has lost one of them has
+ended or is about to end. So the other sockets are closed, and the next program finds all ports
+free.
 
-The script sender is separate: an External Control node requests the robot program there.
+The script sender is separate: an External Control node requests the robot program from it.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ class ProgramCallbacks:
 
     #: A robot program holds all its sockets.
     connected: Callable[[], None]
-    #: It lost them, and why.
+    #: The robot program lost its sockets; the text is the reason.
     lost: Callable[[str], None]
-    #: It reported the end of a trajectory.
+    #: The robot program reported the end of a trajectory.
     result: Callable[[TrajectoryResult], None]
-    #: A client was rejected, and why.
+    #: A client was rejected; the text is the reason.
     warning: Callable[[str], None]
 
 
@@ -56,26 +57,26 @@ class ProgramSockets:
         """Prepare; :meth:`open` listens."""
         self._settings = settings
         self._listener = listener
-        #: The robot program, for the script sender; empty = the robot has one of its own.
+        #: The robot program, for the script sender; empty = the robot runs a saved program.
         self.text = ''
-        #: By which we recognise that program, not 0.
+        #: Random number by which we recognise our program, not 0.
         self.program_number = 1 + secrets.randbelow(INT32_MAX)
-        #: A goal runs: its keepalives are another message.
+        #: A goal runs: keepalives are then NOOP actions of its trajectory.
         self.is_executing = False
-        #: It uses the buffered servo, whose keepalives are a third message.
+        #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
         self.servo = False
         #: The program is paused and reads nothing. Keepalives pause too: a START must not queue
-        #: behind an hour's keepalives.
+        #: after an hour's keepalives.
         self.is_paused = False
         #: The robot reports that no program runs: the client that holds the sockets is dead, for
-        #: instance behind a cut cable, and another one may replace it.
+        #: instance because a cable was cut, and another client may replace it.
         self.ended = False
         self.connected = False
-        #: The longest pause between two keepalives since it was reset [s].
+        #: The longest pause between two keepalives since the last reset of this number [s].
         self.max_keepalive_gap = 0.0
-        #: When the last keepalive was sent to a connected program [s].
+        #: Time of the last keepalive to a connected program [s].
         self.last_keepalive = -inf
-        #: Where the ports are open.
+        #: The address at which the ports are open.
         self._host = ''
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
         self._results = TrajectoryResultDecoder()
@@ -129,7 +130,7 @@ class ProgramSockets:
         Render the robot program for the ports that are open.
 
         :param host: the address at which the robot reaches us.
-        :raises DriverError: it cannot be made from the settings.
+        :raises DriverError: the program cannot be made from the settings.
         """
         s, ports = self._settings, self.ports
         self.text = render(
@@ -180,7 +181,7 @@ class ProgramSockets:
         )
 
     def drop(self, reason: str) -> None:
-        """Close the sockets of a program, and report it lost."""
+        """Close the sockets of the robot program, and report its loss if it was connected."""
         for port in self._program_ports:
             port.disconnect()
         if self.connected:
@@ -199,7 +200,7 @@ class ProgramSockets:
         while True:
             last, before = loop.time(), last
             self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
-            if not (self.is_paused and was_paused):  # one more, for the read that is under way
+            if not (self.is_paused and was_paused):  # one more, for the read that waits
                 self._send_keepalive()
             was_paused = self.is_paused
             due = max(due + self._settings.keepalive_period, loop.time())
@@ -236,7 +237,7 @@ class ProgramSockets:
             self._listener.lost('another robot program connects')
         called = [port.connection for port in self._program_ports].index(connection)
         for port in self._program_ports[called + 1 :]:
-            port.disconnect()  # a stranger, or a program that died while it connected
+            port.disconnect()  # a foreign client, or a program that died while connecting
         if connection is self._trajectory.connection:
             self._results = TrajectoryResultDecoder()
         if all(port.connection is not None for port in self._program_ports):
@@ -280,4 +281,4 @@ class ProgramSockets:
 
 
 def _ignore(_: object) -> None:
-    """Take no notice."""
+    """Do nothing."""

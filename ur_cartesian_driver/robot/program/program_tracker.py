@@ -14,7 +14,7 @@ from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
 #: How long a program may hold its sockets after the robot has reported its end [s].
 DEAD_PROGRAM_TIMEOUT = 0.5
-#: How long our own program may take, from its connection on, to show that it is ours [s].
+#: How long our own program may take after connecting to prove that it is ours [s].
 IDENTITY_TIMEOUT = 0.5
 
 
@@ -24,32 +24,32 @@ class ProgramTracker:
     def __init__(self, sockets: ProgramSockets) -> None:
         """Begin with no program."""
         self._sockets = sockets
-        #: The program that is connected was told to end.
+        #: The connected program was told to end.
         self.is_ending = False
-        #: The program that runs has called us, even if it has hung up since.
+        #: The running program has connected to us, even if it has hung up since.
         self._has_called = False
-        #: Since when the robot reports that no program runs while one is connected [s].
+        #: Time since which the robot reports that no program runs although one is connected [s].
         self._dead_since = inf
         self._has_shown_itself = False
-        #: Its count of connections as the robot reported it last, and when this one was made.
+        #: The program's count of connections: in the newest report, and before this connection.
         self._run = self._run_at_connection = 0
         self._identity = asyncio.Event()
         self._connected_at = -inf
 
     @property
     def is_own(self) -> bool:
-        """Tell whether the program that is connected was rendered by us, and has shown it."""
+        """Return whether the connected program has proved that we rendered it."""
         return self._sockets.connected and self._has_shown_itself
 
     def program_connected(self) -> None:
-        """Begin to doubt a program: it has to show itself on each connection."""
+        """Require a new proof of identity, which a program has to give on each connection."""
         self.is_ending = self._has_shown_itself = False
         self._run_at_connection = self._run
         self._connected_at = asyncio.get_running_loop().time()
         self._identity.clear()
 
     async def wait_for_identity(self) -> bool:
-        """Return whether the connected program is ours, when that can be known."""
+        """Return whether the connected program is ours, as soon as that is known."""
         try:
             async with asyncio.timeout_at(self._connected_at + IDENTITY_TIMEOUT):
                 await self._identity.wait()
@@ -58,7 +58,7 @@ class ProgramTracker:
         return self.is_own
 
     def observe(self, robot: RobotState) -> None:
-        """Take a report; hang up on a program that has ended without a word."""
+        """Take a report; disconnect a program that has ended without closing its sockets."""
         sockets = self._sockets
         sockets.ended = ended = has_ended(robot)
         if not (sockets.connected and ended):
@@ -83,7 +83,7 @@ class ProgramTracker:
             self._identity.set()
 
     def foreign_program_runs(self, robot: RobotState | None) -> bool:
-        """Tell whether a program runs that has not called us."""
+        """Return whether the robot runs a program that has not connected to us."""
         return (
             robot is not None
             and not has_ended(robot)
@@ -92,7 +92,7 @@ class ProgramTracker:
         )
 
     def reads(self, robot: RobotState | None) -> bool:
-        """Tell whether the program would act on a message now."""
+        """Return whether the program would act on a message now."""
         return (
             robot is not None
             and self._sockets.connected

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Sets the temporary TCP of a goal, and restores the one before.
+Sets the temporary TCP of a goal, and restores the previous TCP.
 
-When that is due is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
+The goal decides when to do so (:mod:`~ur_cartesian_driver.execution`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ur_cartesian_driver.robot.connection_status import is_paused
 from ur_cartesian_driver.robot.primary_client import PrimaryClient
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
-#: A program runs, whoever sent it.
+#: States in which a program runs, ours or a foreign one.
 _RUNNING_STATES = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
 
 
 class TemporaryTcpSetter:
-    """Sets a TCP by the robot program, or by a program of its own."""
+    """Sets a TCP through the robot program, or restores it by a secondary program."""
 
     def __init__(
         self, program: ProgramSockets, primary_client: PrimaryClient, *, headless_mode: bool
@@ -37,11 +37,11 @@ class TemporaryTcpSetter:
         """
         self._program, self._primary = program, primary_client
         self._headless_mode = headless_mode
-        #: The connected robot program has set it, and remembers the one before.
+        #: The connected robot program has set the temporary TCP, and remembers the previous one.
         self._program_remembers = False
 
     def set_temporary(self, T_flange_tcp: Pose) -> None:
-        """Have the robot program set the TCP for the time of a goal."""
+        """Have the robot program set the TCP for the duration of a goal."""
         self._program_remembers = True
         self._send(T_flange_tcp, TcpPersistence.TEMPORARY)
 
@@ -51,11 +51,12 @@ class TemporaryTcpSetter:
         """
         Restore the TCP from before a goal.
 
-        The robot program does it if it is connected, not paused, and remembers that TCP exactly.
-        Else a program of its own does, if we may send one and no foreign program runs. If we may
-        not, the robot program does, with the digits of the wire.
+        The robot program does so if it is connected, not paused, and remembers that TCP exactly.
+        Otherwise a secondary program does, if we may send programs and no foreign program runs. If
+        we may not, the robot program sets the TCP, rounded as on the wire.
 
-        :param is_wanted: whether that program may be sent again, if the connection was read-only.
+        :param is_wanted: returns whether the secondary program may be sent again, if the
+            connection was read-only.
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):

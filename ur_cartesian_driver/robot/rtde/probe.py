@@ -14,7 +14,7 @@ async def read_state(host: str, port: int) -> RobotState:
     """
     Return the state of a robot.
 
-    :raises OSError: nobody answers, or not as a robot.
+    :raises OSError: nothing answers, or something that is not a robot.
     """
     states: list[RobotState] = []
     first = asyncio.Event()

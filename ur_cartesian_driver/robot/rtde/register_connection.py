@@ -4,11 +4,11 @@
 The RTDE connection for the registers of the robot program, open during one goal.
 
 Inputs belong to the client that requested them, so they are held only while they are needed. The
-controller frees the inputs of a client (maybe of the goal before) when it finds the connection
+controller frees the inputs of a client (perhaps of the previous goal) when it finds the connection
 closed; until then the request is repeated for a short while.
 
-The program reports in registers arrives on the same connection, so the packets of other goals
-stay as they are.
+The program's reports in registers arrive on the same connection, so the packets of other goals
+need not contain them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegisterExchange:
-    """The outputs and inputs of a connection, by the names of RTDE, and their taker."""
+    """Names of the RTDE outputs and inputs of a connection, and the receiver of the outputs."""
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -65,10 +65,10 @@ class RegisterConnection:
 
     async def run(self, host: str, port: int, on_end: Callable[[str], None]) -> None:
         """
-        Open it, and serve until it ends or is closed.
+        Open the connection, and serve it until it ends or is closed.
 
-        :param on_end: it could not be opened, or was lost, and why; never after
-            :meth:`close`.
+        :param on_end: called with the reason if the connection could not be opened, or was lost;
+            never after :meth:`close`.
         """
         loop = asyncio.get_running_loop()
         give_up, reason = loop.time() + OPEN_TIMEOUT, ''
@@ -83,12 +83,12 @@ class RegisterConnection:
             on_end(reason)
 
     def write_row(self, values: Sequence[float]) -> None:
-        """Write all inputs in their order, if the connection is there."""
+        """Write all inputs in their order, if the connection is open."""
         if self._is_open and self._attempt is not None:
             self._attempt.write_row(values)
 
     def close(self) -> None:
-        """Close, after what was written is sent."""
+        """Close after sending what was written."""
         self._is_open = False
         if self._attempt is not None:
             self._attempt.close()
@@ -112,14 +112,14 @@ class _Attempt(RtdeConnection):
 
     @property
     def has_inputs(self) -> bool:
-        """Whether the robot has given them."""
+        """Whether the robot has granted the inputs."""
         return bool(self._inputs)
 
     async def serve(self, host: str, port: int) -> str:
-        """Serve until it ends, and return why."""
+        """Serve the connection, and return the reason of its end."""
         try:
             await self.open(host, port)
-            # Whoever has closed it meanwhile could not hang up yet.
+            # A close() before the connection was made had nothing to close.
             return await self.ended() if self._is_wanted else ''
         except OSError as error:
             return str(error)
@@ -127,18 +127,18 @@ class _Attempt(RtdeConnection):
             self.close()
 
     def write_row(self, values: Sequence[float]) -> None:
-        """Write all inputs in their order, once they are there."""
+        """Write all inputs in their order, once they are granted."""
         if self._inputs:
             self._connection.send(self._inputs[0].pack(values))
 
     def close(self) -> None:
-        """Close, after what was written is sent."""
+        """Close after sending what was written."""
         self._is_wanted = False
         super().close()
 
 
 def servo_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
-    """Return the registers of the buffered servo."""
+    """Return the exchange of the buffered servo."""
     effective_speed = EffectiveSpeed()
     return RegisterExchange(
         outputs=SERVO_FIELDS,
@@ -150,7 +150,7 @@ def servo_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
 
 
 def offset_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
-    """Return the registers of a trajectory with path offsets."""
+    """Return the exchange of a trajectory with path offsets."""
 
     def take(values: Sequence[Any]) -> None:
         sequence, *numbers = values
@@ -164,9 +164,9 @@ def offset_exchange(on_event: Callable[[Event], None]) -> RegisterExchange:
 
 def feedback_from_rtde(values: Sequence[Any], effective_speed: EffectiveSpeed) -> ServoFeedback:
     """
-    Return a packet with the values of :data:`SERVO_FIELDS`.
+    Return the feedback in a packet with the values of :data:`SERVO_FIELDS`.
 
-    :param effective_speed: follows the packets one by one; this call updates it.
+    :param effective_speed: has seen all earlier packets; this call updates it.
     """
     (timestamp, scaling, slider, state, *feedback) = values
     mode, sequence, lag, done, repeats, skipped, size, over = feedback

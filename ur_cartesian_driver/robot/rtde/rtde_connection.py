@@ -21,7 +21,7 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: Longest time for the handshake about the streamed fields [s].
 ANSWER_TIMEOUT = 2.0
-#: A robot that streams nothing for that long is lost [s].
+#: Silence of the stream after which the robot is lost [s].
 SILENCE_TIMEOUT = 1.0
 
 
@@ -39,8 +39,8 @@ class RtdeConnection:
         Prepare a connection.
 
         :param client: chooses the fields that are streamed and written.
-        :param on_values: a packet came in, with the names and values of its fields; also before
-            :meth:`open` returns.
+        :param on_values: called for each packet with the names and values of its fields, possibly
+            before :meth:`open` returns.
         :param silence: the longest pause between two packets [s].
         """
         self._client = client
@@ -49,10 +49,10 @@ class RtdeConnection:
         self._names: tuple[str, ...] = ()
         self._inputs: tuple[Recipe, ...] = ()
         self._last_packet = self._last_request = 0.0
-        #: The time that the quickest answer of the handshake took [s].
+        #: Shortest time between a request of the handshake and its answer [s].
         self.round_trip = inf
         self._version: ControllerVersion | None = None
-        self._answered = asyncio.Event()  # by a version or by hanging up
+        self._answered = asyncio.Event()  # the handshake is done, or the connection closed
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._connection = TcpConnection(self._on_data, self._on_closed)
 
@@ -63,14 +63,15 @@ class RtdeConnection:
 
     @property
     def peer_address(self) -> str:
-        """Return the robot's IP address, also if a host name was given."""
+        """Return the robot's IP address, even if a host name was given."""
         return self._connection.peer_address
 
     async def open(self, host: str, port: int) -> ControllerVersion:
         """
-        Connect, agree on the recipe, and return the version of the controller's software.
+        Connect, agree on the recipes, and return the version of the controller's software.
 
-        :raises OSError: nobody answers, or not as a robot; the text names host and port.
+        :raises OSError: nothing answers, or something that is not a robot; the text names host
+            and port.
         """
         await dial(self._connection, host, port)
         self._send_request(self._client.start())
@@ -91,7 +92,7 @@ class RtdeConnection:
         self._connection.send(self._inputs[0].pack_named(values))
 
     async def ended(self) -> str:
-        """Wait until the connection breaks or the robot falls silent; return why, as a clause."""
+        """Wait for the end of the connection or of its data; return the reason as a clause."""
         loop = asyncio.get_running_loop()
         while loop.time() - self._last_packet < self._silence:
             await asyncio.wait({self._closed}, timeout=self._silence / 10.0)
@@ -138,7 +139,7 @@ class RtdeConnection:
             self._answered.set()
 
     def _take_values(self, values: RtdeValues) -> None:
-        self._on_values(self._names, values)  # first, because a CANCEL may follow from it
+        self._on_values(self._names, values)  # first, because it may lead to a CANCEL
         self._last_packet = asyncio.get_running_loop().time()
 
     def _on_closed(self, reason: str) -> None:

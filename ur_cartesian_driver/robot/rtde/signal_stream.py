@@ -3,7 +3,8 @@
 """
 Inputs, outputs and tool of the robot, through a slow RTDE connection of their own.
 
-At 500 Hz, in the packets of the robot state, they would cost most of the time for no benefit.
+In the packets of the robot state, at 500 Hz, these fields would take most of the computing time
+for no benefit.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection, SILEN
 from ur_cartesian_driver.robot.transport import AttemptLog, Backoff
 
 REQUIRED_FIELDS = ('actual_digital_input_bits', 'actual_digital_output_bits')
-#: Old software does not have all of these.
+#: Old software lacks some of these.
 OPTIONAL_FIELDS = (
     'analog_io_types',
     'standard_analog_input0',
@@ -45,7 +46,7 @@ OPTIONAL_FIELDS = (
 
 
 class SignalStream:
-    """Keeps a connection of its own while the robot is connected."""
+    """Keeps a separate connection for the signals while the robot is connected."""
 
     def __init__(
         self, on_signals: Callable[[Signals], None], on_warning: Callable[[str], None]
@@ -53,8 +54,8 @@ class SignalStream:
         """
         Prepare; :meth:`stay_connected` connects.
 
-        :param on_signals: something changed.
-        :param on_warning: the connection was lost, and why.
+        :param on_signals: called when a signal has changed.
+        :param on_warning: called with the reason when the connection was lost.
         """
         self._on_signals = on_signals
         self._attempts = AttemptLog(on_warning, on_warning)
@@ -93,7 +94,7 @@ class SignalStream:
 
 
 def signals_from_rtde(values: Mapping[str, Any]) -> Signals:
-    """Return the snapshot of one data package, which has some of the names above."""
+    """Return the signals in one data package, which may lack optional fields."""
     types, tool_types = values.get('analog_io_types', 0), values.get('tool_analog_input_types', 0)
 
     def pair(name: str, domains: int) -> tuple[AnalogChannel, AnalogChannel]:

@@ -3,10 +3,9 @@
 """
 Decodes the RTDE packets of the robot state.
 
-Which outputs there are, and the fields that they become, stands in
-:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState`; nothing of it is repeated here.
-All that is the same in every packet is prepared once: 500 come in a second, and a CANCEL may wait
-behind each.
+:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` declares the outputs and the
+fields that they become; nothing of this is repeated here. Work that is the same for every packet
+is done once: 500 packets arrive in a second, and a CANCEL may have to wait for each.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from ur_cartesian_driver.motion.state.robot_state import (
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 
-#: The rows that the robot sends, with their outputs.
+#: The rows that come from RTDE, with their outputs.
 _ROWS = tuple((row, row.rtde) for row in STATE_TABLE if row.rtde is not None)
 REQUIRED_FIELDS = tuple(rtde.name for _, rtde in _ROWS if not rtde.optional)
 OPTIONAL_FIELDS = tuple(rtde.name for _, rtde in _ROWS if rtde.optional)
 #: All names, in the order of the table.
 STATE_FIELDS = tuple(rtde.name for _, rtde in _ROWS)
 
-#: What an unknown mode of newer software becomes: the most careful one.
+#: The most cautious mode of each kind, which replaces unknown modes of newer software.
 _UNKNOWN_MODES: Mapping[Any, IntEnum] = {
     RobotMode: RobotMode.NO_CONTROLLER,
     SafetyMode: SafetyMode.UNDEFINED_SAFETY_MODE,
@@ -46,7 +45,7 @@ _UNKNOWN_MODES: Mapping[Any, IntEnum] = {
 
 
 def _converter(kind: Any) -> Callable[[Any], Any] | None:
-    """Return what converts an RTDE value to a field of this type; None = nothing has to."""
+    """Return the function that turns an RTDE value into this type; None = none is needed."""
     if kind is Pose:
         return Pose.from_rotation_vector
     if kind in _UNKNOWN_MODES:
@@ -59,7 +58,7 @@ def _converter(kind: Any) -> Callable[[Any], Any] | None:
 
 
 def _monitored(*types: DataType) -> tuple[int, ...]:
-    """Return the columns of these types that have to be finite."""
+    """Return the indices of the outputs of these types that have to be finite."""
     return tuple(
         i
         for i, (_, rtde) in enumerate(_ROWS)
@@ -67,7 +66,7 @@ def _monitored(*types: DataType) -> tuple[int, ...]:
     )
 
 
-#: What stands for an output that the robot does not have.
+#: The value that replaces an output which the robot does not have.
 _ABSENT = {
     rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
     for row, rtde in _ROWS
@@ -75,7 +74,7 @@ _ABSENT = {
 
 
 def _compile() -> Callable[..., RobotState]:
-    """Return a function from the values of a packet to the state; as source, for its speed."""
+    """Return the function that makes a state from a packet's values, compiled for speed."""
     known: dict[str, Any] = {'RobotState': RobotState}
     arguments = []
     for row, _ in _ROWS:
@@ -95,7 +94,7 @@ _numbers = itemgetter(*_monitored(DataType.DOUBLE))
 
 
 def in_recipe_order(names: Sequence[str], values: RtdeValues) -> RtdeValues | tuple[Any, ...]:
-    """Return the values in the order of :data:`STATE_FIELDS`, also where the robot lacks some."""
+    """Return the values in the order of :data:`STATE_FIELDS`, with defaults for missing ones."""
     if names == STATE_FIELDS:
         return values
     found = dict(zip(names, values, strict=True))
@@ -106,10 +105,10 @@ def robot_state_from_rtde(values: Sequence[Any]) -> RobotState:
     """
     Return the state in a packet whose values are in the order of :data:`STATE_FIELDS`.
 
-    What follows from earlier packets too has its default.
+    Fields that also depend on earlier packets have their defaults.
 
-    :raises RemoteProtocolError: a number is not finite. No comparison with it is ever true, so
-        the monitor of a goal would find no fault.
+    :raises RemoteProtocolError: a monitored number is not finite. Comparisons with NaN are always
+        false, so the monitor of a goal would find no fault.
     """
     if not isfinite(sum(map(sum, _vectors(values))) + sum(_numbers(values))):
         raise RemoteProtocolError(_not_finite(values))

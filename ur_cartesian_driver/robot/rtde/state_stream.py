@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's state in every step, through an RTDE connection of its own."""
+"""The robot's state in every step of the controller, through a separate RTDE connection."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class StateStream(RtdeConnection):
 
         :param frequency: packets per second; 0 = as many as the robot can.
         :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
-        :param on_state: a packet came in; also before :meth:`open` returns.
+        :param on_state: called for each packet, possibly before :meth:`open` returns.
         """
         super().__init__(
             RtdeClientCodec(

@@ -37,7 +37,7 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
-#: What to use where its Robot API has no such command; others are done on the pendant.
+#: What to do if the Robot API lacks a command; for all others, use the pendant.
 REPLACEMENTS: Mapping[str, str] = {
     **dict.fromkeys(
         ('power on', 'brake release', 'unlock protective stop'),
@@ -50,23 +50,23 @@ REPLACEMENTS: Mapping[str, str] = {
 }
 
 UNLOCK = 'unlock protective stop'
-#: Begins the answer to an unlock that comes too early.
+#: Beginning of the answer to an unlock that comes too early.
 TOO_EARLY = 'Cannot unlock protective stop'
 
 
 class DashboardConnection:
-    """Sends requests to the dashboard, from one event loop; several at a time."""
+    """Sends requests to the dashboard, from one event loop; several may run at a time."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Prepare; every request connects by itself."""
+        """Prepare; every request opens its own connection."""
         self._host, self._port = host, port
 
     async def request(self, command: str, argument: str = '') -> DashboardReply:
         """
-        Give a command and return the answer.
+        Send a command and return the answer.
 
         :raises OSError: the dashboard does not answer.
-        :raises ProtocolError: it answers nonsense.
+        :raises ProtocolError: the request or the answer is invalid.
         """
         codec = Codec()
         replies: list[DashboardReply] = []
@@ -81,10 +81,10 @@ class DashboardConnection:
 
     async def request_raw(self, line: str) -> str:
         """
-        Send any line and return the one that comes back.
+        Send any line and return the line that answers it.
 
         :raises OSError: the dashboard does not answer.
-        :raises ProtocolError: it answers nonsense.
+        :raises ProtocolError: the answer is invalid.
         """
         buffer = LineBuffer(MAX_LINE_LENGTH)
         lines: list[str] = []
@@ -96,7 +96,7 @@ class DashboardConnection:
     async def _exchange(
         self, request: bytes, feed: Callable[[bytes], None], answered: Callable[[], bool]
     ) -> None:
-        """Send a request and feed what comes back until it is answered."""
+        """Send a request and feed the bytes that come back until the request is answered."""
         ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         errors: list[ProtocolError] = []
 
@@ -130,7 +130,7 @@ class DashboardConnection:
 
 
 def unavailable_reason(command: str, version: ControllerVersion) -> str:
-    """Return why the software of a robot does not have a command; empty when it has it."""
+    """Return the reason why a robot's software lacks a command; empty = it has the command."""
     if version.major >= POLYSCOPE_X:
         return _missing_in_robot_api(command, version)
     spec = COMMAND_SPECS[command]
@@ -146,7 +146,7 @@ def unavailable_reason(command: str, version: ControllerVersion) -> str:
 
 
 def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
-    """Return why PolyScope X does not have a command; empty when it has it."""
+    """Return the reason why PolyScope X lacks a command; empty = it has the command."""
     since = API_COMMANDS[command][-1].since if command in API_COMMANDS else None
     if since is not None and (version.major, version.minor) >= since:
         return ''
@@ -162,7 +162,7 @@ def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
 
 
 def is_too_early(command: str, answer: str) -> bool:
-    """Tell whether an unlock may succeed later; the Robot API does not tell why it cannot."""
+    """Return whether an unlock may succeed later; the Robot API gives no reason for a refusal."""
     return TOO_EARLY in answer or (command == UNLOCK and CONFLICT in answer)
 
 
@@ -170,10 +170,10 @@ def explain_refusal(
     command: str, answer: str, robot: RobotState | None, remote_control: bool | None
 ) -> str:
     """
-    Return what a refusal of the dashboard means.
+    Return an explanation of a refusal.
 
-    :param answer: its words.
-    :param remote_control: whether clients may control the robot; None = it cannot be known.
+    :param answer: the words of the dashboard or Robot API.
+    :param remote_control: whether clients may control the robot; None = unknown.
     """
     return f'The robot refuses {command!r} and says: {answer.rstrip(".")}. ' + _reason(
         command, answer, robot, remote_control

@@ -3,7 +3,7 @@
 """
 Dashboard commands as calls: checked, sent, and confirmed by the robot state.
 
-PolyScope X takes them over its Robot API instead.
+On PolyScope X they go through the Robot API instead.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ EFFECT_TIMEOUT = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardPorts:
-    """Ports on the robot of the dashboard, and of the Robot API that PolyScope X has instead."""
+    """The robot's ports of the dashboard, and of the Robot API that PolyScope X has instead."""
 
     dashboard: int
     robot_api: int
@@ -57,11 +57,11 @@ class ExpectedEffect:
 
     is_reached: Callable[[RobotState], bool]
     timeout: float
-    #: Names that state in an error.
+    #: Name of this state, for error texts.
     target_mode: str
 
 
-#: The effects of dashboard commands that take a while.
+#: The effects of dashboard commands that take time.
 EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
     'power on': ExpectedEffect(
         lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
@@ -93,24 +93,24 @@ EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
 
 
 class DashboardService:
-    """Calls dashboard or Robot API, from one event loop; several calls at a time."""
+    """Calls dashboard or Robot API, from one event loop; several calls may run at a time."""
 
     def __init__(self, host: str, ports: DashboardPorts, link: RobotLink) -> None:
-        """Prepare; every call connects by itself."""
+        """Prepare; every call opens its own connection."""
         self._dashboard = DashboardConnection(host, ports.dashboard)
         self._host, self._ports = host, ports
         self._link = link
 
     @property
     def _client(self) -> DashboardConnection | RobotApiConnection:
-        """The connection that serves this robot; both take the same requests."""
+        """The connection that serves this robot; both kinds accept the same requests."""
         version = self._link.version
         if version is None or version.major < POLYSCOPE_X:
             return self._dashboard
         return RobotApiConnection(self._host, self._ports.robot_api, version)
 
     async def request(self, call: DashboardCall) -> ServiceAnswer:
-        """Give a command, and wait until the robot has done it."""
+        """Send a command, and wait until the robot has carried it out."""
         version = self._link.version
         if version is not None and (reason := unavailable_reason(call.command, version)):
             return failed(reason)
@@ -132,14 +132,14 @@ class DashboardService:
         return succeeded(reply.value or reply.text)
 
     async def request_raw(self, call: DashboardLineCall) -> ServiceAnswer:
-        """Send any line and return the one that comes back."""
+        """Send any line and return the line that answers it."""
         version = self._link.version
         if version is not None and (reason := unavailable_reason('quit', version)):
             return failed(reason)
         return succeeded(await self._dashboard.request_raw(call.line))
 
     async def remote_control(self) -> bool | None:
-        """Return whether clients may control the robot; None = it cannot be known."""
+        """Return whether clients may control the robot; None = unknown."""
         version = self._link.version
         if version is None or unavailable_reason('is in remote control', version):
             return None

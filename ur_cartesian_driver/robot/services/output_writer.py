@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Writes the safe values of outputs to a robot whose program is paused or gone, or restores others.
+Writes the safe values of outputs if the robot program is paused or gone, or restores old values.
 
-Each kind of output has a write of its own: where another client has the inputs of one kind, the
-others are still set.
+Each kind of output is written separately: if another client holds the inputs of one kind, the
+other kinds are still set.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from ur_cartesian_driver.robot.services.rtde_input_writer import (
 )
 from ur_cartesian_driver.robot.services.service_calls import SetOutputCall
 
-#: How long a write may take [s]: the end of a goal waits for it. The inputs of a connection that
-#: was just closed are not free at once, so it is tried again meanwhile.
+#: How long a write may take, because the end of a goal waits for it, and the pause before another
+#: attempt [s]: the inputs of a connection that was just closed are not free at once.
 WRITE_TIMEOUT, RETRY_PERIOD = 0.25, 0.02
 
 
 async def write_outputs(host: str, port: int, outputs: Iterable[SafeOutput]) -> OutputsSecured:
-    """Write the values of outputs; return what that has changed, and what has failed."""
+    """Write the values of outputs; return the outputs that have changed, and the failures."""
     by_kind: dict[int, list[SafeOutput]] = {}
     for output in outputs:
         by_kind.setdefault(output.output, []).append(output)
@@ -42,7 +42,7 @@ async def write_outputs(host: str, port: int, outputs: Iterable[SafeOutput]) -> 
 
 
 async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[SafeOutput], str]:
-    """Write outputs of one kind; return those that were changed, as they were, and a failure."""
+    """Write outputs of one kind; return the changed ones with their old values, and a failure."""
     calls = [
         SetOutputCall(kind=o.output, pin=o.pin, value=o.value, domain=o.domain) for o in outputs
     ]

@@ -10,14 +10,14 @@ from collections.abc import Callable
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.robot.link import RobotLink
 
-#: How often a condition is checked [s].
+#: Time between two checks of a condition [s].
 POLL_PERIOD = 0.02
 
 
 async def wait_for_state(
     link: RobotLink, predicate: Callable[[RobotState], bool], within: float
 ) -> bool:
-    """Return whether the robot reports it within a time [s]; a robot that is lost may return."""
+    """Return whether a condition holds within a time [s]; a lost robot may connect again."""
     loop = asyncio.get_running_loop()
     end = loop.time() + within
     while loop.time() < end:

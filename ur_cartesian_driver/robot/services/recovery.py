@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Brings a stopped robot back to READY, step by step by the tables of recovery."""
+"""Brings a stopped robot back to READY, step by step, by the tables in `recovery_steps`."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 #: How long a robot may take until the next step is due [s].
 STEP_TIMEOUT = 35.0
-#: The same for a robot that is not connected [s].
+#: The same for a robot that is not connected when the recovery begins [s].
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Pause before an unlock that came too early is repeated, and how long that goes on [s].
+#: Pause before an unlock that came too early is repeated, and longest time of repetitions [s].
 UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
-#: Dashboard commands of the steps of a recovery; the last one does it.
+#: Dashboard commands of the steps of a recovery; the last command is the step itself.
 STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
     RecoveryStep.UNLOCK: ('close safety popup', 'close popup', 'unlock protective stop'),
     RecoveryStep.RESTART_SAFETY: ('close safety popup', 'restart safety'),
@@ -57,7 +57,7 @@ STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
     RecoveryStep.STOP_PROGRAM: ('stop',),
     RecoveryStep.PLAY: ('close popup', 'play'),
 }
-#: The same through the primary interface, where there is neither dashboard nor Robot API.
+#: Commands to the primary interface, for steps whose dashboard command the robot lacks.
 PRIMARY_COMMANDS: Mapping[RecoveryStep, primary.PrimaryCommand] = {
     RecoveryStep.UNLOCK: primary.PrimaryCommand.UNLOCK_PROTECTIVE_STOP,
     RecoveryStep.POWER_ON: primary.PrimaryCommand.POWER_ON,
@@ -81,7 +81,7 @@ class RecoveryRunner:
         Prepare.
 
         :param send_program: uploads the robot program and waits until it has connected.
-        :param headless: we upload the program; else a program on the robot requests it.
+        :param headless: the driver uploads the program; else a program on the robot requests it.
         """
         self._link, self._dashboard = link, dashboard
         self._send_program, self._headless = send_program, headless
@@ -91,7 +91,7 @@ class RecoveryRunner:
         """
         Recover until READY, or until a person has to act; the text says what was done.
 
-        :param may_unlock: whether somebody answers for unlocking a protective stop.
+        :param may_unlock: whether a person takes responsibility for unlocking a protective stop.
         """
         if self._is_running:
             return failed('A recovery is running already.')
@@ -117,7 +117,7 @@ class RecoveryRunner:
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # A robot that was never connected will not appear by waiting.
+                # Waiting is in vain if the robot was not connected from the start.
                 lost = self._link.robot is None and not done
                 if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))
@@ -140,10 +140,10 @@ class RecoveryRunner:
 
     async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
-        Return the next step; one for a person only if it lasts.
+        Return the next step; a step for a person only if it persists.
 
-        Sockets and robot state show a change at different times, and a program that has just been
-        started has not connected yet.
+        Sockets and robot state reflect a change at different times, and a program that has just
+        been started has not connected yet.
         """
         loop = asyncio.get_running_loop()
         upcoming = next_step(situation())
@@ -166,7 +166,7 @@ class RecoveryRunner:
         )
 
     async def _do(self, step: RecoveryStep) -> ServiceAnswer:
-        """Do one step and wait for its effect."""
+        """Carry out one step and wait for its effect."""
         if step is RecoveryStep.SEND_PROGRAM:
             return await self._send_program()
         version = self._link.version

@@ -3,9 +3,9 @@
 """
 The recovery of a stopped robot as tables: from the modes of the robot to the next step.
 
-First the safety system, then power and brakes, then the program. Each step follows from the
-newest state of the robot, so a step that a person does meanwhile is not done twice. Where a person
-has to act, the recovery ends with a sentence that says what to do.
+First the safety system, then power and brakes, then the program. Each step follows from the newest
+state of the robot, so a step that a person takes meanwhile is not repeated. If a person has to
+act, the recovery ends with a sentence that says what to do.
 
 Pure: no socket, no clock.
 """
@@ -42,7 +42,7 @@ class RecoveryStep(Enum):
     OPERATOR = auto()
 
 
-#: The step in a sentence, as an imperative.
+#: The steps as imperatives, for sentences.
 STEP_NAMES: Mapping[RecoveryStep, str] = {
     RecoveryStep.UNLOCK: 'unlock the protective stop',
     RecoveryStep.RESTART_SAFETY: 'restart the safety system',
@@ -91,7 +91,7 @@ SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = {
     SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
 }
 
-#: The same for power and brakes.
+#: The step for each robot mode (power and brakes), in the same form.
 POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = {
     RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
     RobotMode.DISCONNECTED: 'The arm is not connected to its controller: check the pendant.',
@@ -111,12 +111,12 @@ class RecoverySituation:
     """
     Input of :func:`next_step`.
 
-    :param message: of the status: the next step.
-    :param robot: its newest state; None = none.
+    :param message: message of the status, which says the next step.
+    :param robot: newest state of the robot; None = not connected.
     :param program_connected: our program holds its sockets.
-    :param headless: we upload the program; else a program on the robot requests it.
-    :param remote_control: whether clients may control the robot; None = it cannot be known.
-    :param may_unlock: somebody answers for unlocking a protective stop.
+    :param headless: the driver uploads the program; else a program on the robot requests it.
+    :param remote_control: whether clients may control the robot; None = unknown.
+    :param may_unlock: a person takes responsibility for unlocking a protective stop.
     """
 
     connection: ConnectionState
@@ -130,14 +130,14 @@ class RecoverySituation:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """A step, with a sentence if it ends the recovery."""
+    """A step, with a sentence in case the recovery ends with it."""
 
     step: RecoveryStep
     text: str = ''
 
 
 def next_step(situation: RecoverySituation) -> NextStep:
-    """Return what has to be done next."""
+    """Return the next step of the recovery."""
     if situation.connection is ConnectionState.READY:
         return NextStep(RecoveryStep.DONE, 'The robot is ready for goals.')
     if situation.connection is ConnectionState.EXECUTING:
@@ -148,7 +148,7 @@ def next_step(situation: RecoverySituation) -> NextStep:
         ConnectionState.DISCONNECTED,
         ConnectionState.CONNECTING,
     ):
-        # Restarting the safety system may cost the connection; it comes back by itself.
+        # Restarting the safety system may break the connection, which comes back by itself.
         return NextStep(RecoveryStep.WAIT, situation.message)
     return _unless_local(_of_robot(situation, situation.robot), situation)
 
@@ -178,7 +178,7 @@ def _of_program(situation: RecoverySituation, runtime: RuntimeState) -> NextStep
         case RuntimeState.STOPPING | RuntimeState.RESUMING:
             return NextStep(RecoveryStep.WAIT)
         case RuntimeState.PAUSING | RuntimeState.PAUSED:
-            # Resumed, it could go on with an old motion.
+            # If resumed, the program could go on with an old motion.
             return NextStep(RecoveryStep.STOP_PROGRAM)
         case RuntimeState.PLAYING if situation.program_connected:
             return NextStep(RecoveryStep.WAIT)

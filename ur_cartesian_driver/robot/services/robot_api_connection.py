@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The Robot API of PolyScope X behind the calls of the dashboard: a request, an answer, no state.
+The Robot API of PolyScope X, called like the dashboard: a request, an answer, no state.
 
-urllib3 speaks HTTP, in a thread for each request, so the robot loop never waits for it. Each
-request connects anew, as to the dashboard: a kept connection would fail the first request after a
-restart of the robot.
+urllib3 handles HTTP, in a thread for each request, so the robot loop never waits for it. As with
+the dashboard, each request opens a new connection: on a reused connection, the first request after
+a restart of the robot would fail.
 """
 
 from __future__ import annotations
@@ -26,40 +26,40 @@ from ur_cartesian_driver.protocol.robot_api import (
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
 
-#: How long the robot may take to answer [s]; powering up takes a while, and is waited for.
+#: How long the robot may take to answer [s]; slow commands are answered after their effect.
 ANSWER_TIMEOUT = 10.0
 SLOW_ANSWER_TIMEOUT = 30.0
 SLOW_COMMANDS = frozenset({'power on', 'brake release', 'restart safety'})
 #: Longest answer that is read [bytes].
 MAX_ANSWER_SIZE = 65536
-#: Paths have moved between versions, and the old ones lead to the new ones.
+#: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
 MAX_REDIRECTS = 3
-#: How long a program may take until the robot names it as loaded [s], and how often it is asked.
+#: How long the robot may take to report a program as loaded, and the period of the queries [s].
 LOAD_TIMEOUT, LOAD_POLL_PERIOD = 5.0, 0.2
-#: The first software that names the loaded program.
+#: The first software that reports the loaded program.
 NAMES_LOADED_PROGRAM = (10, 12)
-#: Suffix of programs, which their names in the API do not have.
+#: Suffix of program files, which names of programs in the API do not have.
 PROGRAM_SUFFIX = '.urpx'
 
 
 class RobotApiConnection:
-    """Sends commands of the dashboard to the Robot API, from one event loop; several at a time."""
+    """Sends dashboard commands to the Robot API, from one event loop; several may run at once."""
 
     def __init__(self, host: str, port: int, version: ControllerVersion) -> None:
         """
-        Prepare; every request connects by itself.
+        Prepare; every request opens its own connection.
 
-        :param version: software of the robot, which decides on the requests.
+        :param version: software of the robot, which determines the requests.
         """
         self._host, self._port = host, port
         self._version = (version.major, version.minor)
 
     async def request(self, command: str, argument: str = '') -> DashboardReply:
         """
-        Give a command and return the answer.
+        Send a command and return the answer.
 
         :raises OSError: the Robot API does not answer, or ignores a request that it accepted.
-        :raises ProtocolError: it answers nonsense, or does not have the command.
+        :raises ProtocolError: the answer is invalid, or the API does not have the command.
         """
         api_command = find_command(command, self._version)
         if command == 'load':
@@ -80,9 +80,9 @@ class RobotApiConnection:
 
     async def _wait_until_loaded(self, program: str) -> None:
         """
-        Wait until the robot names a program as loaded: it accepts to load before it does.
+        Wait until the robot reports a program as loaded: it accepts the request before it loads.
 
-        :raises OSError: it does not in time.
+        :raises OSError: the robot does not load the program in time.
         """
         loop = asyncio.get_running_loop()
         end = loop.time() + LOAD_TIMEOUT
@@ -98,7 +98,7 @@ class RobotApiConnection:
     def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; called in a thread."""
         try:
-            # To the robot only: through no proxy of the environment, and after no redirect.
+            # To the robot only: not through a proxy of the environment, nor redirected elsewhere.
             with urllib3.HTTPConnectionPool(
                 self._host,
                 self._port,
@@ -123,7 +123,7 @@ class RobotApiConnection:
 
 
 def _reason(error: urllib3.exceptions.HTTPError, timeout: float) -> str:
-    """Return what went wrong, as the rest of a sentence."""
+    """Return the cause of an error, as the rest of a sentence."""
     cause: BaseException | None = error
     if isinstance(error, urllib3.exceptions.MaxRetryError) and error.reason is not None:
         cause = error.reason

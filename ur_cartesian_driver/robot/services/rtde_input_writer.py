@@ -4,7 +4,7 @@
 Write RTDE inputs of a robot once, and wait for the effect.
 
 Each write uses a connection of its own: inputs belong to the client that requested them until it
-disconnects, and fieldbuses and other programs need them back at once. What was written stays set.
+disconnects, and fieldbuses and other programs need them back at once. Written values stay set.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.services.service_calls import SetOutputCall, SetSpeedSliderCall
 
-#: How long the robot may take to show what was written [s].
+#: How long the robot may take to report the effect of a write [s].
 EFFECT_TIMEOUT = 1.0
 
 _DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
@@ -30,7 +30,7 @@ _DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
     OutputKind.CONFIGURABLE_DIGITAL: ('configurable_digital_output', 8),
     OutputKind.TOOL_DIGITAL: ('tool_digital_output', 16),
 }
-#: Range of an analog output: its least and greatest value [A], [V].
+#: Smallest and largest value of an analog output [A], [V].
 RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
     AnalogDomain.CURRENT: (0.004, 0.020),
     AnalogDomain.VOLTAGE: (0.0, 10.0),
@@ -44,7 +44,7 @@ class InputWrite:
 
     :param inputs: values by the names of RTDE inputs.
     :param outputs: names of the RTDE outputs that show the effect.
-    :param done: tells from these whether the effect is there.
+    :param done: returns whether the values of these outputs show the effect.
     """
 
     inputs: Mapping[str, RtdeValue]
@@ -53,7 +53,7 @@ class InputWrite:
 
 
 def speed_slider_write(call: SetSpeedSliderCall) -> InputWrite:
-    """Return how the speed slider is moved."""
+    """Return the write that moves the speed slider."""
     return InputWrite(
         inputs={'speed_slider_mask': 1, 'speed_slider_fraction': call.fraction},
         outputs=('target_speed_fraction',),
@@ -63,16 +63,16 @@ def speed_slider_write(call: SetSpeedSliderCall) -> InputWrite:
 
 
 def output_write(call: SetOutputCall) -> InputWrite:
-    """Return how an output is set."""
+    """Return the write that sets an output."""
     return _analog(call) if call.is_analog else _digital(call)
 
 
 def joint_write(calls: Sequence[SetOutputCall]) -> InputWrite:
-    """Return how several outputs of one kind are set at once."""
+    """Return the write that sets several outputs of one kind at once."""
     writes = [output_write(call) for call in calls]
     inputs: dict[str, RtdeValue] = {}
     for write in writes:
-        for name, value in write.inputs.items():  # masks and bits are joined, others differ
+        for name, value in write.inputs.items():  # masks and bits are joined, values are not
             before = inputs.get(name)
             if isinstance(value, int) and isinstance(before, int):
                 inputs[name] = before | value
@@ -86,7 +86,7 @@ def joint_write(calls: Sequence[SetOutputCall]) -> InputWrite:
 
 
 def value_before(call: SetOutputCall, values: Mapping[str, Any]) -> SetOutputCall:
-    """Return the call that sets an output to the values that RTDE reports after its write."""
+    """Return the call that sets an output back to the value reported before its write."""
     if not call.is_analog:
         _, first_bit = _DIGITAL[call.kind]
         bit = values['actual_digital_output_bits'] >> (first_bit + call.pin) & 1
@@ -131,7 +131,7 @@ async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
     """
     Write, and return whether the robot reported the effect.
 
-    :raises OSError: there is no connection, or another client has the inputs.
+    :raises OSError: there is no connection, or another client holds the inputs.
     """
     return (await write_and_compare(host, port, input_write))[0]
 
@@ -140,9 +140,9 @@ async def write_and_compare(
     host: str, port: int, input_write: InputWrite
 ) -> tuple[bool, Mapping[str, Any]]:
     """
-    Write, and return whether the robot reported the effect, with its values before.
+    Write; return whether the robot reported the effect, and the outputs before the write.
 
-    :raises OSError: there is no connection, or another client has the inputs.
+    :raises OSError: there is no connection, or another client holds the inputs.
     """
     reported, done = asyncio.Event(), asyncio.Event()
     before: dict[str, Any] = {}

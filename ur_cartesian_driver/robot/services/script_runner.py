@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Scripts of others on the robot: what they do is outside all checks.
+Runs users' scripts on the robot; the driver does not check what they do.
 
-The controller never confirms that a script has run. A secondary program counts as run if the robot
-reports no error for a while, a primary one if a program has run and ended.
+The controller never confirms that a script has run. A secondary program is assumed to have run if
+the robot reports no error for a while, a primary program if some program has run and ended.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ur_cartesian_driver.urscript import CompileError, parse
 REPORT_TIME = 0.3
 #: How long the robot may take to begin a primary program, or to end it when it is stopped [s].
 BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
-#: A longer script is parsed in a thread, because keepalives cannot wait [characters].
+#: Length from which a script is parsed in a thread, because keepalives cannot wait [characters].
 MIN_THREAD_LENGTH = 1000
 #: How long the robot may report that no program runs between ours and the script [s].
 CHANGE_TIME = 0.3
@@ -96,7 +96,7 @@ class ScriptRunner:
             return failed('The script was not sent: the primary interface is not connected.')
         was_connected = link.program.connected
         has_begun = await wait_for_state(link, self._runs_script, BEGIN_TIMEOUT)
-        # A short one may have ended unseen, but it has ended ours.
+        # A short script may have ended unseen, but it has ended our program.
         has_run = has_begun or (was_connected and not link.program.connected)
         in_time = not has_begun or await self._ends_within(call.timeout)
         if not in_time:
@@ -124,9 +124,9 @@ class ScriptRunner:
 
     async def _ends_within(self, longest: float) -> bool:
         """
-        Return whether the program ends, or ours takes its place.
+        Return whether the script ends within a time [s], or is replaced by our program.
 
-        None runs for a moment between ours and this one.
+        Between our program and the script, no program runs for a moment.
         """
         end = asyncio.get_running_loop().time() + longest
         while (left := end - asyncio.get_running_loop().time()) > 0.0:
@@ -141,7 +141,7 @@ async def _kind(script: str) -> str:
     """
     Return the kind of a script, ``def`` or ``sec``.
 
-    :raises CompileError: it is no program.
+    :raises CompileError: the script is not a program.
     """
     if len(script) < MIN_THREAD_LENGTH:
         return parse(script).kind

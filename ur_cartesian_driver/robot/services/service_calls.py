@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Service calls: requests to the robot beside motions, and their answer.
+Service calls: requests to the robot other than motions, and their answers.
 
-A call checks its values when it is made, so every call that exists can be sent.
+A call checks its values when it is made, so every existing call can be sent.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.goal.goal import OutputKind
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
-#: How many outputs there are of each kind.
+#: Number of outputs of each kind.
 PINS = {
     OutputKind.STANDARD_DIGITAL: 8,
     OutputKind.CONFIGURABLE_DIGITAL: 8,
@@ -30,11 +30,11 @@ PINS = {
 
 #: How long a script may take, by default and at most [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
-#: Longer scripts are mistakes [characters].
+#: Length above which a script must be a mistake [characters].
 MAX_SCRIPT_LENGTH = 200_000
-#: Longest text for the dashboard: as lines of any alphabet the server takes it.
+#: Longest text for the dashboard [characters]: in any alphabet, it fits into a line of the server.
 MAX_TEXT_LENGTH = 1000
-#: No tool is longer [m], and no arm carries more [kg].
+#: Longer than any tool [m], and heavier than any payload [kg].
 MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
 #: How far the length of a quaternion may be off 1.
 UNIT_TOLERANCE = 1e-3
@@ -45,7 +45,7 @@ class ServiceAnswer:
     """
     The outcome of a call.
 
-    :param ok: the robot has done it, and has reported the effect if it reports such effects.
+    :param ok: the call was carried out; if its effect can be reported, the robot reports it.
     :param text: a sentence, or the requested value.
     """
 
@@ -55,7 +55,7 @@ class ServiceAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardCall:
-    """Give a command to the dashboard, and wait until the robot has done it."""
+    """Send a command to the dashboard, and wait until the robot has carried it out."""
 
     command: str
     argument: str = ''
@@ -74,7 +74,7 @@ class DashboardLineCall:
     line: str
 
     def __post_init__(self) -> None:
-        """Check that it is one line."""
+        """Check that the text is one line."""
         _declare_types(self)
         if not self.line.strip() or '\n' in self.line or '\r' in self.line:
             raise LocalProtocolError(
@@ -90,10 +90,10 @@ class SetTcpCall:
     T_flange_tcp: Pose
 
     def __post_init__(self) -> None:
-        """Check that it is a pose, in metres."""
+        """Check that the TCP is a pose, in metres."""
         _declare_types(self)
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
-        if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN neither
+        if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN fails, too
             raise LocalProtocolError(
                 f'The TCP is at {position} m in the flange, farther than {MAX_TOOL_OFFSET:g} m; '
                 'give its position in metres.'
@@ -117,7 +117,7 @@ class SetPayloadCall:
         _declare_types(self)
         if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
             abs(value) <= MAX_TOOL_OFFSET for value in self.cog
-        ):  # NaN neither
+        ):  # NaN fails, too
             raise LocalProtocolError(
                 f'The payload is {self.mass} kg at {self.cog} m; the mass has to be 0 to '
                 f'{MAX_PAYLOAD_MASS:g} kg, and each coordinate at most {MAX_TOOL_OFFSET:g} m.'
@@ -126,7 +126,7 @@ class SetPayloadCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroFtSensorCall:
-    """Take the force and torque that are measured now as zero."""
+    """Define the present force and torque as zero."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,8 +134,8 @@ class SetOutputCall:
     """
     Set an output.
 
-    :param value: 0 or 1 for a digital one, a fraction of its range for an analog one.
-    :param domain: of an analog one; a digital one has none.
+    :param value: 0 or 1 for a digital output, a fraction of the range for an analog output.
+    :param domain: domain of an analog output; ignored for a digital output.
     """
 
     kind: OutputKind
@@ -144,7 +144,7 @@ class SetOutputCall:
     domain: AnalogDomain = AnalogDomain.CURRENT
 
     def __post_init__(self) -> None:
-        """Check number and value."""
+        """Check pin and value."""
         _declare_types(self)
         if self.kind not in PINS:
             raise LocalProtocolError(f'kind is {self.kind}, which is no OutputKind.')
@@ -162,7 +162,7 @@ class SetOutputCall:
 
     @property
     def is_analog(self) -> bool:
-        """Tell whether it is an analog output."""
+        """Return whether the output is analog."""
         return self.kind is OutputKind.STANDARD_ANALOG
 
 
@@ -189,7 +189,7 @@ class SendProgramCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandBackCall:
-    """End the robot program, so that the pendant's program goes on behind its node."""
+    """End the robot program; the pendant's program continues after its External Control node."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,7 +213,7 @@ class RunScriptCall:
                 f'The script has {len(self.script)} characters, more than {MAX_SCRIPT_LENGTH}; '
                 'shorten it, or load it on the pendant.'
             )
-        if not 0.0 < self.timeout <= MAX_SCRIPT_TIMEOUT:  # NaN neither
+        if not 0.0 < self.timeout <= MAX_SCRIPT_TIMEOUT:  # NaN fails, too
             raise LocalProtocolError(
                 f'timeout is {self.timeout:g} s, it has to be more than 0 and at most '
                 f'{MAX_SCRIPT_TIMEOUT:g} s.'
@@ -222,9 +222,9 @@ class RunScriptCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverCall:
-    """Bring a stopped robot back to where it takes goals, as far as software may."""
+    """Bring a stopped robot back to READY, as far as software is allowed to."""
 
-    #: A person has looked at the cause of a protective stop, and it may be unlocked.
+    #: A person has looked for the cause of a protective stop, and allows unlocking it.
     unlock_protective_stop: bool = False
 
     def __post_init__(self) -> None:

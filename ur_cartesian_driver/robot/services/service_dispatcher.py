@@ -4,8 +4,8 @@
 Carries out the service calls of a driver's owner.
 
 A call uses the dashboard, a single command to the robot program, or RTDE inputs. It succeeds when
-the robot reports the effect, and ends within :data:`CALL_TIMEOUT` in any case, a recovery within
-:data:`RECOVERY_TIMEOUT`, a script within its own time more.
+the robot reports the effect. In any case it ends within :data:`CALL_TIMEOUT`; a recovery within
+:data:`RECOVERY_TIMEOUT`, and a script within :data:`CALL_TIMEOUT` plus its own time.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ from ur_cartesian_driver.robot.services.service_calls import (
     ZeroFtSensorCall,
 )
 
-#: Bounds of a call, and of a recovery with its several steps [s].
+#: Longest duration of a call, and of a recovery with its several steps [s].
 CALL_TIMEOUT = 40.0
 RECOVERY_TIMEOUT = 120.0
 #: How long the robot may take to report a setting [s].
 SETTING_TIMEOUT = 1.0
-#: How far a TCP may be from the one that was set [m], [rad]: it goes through 32-bit integers.
+#: Largest error of the reported TCP [m], [rad]: on the way it is rounded to 32-bit integers.
 TCP_TOLERANCE = 1e-5
-#: The same of mass and centre of gravity [kg, m].
+#: Largest error of the reported mass and centre of gravity [kg, m].
 PAYLOAD_TOLERANCE = 1e-4
 
 #: The first software of robots with a force sensor.
 E_SERIES = 5
 
-#: Dashboard commands that only query: also allowed with a robot that must not be moved.
+#: Dashboard commands that only query: they are allowed even if the robot must not be moved.
 QUERY_COMMANDS = frozenset(
     {
         'running',
@@ -84,7 +84,7 @@ INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'}
 
 
 class ServiceDispatcher:
-    """Answers calls on one event loop: several at a time, but only one recovery."""
+    """Carries out calls on one event loop: several at a time, but only one recovery."""
 
     def __init__(self, settings: LinkSettings, ports: DashboardPorts, link: RobotLink) -> None:
         """Prepare; nothing is sent before the first call."""
@@ -96,7 +96,7 @@ class ServiceDispatcher:
         )
         self._run_script = self._refuse_script
         if settings.allow_scripts:
-            # Here, because most drivers do without the parser of URScript.
+            # Imported here, because most drivers do not need the parser of URScript.
             from ur_cartesian_driver.robot.services.script_runner import ScriptRunner
 
             self._run_script = ScriptRunner(settings, link, self._send_program).run
@@ -104,11 +104,11 @@ class ServiceDispatcher:
 
     @property
     def is_changing_settings(self) -> bool:
-        """Tell whether TCP or payload is being set."""
+        """Return whether TCP or payload is being set."""
         return self._pending_settings > 0
 
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
-        """Carry out a call; an error is an answer too."""
+        """Carry out a call; errors become answers."""
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         if isinstance(call, RunScriptCall):
             bound += call.timeout
@@ -188,7 +188,7 @@ class ServiceDispatcher:
         return None
 
     def _paused(self) -> ServiceAnswer | None:
-        """Return the answer to a call whose message a paused program would read later."""
+        """Return a refusal if the program is not playing: it would read a message only later."""
         robot = self._link.robot
         if robot is None or robot.runtime_state is RuntimeState.PLAYING:
             return None
@@ -282,7 +282,7 @@ class ServiceDispatcher:
             return failed(self._link.status.message)
         replaces = self._link.program.connected
         self._link.control.upload()
-        if replaces:  # its predecessor disconnects first
+        if replaces:  # the previous program disconnects first
             await wait_for_state(
                 self._link, lambda _: not self._link.program.connected, SETTING_TIMEOUT
             )

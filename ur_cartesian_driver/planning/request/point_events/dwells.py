@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Dwells: the arm rests at a point for a time, which a segment names."""
+"""Dwells: the arm rests at a point for a time that the segment gives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ur_cartesian_driver.planning.request.point_events.point_event import Placed
 
 
 class Dwells(PointEvent[Segment]):
-    """Segments whose point is held for a time."""
+    """Segments at whose point the arm rests for a time."""
 
     field = 'segments'
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The rest of a goal that was stopped, as far as it matters to what happens at its points."""
+"""The remainder of a stopped goal, as needed for the events at its points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.goal.field_table import points_of, renumbered
 
 E = TypeVar('E')
 
-#: A smaller part of a segment is nothing.
+#: Smaller fractions of a segment are neglected.
 NO_FRACTION = 1e-6
 
 
@@ -21,26 +21,25 @@ class GoalRest:
     """
     The points of a resumed goal on the path of the goal that was stopped.
 
-    A place on that path counts segments: ``k + u`` is on the segment to point k, at the fraction u
-    of it.
+    A place on that path is a number ``k + u``: at the fraction u of the segment to point k.
     """
 
-    #: Where the path is resumed, some way before the arm was stopped.
+    #: Places where the path is resumed, and where the arm was stopped, somewhat farther on.
     begin: float
     stopped: float
-    #: Where the points of the resumed goal are.
+    #: Places of the points of the resumed goal.
     places: Sequence[float]
-    #: How long before ``begin`` the tool passed a waypoint [s], for the field and the value of an
-    #: offset from there; not known beyond that.
+    #: Returns how long before ``begin`` the tool passed a waypoint [s]. The other arguments are
+    #: name and value of the offset from that waypoint; only offsets above 0 need the time.
     time_since: Callable[[int, str, float], float]
 
     @property
     def first(self) -> int:
-        """The number of the point where the path is resumed, or of the first one behind."""
+        """The number of the last point at or before the place of resumption; 0 if none is."""
         return max(sum(place <= self.begin + NO_FRACTION for place in self.places) - 1, 0)
 
     def is_passed(self, waypoint: int) -> bool:
-        """Tell whether the path is resumed at or behind a waypoint."""
+        """Return whether the path is resumed at or after a waypoint."""
         return waypoint + 1.0 <= self.begin + NO_FRACTION
 
     def index(self, waypoint: int) -> int:
@@ -49,7 +48,7 @@ class GoalRest:
         return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
 
     def ahead(self, events: Sequence[E]) -> list[E]:
-        """Return the events whose points are all left, with their new numbers."""
+        """Return the events whose points are all still ahead, with their new numbers."""
         return [
             renumbered(event, self.index)
             for event in events
@@ -57,7 +56,7 @@ class GoalRest:
         ]
 
     def with_last(self, events: Sequence[E]) -> list[E]:
-        """Return the events ahead, and at the path's begin the events of the last point before."""
+        """Return the events ahead, and first those of the last passed point, at the new start."""
         first, left = self.first, self.ahead(events)
         passed = [event for event in events if self.is_passed(*points_of(event).values())]
         if not passed or self.places[first] > self.begin + NO_FRACTION:  # no need to stop there
@@ -68,9 +67,9 @@ class GoalRest:
 
     def stretches(self, events: Sequence[E], begun: Callable[[E], E]) -> list[E]:
         """
-        Return the events between two points, as far as they are on the rest of the path.
+        Return the events that last from point to point, cut to the remaining path.
 
-        :param begun: turns an event that has begun before into its continuation from here on.
+        :param begun: returns the continuation of an event that has already begun.
         """
         left = []
         for event in events:

@@ -15,7 +15,7 @@ from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
-#: How many inputs there are of each kind.
+#: Number of inputs of each kind.
 INPUTS = {
     InputKind.STANDARD_DIGITAL: 8,
     InputKind.CONFIGURABLE_DIGITAL: 8,
@@ -28,7 +28,7 @@ MAX_LEVEL = 10.0
 
 
 class InputWaits(PointEvent[InputWait]):
-    """Waits, one at a point."""
+    """Waits for inputs, at most one at a point."""
 
     field = 'input_waits'
     mode_rule = only_rests('input_waits')
@@ -54,7 +54,7 @@ class InputWaits(PointEvent[InputWait]):
                 'name one of these',
             )
         is_level = 0.0 <= wait.value <= MAX_LEVEL
-        if not (is_level if wait.input.is_analog else wait.value in (0.0, 1.0)):  # NaN neither
+        if not (is_level if wait.input.is_analog else wait.value in (0.0, 1.0)):  # or NaN
             takes = f'a level of 0 to {MAX_LEVEL:g} A or V' if wait.input.is_analog else '0 or 1'
             raise InvalidGoal(f'{where}.value', f'is {wait.value:g}; a {name} takes {takes}')
         if wait.below and not wait.input.is_analog:
@@ -81,5 +81,5 @@ class InputWaits(PointEvent[InputWait]):
             yield PlacedStop(wait.waypoint, stop, note)
 
     def left(self, events: Sequence[InputWait], rest: GoalRest) -> Sequence[InputWait]:
-        """Return those ahead; the last one before has to come true again."""
+        """Return the waits ahead, and the last passed one: its input must be checked again."""
         return rest.with_last(events)

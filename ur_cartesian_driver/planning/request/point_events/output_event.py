@@ -9,13 +9,13 @@ from ur_cartesian_driver.planning.request.point_events.timed_path import PlacedO
 
 
 class OutputEvent(PointEvent[E]):
-    """One kind of output; the arm need not stop at its points."""
+    """A kind of event that switches an output; the arm need not stop at its points."""
 
     def place(self, event: E, field: str, path: TimedPath) -> list[PlacedOutput]:
         """
-        Return the records of an event, and where on the path they belong.
+        Return the records of an event, with their places on the path.
 
-        :param field: its name in a refusal.
-        :raises InvalidGoal: no motion leads to its point.
+        :param field: name of the event in a refusal.
+        :raises InvalidGoal: no motion leads to the event's point.
         """
         raise NotImplementedError

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of the payload, where the arm stops at a point."""
+"""Changes of the payload at points where the arm stops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
-#: A centre of gravity that is farther from the flange is a mistake [m].
+#: Largest coordinate of a centre of gravity in the flange frame that is believed [m].
 MAX_OFFSET = 5.0
 
 
@@ -27,7 +27,7 @@ class PayloadChanges(PointEvent[PayloadChange]):
     mode_rule = only_rests('payload_changes')
 
     def check_event(self, where: str, change: PayloadChange) -> None:
-        """Refuse a centre of gravity that cannot be meant."""
+        """Refuse a centre of gravity that must be a mistake."""
         if not all(isfinite(x) and abs(x) <= MAX_OFFSET for x in change.center_of_gravity):
             raise InvalidGoal(
                 f'{where}.center_of_gravity',
@@ -42,5 +42,5 @@ class PayloadChanges(PointEvent[PayloadChange]):
             yield PlacedStop(change.waypoint, stop, f'sets a payload of {change.mass:g} kg there')
 
     def left(self, events: Sequence[PayloadChange], rest: GoalRest) -> Sequence[PayloadChange]:
-        """Return those ahead, and the payload that holds where the path is resumed."""
+        """Return the changes ahead, and the one in effect where the path is resumed."""
         return rest.with_last(events)

@@ -3,9 +3,9 @@
 """
 The interface of events at the points of a goal.
 
-A kind of event is a subclass with an instance in the registry. A dataclass of the table of the
-goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares its fields in goals, messages and
-files; they are checked by their ranges before.
+A kind of event is a subclass of :class:`PointEvent` with an instance in the registry. A dataclass
+in the table of the goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares the fields of the
+event in goals, messages and files; their ranges are checked before the checks here.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ E = TypeVar('E')
 
 @dataclass(frozen=True, slots=True)
 class PlacedStop:
-    """A stop of the robot program at a waypoint where the arm stands, and a note on it."""
+    """A stop of the robot program at a waypoint where the arm rests, and a note on the stop."""
 
     waypoint: int
     stop: Stop
     note: str = ''
-    #: The order among stops at one waypoint; equal ones keep the order of the registry.
+    #: The order among stops at one waypoint; stops of equal order keep that of the registry.
     order: int = 0
 
 
 def check_point(field: str, waypoint: int, goal: GoalTable) -> None:
     """
-    Refuse the number of a point that is none.
+    Refuse the number of a point that does not exist.
 
-    :raises InvalidGoal: names the field, and the points.
+    :raises InvalidGoal: names the field, and the numbers that exist.
     """
     if not 0 <= waypoint < len(goal.waypoints):
         raise InvalidGoal(
@@ -56,9 +56,9 @@ def check_point(field: str, waypoint: int, goal: GoalTable) -> None:
 class PointEvent(Generic[E]):
     """One kind of event."""
 
-    #: The field of the goal.
+    #: The field of the goal that holds the events.
     field: ClassVar[str]
-    #: Which execution modes have it; None = all.
+    #: The rule for the execution modes that support the events; None = all do.
     mode_rule: ClassVar[ModeRule | None] = None
 
     def of(self, goal: Goal) -> Sequence[E]:
@@ -67,7 +67,7 @@ class PointEvent(Generic[E]):
         return events
 
     def places(self, goal: GoalTable) -> Iterator[tuple[str, int]]:
-        """Yield the points that the events name, each with the field that does."""
+        """Yield each field of the events that names a point, with the point's number."""
         for i, event in enumerate(self.of(goal)):
             for name, point in points_of(event).items():
                 yield f'{self.field}[{i}].{name}', point
@@ -83,7 +83,7 @@ class PointEvent(Generic[E]):
 
     def check_event(self, where: str, event: E) -> None:
         """
-        Check what an event says by itself; ``where`` is its name.
+        Check an event on its own; ``where`` is its name in refusals.
 
         :raises InvalidGoal: names field, value and bound.
         """
@@ -92,14 +92,14 @@ class PointEvent(Generic[E]):
         """
         Refuse events that the robot of the goal cannot carry out.
 
-        :param T_tcp_controlled: the controlled frame behind the TCP of the motion.
+        :param T_tcp_controlled: pose of the controlled frame in the TCP of the motion.
         :raises NotAvailable: names the field and the reason.
         """
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the stops of the robot program, where the arm stands."""
+        """Yield the stops of the robot program for the events."""
         yield from ()
 
     def left(self, events: Sequence[E], rest: GoalRest) -> Sequence[E]:
-        """Return the events that are left of a goal after a stop."""
+        """Return the events that remain when a stopped goal is resumed."""
         return rest.ahead(events)

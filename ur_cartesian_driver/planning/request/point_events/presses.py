@@ -3,8 +3,8 @@
 """
 Presses: the controller's force mode from one point to another, at both of which the arm stops.
 
-The path is planned as if nothing gave way. What gives way while it runs is for the monitor
-(``execution.monitoring.press_window``).
+The path is planned as if the tool did not give way. During execution, the monitor allows for the
+yield of the tool (``execution.monitoring.press_window``).
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from ur_cartesian_driver.planning.request.mode_rules import ModeRule
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
-#: Of axes along which the tool moves, and about which it turns: the largest forces [N] and torques
-#: [Nm], and speeds of compliant axes [m/s], [rad/s]; more are mistakes.
+#: Along axes, and about them: the largest force [N] and torque [Nm], and the largest speeds of
+#: compliant axes [m/s], [rad/s]. Larger values must be mistakes.
 MAX_FORCES, MAX_SPEEDS = (200.0, 30.0), (0.25, 1.0)
-#: Speeds of compliant axes, and deviations of the others [m], [rad], where the goal gives none.
+#: Default speeds of compliant axes [m/s], [rad/s], and deviations of the other axes [m], [rad].
 DEFAULT_SPEEDS, DEFAULT_DEVIATIONS = (0.05, 0.2), (0.005, 0.05)
 _UNITS = (('N', 'm/s'), ('Nm', 'rad/s'))
 
 
 def is_turn(axis: str) -> bool:
-    """Tell whether an axis is one about which the tool turns."""
+    """Return whether an axis of a press is one about which the tool turns."""
     return axis.startswith('r')
 
 
@@ -55,7 +55,7 @@ class Presses(PointEvent[Press]):
     )
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse presses at the same time, and arcs that begin where one has brought the tool."""
+        """Refuse presses that overlap, and arcs that begin where a press has moved the tool."""
         super().check(goal, options)
         for i, press in enumerate(goal.presses):
             field = f'presses[{i}]'
@@ -111,7 +111,7 @@ class Presses(PointEvent[Press]):
         for k, axis in enumerate(axes):
             force_unit, speed_unit = _UNITS[is_turn(axis)]
             bound = MAX_FORCES[is_turn(axis)]
-            if not abs(press.forces[k]) <= bound:  # NaN neither
+            if not abs(press.forces[k]) <= bound:  # or NaN
                 raise InvalidGoal(
                     f'{where}.forces[{k}]',
                     f'is {press.forces[k]:g} {force_unit}, outside -{bound:g} to {bound:g}',
@@ -124,7 +124,7 @@ class Presses(PointEvent[Press]):
                 )
 
     def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
-        """Refuse what a CB3 cannot do, and the axes of a tool that is not the robot's TCP."""
+        """Refuse what a CB3 cannot do, and tool axes if the tool is not the robot's TCP."""
         for i, press in enumerate(goal.presses):
             for name, is_set in (
                 ('zero_sensor', press.zero_sensor),
@@ -146,14 +146,14 @@ class Presses(PointEvent[Press]):
                 )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield where force mode ends and begins; at one point it ends first."""
+        """Yield the ends and beginnings of force mode; at the same point, the end comes first."""
         for press in goal.presses:
             yield PlacedStop(press.last_waypoint, EndPress(), 'ends to press there', order=-1)
             for record, note in press_records(press, goal.T_base_frame):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
     def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
-        """Return those ahead, and the one that has begun; its sensor was zeroed in free air."""
+        """Return the presses ahead, and the begun one: its sensor is not zeroed again."""
         return rest.stretches(
             events,
             begun=lambda press: replace(press, zero_sensor=False) if press.zero_sensor else press,

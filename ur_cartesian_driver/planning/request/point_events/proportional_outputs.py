@@ -29,7 +29,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     mode_rule = switches_nothing('proportional_outputs')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse two that drive one output at a time, and a command to it meanwhile."""
+        """Refuse entries that drive one output at the same time, and commands to it meanwhile."""
         super().check(goal, options)
         if goal.proportional_outputs and goal.keep_open:
             raise NotAvailable(
@@ -66,7 +66,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
                     )
 
     def check_event(self, where: str, output: ProportionalOutput) -> None:
-        """Refuse bounds between which there is nothing."""
+        """Refuse a maximum that is not above the minimum."""
         if not output.minimum < output.maximum:
             raise InvalidGoal(
                 f'{where}.maximum',
@@ -77,11 +77,11 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     def left(
         self, events: Sequence[ProportionalOutput], rest: GoalRest
     ) -> Sequence[ProportionalOutput]:
-        """Return those ahead, and the one that has begun, which begins at once."""
+        """Return the entries ahead, and those already begun, which begin at once."""
         return rest.stretches(events, begun=lambda output: replace(output, begin_lead=0.0))
 
     def place(self, output: ProportionalOutput, field: str, path: TimedPath) -> list[PlacedOutput]:
-        """Return where the output begins to follow the speed, and where it ends."""
+        """Return the records with which the output begins and ends to follow the speed."""
         switch = SwitchOutput(
             output=OutputKind.STANDARD_ANALOG,
             pin=output.pin,
@@ -97,7 +97,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
         )
         name = f'standard analog output {output.pin}'
         begin = _ahead(
-            # A value that is not 0: a stop does not carry it out.
+            # The value is not 0, so that a stop does not carry the record out.
             replace(switch, value=1.0, follows_speed=True),
             (output.first_waypoint, output.begin_lead, f'{field}.begin_lead'),
             path,
@@ -124,7 +124,7 @@ def _ahead(
     """
     Return a record placed some time before a point.
 
-    :param at: the waypoint, the time before it [s], and the field that says so.
+    :param at: the waypoint, the time before it [s], and the field that gives this time.
     """
     waypoint, lead, field = at
     row = path.row(waypoint)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The registry of what happens at points: a row for each kind, its checks, and what a plan needs.
+The registry of events at points: a row for each kind, and the checks of all kinds.
 
-A new kind is a dataclass in the table of the goal, a module here, and a row.
+A new kind needs a dataclass in the table of the goal, a module here, and a row.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from ur_cartesian_driver.planning.request.point_events.safe_outputs import check
 from ur_cartesian_driver.planning.request.point_events.script_calls import ScriptCalls
 from ur_cartesian_driver.planning.request.point_events.switched_outputs import SwitchedOutputs
 
-#: Events where the arm stops.
+#: Events at points where the arm stops.
 STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     Dwells(),
     InputWaits(),
@@ -48,7 +48,7 @@ STOP_EVENTS: tuple[PointEvent[Any], ...] = (
 #: Events while the arm moves.
 OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (SwitchedOutputs(), ProportionalOutputs())
 POINT_EVENTS: tuple[PointEvent[Any], ...] = (*OUTPUT_EVENTS, *STOP_EVENTS)
-#: Those that have a dataclass of their own, by it.
+#: The kinds of events that have a dataclass of their own, by dataclass.
 EVENT_KINDS: Mapping[type, PointEvent[Any]] = {
     each.type: kind
     for kind in POINT_EVENTS
@@ -59,9 +59,9 @@ EVENT_KINDS: Mapping[type, PointEvent[Any]] = {
 
 def check_event(where: str, event: Any) -> None:
     """
-    Check what an event says by itself, for a goal that is not complete.
+    Check an event on its own, while its goal is not complete.
 
-    :param where: its name in the refusal.
+    :param where: name of the event in the refusal.
     :raises InvalidGoal: names field, value and bound.
     """
     check_record(where, event)
@@ -73,7 +73,7 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     Refuse outputs that cannot be switched while the arm moves.
 
     :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode cannot do it.
+    :raises NotAvailable: the execution mode cannot switch outputs.
     """
     for kind in OUTPUT_EVENTS:
         check_mode(goal, kind.mode_rule)
@@ -84,10 +84,10 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse events that the robot cannot carry out at a point, or where the arm does not stop.
+    Refuse events that the robot cannot carry out, and events where the arm does not stop.
 
     :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode cannot do it, or the goal is kept open.
+    :raises NotAvailable: the execution mode does not support an event, or the goal is kept open.
     """
     for kind in STOP_EVENTS:
         check_mode(goal, kind.mode_rule)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs that take a value of their own when the motion does not go on as planned."""
+"""Outputs that are set to a safe value when the motion does not go on as planned."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.planning.request.point_events.switched_outputs import c
 
 def check_safe_outputs(goal: GoalTable) -> None:
     """
-    Check the outputs that a goal wants to be safe.
+    Check the safe outputs of a goal.
 
     :raises InvalidGoal: names field, value and bound.
     """
@@ -36,11 +36,11 @@ def check_safe_outputs(goal: GoalTable) -> None:
 
 
 def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
-    """Return a goal with the safe outputs of the parameter that it does not name itself."""
+    """Return a goal, with the parameter's safe outputs added to those that it names itself."""
     outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
     for output in parse_safe_outputs(options.safe_outputs):
         outputs.setdefault((output.output, output.pin), output)
-    # Those that follow the speed write their own value again when a pause has ended.
+    # Outputs that follow the speed do so again after a pause: they are restored.
     for pin, following in {each.pin: each for each in goal.proportional_outputs}.items():
         outputs.setdefault(
             (OutputKind.STANDARD_ANALOG, pin),

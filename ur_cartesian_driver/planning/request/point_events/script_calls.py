@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of functions of the script prelude, where the arm stops at a point."""
+"""Calls of functions of the script prelude at points where the arm stops."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ScriptCalls(PointEvent[ScriptCall]):
             yield PlacedStop(call.waypoint, stop, note)
 
     def left(self, events: Sequence[ScriptCall], rest: GoalRest) -> Sequence[ScriptCall]:
-        """Return the calls of points that the arm had not left when the goal was stopped."""
+        """Return the calls at points that the arm had not left when the goal was stopped."""
         return [
             renumbered(call, lambda i: rest.first if rest.is_passed(i) else rest.index(i))
             for call in events

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The stops of a plan: what happens where the arm stops.
+The stops of a plan, at points where the arm rests.
 
-A goal is planned as if it did not rest, with times that count its motion only; the stops are put
-into the plan afterwards. So they change nothing of the motions before and behind them, and are not
-stretched where these are slowed.
+A goal is planned as if the arm did not rest, with the times of the motion only; the stops are
+inserted into the plan afterwards. So stops do not change the motions before and after them, and
+are not stretched if the motions are slowed.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ class Stops:
     """
     The stops of a goal that passed the checks.
 
-    :param goal: for the TCP with which it runs.
+    :param goal: the goal, expressed for the TCP with which it runs.
     """
 
     def __init__(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Collect them."""
+        """Collect the stops."""
         dwells = goal.motions.dwells
         self._before: Floats = np.cumsum(dwells) - dwells
         stops = [stop for kind in STOP_EVENTS for stop in kind.stops(goal, options)]
-        #: In the order in which they come.
+        #: The stops in the order of their execution.
         self._stops: list[PlacedStop] = sorted(stops, key=lambda one: (one.waypoint, one.order))
-        #: The goal without them: its times count the motion only.
+        #: The goal without its stops, with the times of the motion only.
         self.moving_goal = goal
         if self._stops:
             rates = {}
@@ -63,10 +63,10 @@ class Stops:
         self, goal: GoalTable, segments: PlannedRows, reference: ReferencePath
     ) -> tuple[GoalTable, PlannedRows, ReferencePath]:
         """
-        Return goal, segments and path of a plan that stops at the points.
+        Return goal, segments and path of a plan with the stops inserted.
 
-        :param goal: as planned, with times of the motion.
-        :param segments: without outputs.
+        :param goal: the planned goal, with the times of the motion only.
+        :param segments: the planned segments, without outputs.
         """
         if not self._stops:
             return goal, segments, reference
@@ -122,7 +122,7 @@ class Stops:
 
 
 def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
-    """Return what lets a servo rest behind a motion."""
+    """Return a spline that keeps the servo at rest after a motion."""
     assert isinstance(stop, Wait)
     is_quintic = isinstance(before, Spline) and before.accelerations is not None
     return Spline(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs that are switched when the tool passes a point, or some time after."""
+"""Outputs that are switched when the tool passes a point, or some time later."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from ur_cartesian_driver.planning.request.point_events.timed_path import (
     TimedPath,
 )
 
-#: Digits of the time of a command that is left [s].
+#: Digits to which the remaining time of a command is rounded [s].
 _DIGITS = 9
 
 
 class SwitchedOutputs(OutputEvent[IOCommand]):
-    """Commands of a goal."""
+    """The output commands of a goal."""
 
     field = 'io_commands'
     mode_rule = switches_nothing('io_commands')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse points and outputs that there are not."""
+        """Refuse points and outputs that do not exist."""
         super().check(goal, options)
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
 
     def check_event(self, where: str, command: IOCommand) -> None:
-        """Refuse outputs that the robot does not have, and values that they do not take."""
+        """Refuse outputs that the robot does not have, and values that they do not accept."""
         check_output(where, command)
 
     def left(self, events: Sequence[IOCommand], rest: GoalRest) -> Sequence[IOCommand]:
-        """Return the state of the outputs where the path is resumed, and the commands ahead."""
+        """Return commands for the outputs' states at the resumption, and the commands ahead."""
         state: dict[tuple[int, int], IOCommand] = {}
         left = []
         for i, command in sorted(
@@ -63,7 +63,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
         return [*state.values(), *left]
 
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
-        """Return the record that switches the output, and when and where it does."""
+        """Return the record that switches the output, with its time and place."""
         row = path.row(command.waypoint)
         if row is None:
             raise InvalidGoal(
@@ -105,7 +105,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
 def check_output(where: str, named: IOCommand | SafeOutput) -> None:
     """
-    Refuse an output that the robot does not have, or a value that it does not take.
+    Refuse an output that the robot does not have, or a value that the output does not accept.
 
     :raises InvalidGoal: names field, value and bound.
     """

@@ -3,10 +3,10 @@
 """
 The planned motions over time, for outputs that are switched during them.
 
-The robot program reads a record when the motion before it returns, at its stop or where its blend
+The robot program reads a record when the previous motion returns, at its stop or where its blend
 begins, and switches the output when the tool reaches the trigger pose. So the time of a command
 (the time of its point plus its offset) becomes a trigger pose on the planned path, and the record
-stands behind the last motion that has returned by then. A slower robot switches at the same poses.
+is sent after the last motion that has returned by then. A slower robot switches at the same poses.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Wait,
 )
 
-#: Times that differ by less are the same [s].
+#: Times that differ by less than this are the same [s].
 SAME_TIME = 1e-6
-# Half of the time over which the trigger direction is measured [s], at first and at most.
+# Half of the time over which the trigger direction is measured [s]: initial and largest value.
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
-# A shorter motion has no direction [m], [rad]; with less distance per turn than this [m/rad] the
-# direction of the turn counts.
+# A motion shorter than this has no direction [m], [rad]; with less distance per turn than the
+# second number [m/rad], the direction of the turn is used.
 _MIN_MOTION = 1e-7
 _TURNING = 0.01
-# Where the tool gets on by less than this part of its way, it turns back.
+# The tool turns back if its displacement is less than this fraction of its way.
 _TURNS_BACK = 0.1
-# From this distance beyond the trigger pose on, the tool counts as coming round to it [m], [rad].
+# If the tool is beyond the trigger pose by more than this when the record is read [m], [rad], it
+# must come round to the pose again.
 _BEYOND = 1e-4
 
 
@@ -53,7 +54,7 @@ class PlacedOutput:
 
 
 class TimedPath:
-    """The segments over time, with their path."""
+    """The planned segments over time, with their path."""
 
     def __init__(
         self,
@@ -80,7 +81,7 @@ class TimedPath:
             for k in np.flatnonzero(still).tolist()
             if isinstance(segments.primitives[k], Stop)
         }
-        #: By waypoint: the row of its rest.
+        #: Rows of the rests, by waypoint.
         self.rests = {
             int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
         }
@@ -94,9 +95,9 @@ class TimedPath:
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
         """
-        Return a record with the tool pose at a time as trigger; None = without one.
+        Return a record with the tool pose at a time as its trigger; None = without a trigger.
 
-        :param after: the row of the motion behind which it is read.
+        :param after: the row of the motion after which the record is read.
         """
         if time is None or (direction := self._trigger_direction(time)) is None:
             return record
@@ -115,18 +116,18 @@ class TimedPath:
         return int(np.searchsorted(self._returns, time + SAME_TIME, side='right')) - 1
 
     def _passes(self, k: int) -> bool:
-        """Tell whether the arm moves at the end of a motion."""
+        """Return whether the arm moves at the end of a motion."""
         piece = self._primitives[k]
         return self._blend_halves[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
     def where(self, k: int) -> str:
-        """Return where an output at the end of a motion is switched, in words."""
+        """Describe where an output at the end of a motion is switched."""
         if self._blend_halves[k] > 0.0:
             return 'in the middle of its blend'
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def at_point(self, k: int) -> float | None:
-        """Return when the tool is closest to the end of a motion [s], None where it stops."""
+        """Return the time when the tool is closest to a motion's end [s], None if it stops."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
@@ -136,7 +137,7 @@ class TimedPath:
         return self._nearest(np.array(target.position), end - half, end + half, end)
 
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
-        """Return when the path is closest to a position; the middle where the tool rests."""
+        """Return the time when the path is closest to a position; ``middle`` if the tool rests."""
         times, rows = self._reference.time, self._reference.poses
         own = slice(
             max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
@@ -160,7 +161,7 @@ class TimedPath:
         return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
 
     def _trigger_direction(self, time: float) -> Vector6 | None:
-        """Return the direction of the path at a time, None where the tool rests or turns back."""
+        """Return the direction of the path at a time, None if the tool rests or turns back."""
         pose, half = self._pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
             a, b = self._pose(time - half), self._pose(time + half)
