@@ -4,7 +4,7 @@
 
 from pkgutil import extend_path
 
-# The generated modules (msg, srv, action) are made by the build and installed, while these may be
-# used from the source tree (an editable install, `python -m` in a checkout). This joins the two
-# directories into the one package that they are.
+# The build generates and installs the modules msg, srv and action, while the others may be used
+# from the source tree (an editable install, `python -m` in a checkout). This joins the two
+# directories into one package.
 __path__ = extend_path(__path__, __name__)

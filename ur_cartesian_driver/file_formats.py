@@ -4,9 +4,9 @@
 File formats by name and suffix: ours, and formats that other packages declare.
 
 Another package declares its formats as entry points, so their names are known without importing
-it. A format is imported when a file needs it: a broken package disturbs only those who ask for its
-format, and they get a sentence that names it. Ours are a table and no entry points, because a
-checkout on PYTHONPATH has no metadata.
+it. A format is imported only when a file needs it: a broken package affects only users of its
+format, who get an error that names the package. Our own formats are in a table, because a checkout
+on PYTHONPATH has no metadata and so no entry points.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class FileFormats(Generic[_Format]):
         Take our formats.
 
         :param group: the group of the entry points of other packages.
-        :param built_in: names and suffixes, separated by spaces, by ``module:object``.
+        :param built_in: for each ``module:object``, its names and suffixes, separated by spaces.
         :param refusals: exceptions that explain the fault of a file; all others are faults of the
             package.
         """
@@ -46,21 +46,21 @@ class FileFormats(Generic[_Format]):
 
     @cached_property
     def _of_others(self) -> Mapping[str, Mapping[str, EntryPoint]]:
-        """Return the declarations of each name by their packages."""
+        """The formats of other packages: for each name, the declarations by package."""
         found: dict[str, dict[str, EntryPoint]] = {}
         for package in distributions():
             try:
                 entries = package.entry_points.select(group=self._group)
-            except Exception:  # each malformed line raises its own
+            except Exception:  # malformed lines raise exceptions of many types
                 _LOG.warning('the entry points of %s are damaged; reinstall it', package.name)
                 continue
             for entry in entries:
-                # A package that is installed twice, as under an overlay, counts once: the first.
+                # Of a package that is installed twice (with an overlay), only the first is used.
                 found.setdefault(entry.name.lower(), {}).setdefault(package.name, entry)
         return found
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether there is a format of this name or suffix."""
+        """Return whether there is a format of this name or suffix."""
         return name in self.built_in or name in self._of_others
 
     def names(self) -> list[str]:
@@ -77,7 +77,7 @@ class FileFormats(Generic[_Format]):
     @contextmanager
     def using(self, name: str) -> Iterator[_Format]:
         """
-        Yield the format of a name or suffix; blame its package for what fails meanwhile.
+        Yield the format of a name or suffix; report errors of the block as its package's fault.
 
         :raises ImportError: the package is broken, or two packages declare this name.
         """
@@ -107,7 +107,7 @@ class FileFormats(Generic[_Format]):
 
 @contextmanager
 def _blaming(entry: EntryPoint, but: tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """Turn exceptions, but for some, into a sentence that names the package of a format."""
+    """Turn exceptions, except those in ``but``, into an ImportError that names the package."""
     try:
         yield
     except but:
@@ -121,5 +121,5 @@ def _blaming(entry: EntryPoint, but: tuple[type[Exception], ...] = ()) -> Iterat
 
 def _source(entry: EntryPoint) -> str:
     """Return the declaration of a format, and its package."""
-    assert entry.dist is not None  # it was found there
+    assert entry.dist is not None  # it was found in a package
     return f"'{entry.name} = {entry.value}' of {entry.dist.name} {entry.dist.version}"

@@ -9,14 +9,14 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
     ``faults=['protective_stop at 0.35 m']``; ``ur_sim.inject('drop rtde')`` injects a fault
     during a test.
 ``cartesian_driver``
-    the driver's node, connected to ``ur_sim`` and ready for goals; add it to an executor of your
-    own, nothing spins it. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
+    the driver's node, connected to ``ur_sim`` and ready for goals; add it to your own executor,
+    which has to spin it. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
 ``private_ros_graph``
-    isolates the nodes of a test run from all others; ``cartesian_driver`` uses it. A test is
-    refused while rclpy runs in another domain: its goals could reach a robot.
+    isolates the nodes of a test run from all others; ``cartesian_driver`` uses it. A test fails
+    if rclpy runs in another domain, because its goals could reach a real robot.
 
-pytest imports this module in every project of the environment. So it costs next to nothing: heavy
-imports stand in the fixtures.
+pytest imports this module in every project of the environment. So that it loads fast, heavy
+imports are in the fixtures.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ READY_TIMEOUT = 10.0
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the markers, and ignore what ROS 2 itself warns of."""
+    """Register the markers, and ignore a warning that ROS 2 itself causes."""
     # lark 0.12, which generated messages load by way of rosidl_parser
     config.addinivalue_line(
         'filterwarnings',
@@ -61,7 +61,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> None:
-    """Check the domain of tests with nodes of their own, once their fixtures are there."""
+    """Check the domain of tests with nodes of their own, once their fixtures are set up."""
     domain = getattr(item, 'funcargs', {}).get('private_ros_graph')
     if domain is not None:
         _check_domain(domain)

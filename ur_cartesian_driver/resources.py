@@ -13,9 +13,9 @@ def share_path() -> Path:
     """
     Return the directory that holds config/, launch/, msg/, srv/, action/ and package.xml.
 
-    If the modules are used from a checkout (an editable install, colcon's --symlink-install), that
-    is the checkout, so that an edited file counts at once; else share/ of the ROS installation or
-    of the pip environment.
+    If the modules are used from a checkout (an editable install, colcon's --symlink-install), this
+    is the checkout, so that an edited file takes effect at once. Otherwise it is share/NAME of the
+    ROS installation or of the pip environment.
 
     :raises FileNotFoundError: the data files are not installed.
     """

@@ -37,7 +37,7 @@ def simulated_robot(request: pytest.FixtureRequest, marker: str) -> Iterator[Sim
 
 
 def marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
-    """Return the arguments of the markers of a test, of which the closest comes last."""
+    """Return the merged arguments of a test's markers; the closest marker has priority."""
     values: dict[str, Any] = {}
     for marker in reversed(list(request.node.iter_markers(name))):
         values |= marker.kwargs

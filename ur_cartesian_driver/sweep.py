@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan one goal in many variants: other places, other robots, arms as exactly built as real ones.
+Plan one goal in many variants: other places, other robots, arms with the tolerances of real ones.
 
 ::
 
@@ -58,10 +58,10 @@ from ur_cartesian_driver.preview import sample
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-#: At so many times the margins of a plan are measured, but not closer together than a cycle [s].
+#: Number of times at which the margins of a plan are measured, and their least distance [s].
 SAMPLES, MIN_PERIOD = 400, 0.008
 
-#: What a variant differs in: numbers [m], [rad], or names.
+#: A quantity in which variants differ: a number [m], [rad], or a name.
 Coordinate: TypeAlias = float | str
 
 
@@ -69,7 +69,7 @@ Coordinate: TypeAlias = float | str
 class Variant:
     """A goal, and the arm that it is planned for."""
 
-    #: In a sweep a path is resolved with ``frames``.
+    #: A goal, or a path whose frames the sweep resolves with ``frames``.
     goal: Goal | Path
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
     #: Joint positions in which the arm rests at the start [rad], and its active TCP.
@@ -77,24 +77,26 @@ class Variant:
     T_flange_tcp: Pose = IDENTITY
     options: PlanningOptions = field(default_factory=PlanningOptions)
     frames: Frames = field(default_factory=Frames)
-    #: How far the goal is from where it says: of its frame along the axes of the base [m], and
-    #: about the base's z through the frame's origin [rad].
+    #: Displacement of the goal's frame: along the axes of the base [m], and about the base's z
+    #: through the origin of the frame [rad].
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    #: Its differences from the other variants, by name.
+    #: The quantities in which the variant differs from the others, by name.
     coordinates: Mapping[str, Coordinate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
-    """The smallest distances on a planned motion from what would refuse it; NaN = not known."""
+    """The smallest distances from a refusal on a planned motion; NaN = not known."""
 
-    #: Of any joint from its limits [rad].
+    #: Smallest distance of any joint from its limits [rad].
     joint_limit: float = nan
-    #: From a singularity where the tool is led [rad]; 0.3 m of the shoulder count as 1 rad.
+    #: Smallest distance from a singularity, except on joint motions [rad]; for the shoulder, 0.3 m
+    #: correspond to 1 rad.
     singularity: float = nan
-    #: Part of the speed of the fastest joint that is left, 0 to 1.
+    #: Unused fraction of the speed limit, for the joint that comes closest to its limit, 0 to 1.
     speed: float = nan
-    #: Of the arm and its tool from themselves and from planes [m]; infinite = nothing is checked.
+    #: Smallest distance of the arm and its tool from themselves and from planes [m]; infinite =
+    #: nothing is checked.
     clearance: float = nan
 
 
@@ -103,9 +105,9 @@ class SweepResult:
     """The result of planning a variant."""
 
     variant: Variant
-    #: Empty = the goal passes; else the sentence that refuses it.
+    #: The sentence that refuses the goal; empty = the goal passes.
     refusal: str = ''
-    #: None = the refusal is no verdict: planning itself failed.
+    #: The code of the result; None = planning itself failed, which is no verdict on the goal.
     code: ErrorCode | None = ErrorCode.SUCCESSFUL
     margins: Margins = Margins()
     #: Expected time of the motion [s].
@@ -113,7 +115,7 @@ class SweepResult:
 
     @property
     def passes(self) -> bool:
-        """Tell whether the arm could carry the goal out."""
+        """Whether the arm could carry out the goal."""
         return not self.refusal
 
 
@@ -127,7 +129,7 @@ def at_places(
     """
     Return each variant at all places of a grid.
 
-    :param x: offsets of the goal's frame along the base's x [m]; as ``y`` and ``z``.
+    :param x: offsets of the goal's frame along the base's x [m]; ``y`` and ``z`` likewise.
     :param rz: turns about the base's z through the frame's origin [rad].
     """
     axes = {'x': x, 'y': y, 'z': z, 'rz': rz}
@@ -145,7 +147,7 @@ def at_places(
 
 
 def on_models(variants: Variant | Iterable[Variant], names: Iterable[str]) -> list[Variant]:
-    """Return each variant on arms of other models, as they are designed."""
+    """Return each variant on arms of other models, in their nominal geometry."""
     arms = {name: Arm(robot_model(name)) for name in names}
     return [
         replace(variant, arm=arm, coordinates={**variant.coordinates, 'model': name})
@@ -158,7 +160,7 @@ def calibrated(variants: Variant | Iterable[Variant], count: int, seed: int = 0)
     """
     Return each variant on ``count`` arms whose axes deviate at random, as on real arms.
 
-    The flange of such an arm is 1 to 2 mm off; the same seed makes the same arms.
+    The flange of such an arm is 1 to 2 mm off its nominal pose; the same seed makes the same arms.
     """
     return [
         replace(
@@ -181,13 +183,13 @@ def sweep(
     on_result: Callable[[], object] = lambda: None,
 ) -> list[SweepResult]:
     """
-    Plan goals beside each other, and return what each came to, in their order.
+    Plan goals in parallel, and return their results in the order of the goals.
 
-    A goal that is refused, fails, or ends its process loses no other.
+    A goal that is refused, fails, or ends its process does not affect the others.
 
     :param goals: variants, or goals and paths for a UR5e in its home position.
-    :param executor: runs them; None = a process for each core. It outlives the call.
-    :param on_result: called as each is done.
+    :param executor: runs the planning, and is not shut down; None = a process for each core.
+    :param on_result: called whenever a goal is done.
     """
     variants = [g if isinstance(g, Variant) else Variant(goal=g) for g in goals]
     if executor is not None:
@@ -202,7 +204,7 @@ def sweep(
     results = []
     for variant, result in zip(variants, found, strict=True):
         if isinstance(result, BrokenExecutor):
-            # A process that dies takes those that wait with it: each gets a process of its own.
+            # A process that dies breaks the pool, so each goal left gets a process of its own.
             with _processes(1) as pool:
                 (result,) = _gather(pool, [variant], lambda: None)
         results.append(_failed(variant, result) if isinstance(result, Exception) else result)
@@ -217,7 +219,7 @@ def _processes(count: int) -> ProcessPoolExecutor:
 def _gather(
     executor: Executor, variants: Sequence[Variant], on_result: Callable[[], object]
 ) -> list[SweepResult | Exception]:
-    """Return the results in the order of the variants, or why there is none."""
+    """Return the results in the order of the variants; an exception for each one that failed."""
     futures: list[Future[SweepResult] | Exception] = []
     for variant in variants:
         try:
@@ -293,7 +295,7 @@ def margins_of(made: Plan, variant: Variant) -> Margins:
 
 
 def _points_at(made: Plan, time: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
-    """Return to which point of the goal the tool is on its way at some times."""
+    """Return the indices of the points to which the tool is moving at some times."""
     row = np.searchsorted(made.reference.time, time, side='left')
     return made.reference.point[np.minimum(row, len(made.reference.point) - 1)]
 
@@ -306,9 +308,9 @@ def _joint_moves(made: Plan) -> list[int]:
     ]
 
 
-# ---- what people look at -----------------------------------------------------------------------
+# ---- tables, maps and pictures -----------------------------------------------------------------
 
-#: What a table has of each variant, with its unit.
+#: The columns of numbers in a table, with their units.
 COLUMNS = {
     'joint_limit': 'joint limit [rad]',
     'singularity': 'singularity [rad]',
@@ -336,7 +338,7 @@ def columns(results: Sequence[SweepResult]) -> dict[str, list[Coordinate]]:
 
 
 def table(results: Sequence[SweepResult]) -> str:
-    """Return a line for each variant, as wide as it has to be, with the refusal at its end."""
+    """Return a table with a line for each variant, and the refusal at the end of the line."""
     cells = columns(results)
     cells['result'] = cells.pop('result')  # last, as it is long
     texts = [[name, *map(_text, values)] for name, values in cells.items()]
@@ -351,7 +353,7 @@ def table(results: Sequence[SweepResult]) -> str:
 
 
 def summary(results: Sequence[SweepResult]) -> str:
-    """Return one line: how many pass, and which margins are the smallest of those."""
+    """Return one line: the number of variants that pass, and the smallest of their margins."""
     passed = [r for r in results if r.passes]
     text = f'{len(passed)} of {len(results)} variants pass'
     if not passed:
@@ -386,7 +388,7 @@ def _grid(
     """
     Return the axes of a map, their values, and the worst margin of each cell.
 
-    -inf = a variant of the cell is refused, NaN = there is none.
+    -inf = a variant of the cell is refused, NaN = the cell has no variant.
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [
@@ -399,7 +401,7 @@ def _grid(
             for name, each in zip(names, values, strict=True)
         )
         grid[cell] = np.fmin(grid[cell], _value(result, column) if result.passes else -inf)
-    # Rounding is no difference.
+    # Rounded, because values that differ only by rounding errors are the same.
     return names, values, np.atleast_2d(np.round(grid.T, 6))
 
 
@@ -409,10 +411,10 @@ def _order(value: Coordinate) -> tuple[int, Coordinate]:
 
 def heat_map(results: Sequence[SweepResult], column: str = 'singularity') -> str:
     """
-    Return a map in text over the two coordinates with the most values, ``x`` where it is refused.
+    Return a map as text over the two coordinates with the most values; ``x`` = refused.
 
     :param column: joint_limit, singularity, speed, clearance or duration; each cell shows the
-        least of its variants.
+        least value of its variants.
     """
     names, values, grid = _grid(results, column)
     if not names:
@@ -461,7 +463,7 @@ def draw(results: Sequence[SweepResult], picture: FilePath) -> None:
 
 
 def _ticks(values: Sequence[Coordinate]) -> tuple[list[int], list[str]]:
-    """Return places and labels of at most a dozen ticks."""
+    """Return the positions and labels of at most a dozen ticks."""
     every = range(0, len(values), -(-len(values) // 12))
     return list(every), [_text(values[i]) for i in every]
 

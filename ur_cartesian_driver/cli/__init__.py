@@ -4,7 +4,7 @@
 The command ``ur-cartesian``.
 
 Each command is a function from parsed arguments to the exit status. Only the commands that need
-ROS import it, so ``sim`` and ``where`` run without.
+ROS import it, so ``sim`` and ``where`` run without ROS.
 """
 
 from __future__ import annotations

@@ -16,16 +16,16 @@ from ur_cartesian_driver.sim.command_line.simulator_options import parsed, six_n
 if TYPE_CHECKING:
     from ur_cartesian_driver.importing import CodeOutput
 
-#: Of options that are times [s].
+#: Largest value of options that are times [s].
 MAX_SECONDS = 86400.0
-#: Of offsets of a goal [m], [rad].
+#: Largest offset of a goal [m], [rad].
 MAX_OFFSET = 50.0
-#: A grid of more variants is a mistake.
+#: Largest number of variants in a grid; more must be a mistake.
 MAX_VARIANTS = 100_000
 
 
 def length(text: str) -> float:
-    """Return a length with its unit [m]."""
+    """Return a length that is given with its unit, in metres."""
     from ur_cartesian_driver.importing import parse_length
 
     return parsed(parse_length, text)
@@ -44,13 +44,13 @@ def tcp(text: str) -> tuple[float, ...]:
 
 
 def offsets(text: str) -> tuple[float, ...]:
-    """Return equally spaced numbers from the first to the last, like ``-0.1,0.1,5``."""
+    """Return the equally spaced numbers of a text like ``-0.1,0.1,5`` (FROM,TO,COUNT)."""
     try:
         first, last, number = text.split(',')
         numbers = np.linspace(float(first), float(last), count(number)).round(9).tolist()
     except ValueError:
         raise argparse.ArgumentTypeError(f'{text!r} is not FROM,TO,COUNT') from None
-    if not numbers or not all(abs(offset) <= MAX_OFFSET for offset in numbers):  # NaN neither
+    if not numbers or not all(abs(offset) <= MAX_OFFSET for offset in numbers):  # or NaN
         raise argparse.ArgumentTypeError(f'{text!r} is not within {MAX_OFFSET:g}, or has no count')
     return tuple(numbers)
 
@@ -64,7 +64,7 @@ def count(text: str) -> int:
 
 
 def point_index(text: str) -> int:
-    """Return the index of a point of a goal, which may be endless."""
+    """Return the index of a point; the number of points in a goal may be unlimited."""
     number = int(text)
     if not 0 <= number < 2**32:
         raise argparse.ArgumentTypeError(f'{text} is not an index from 0')
@@ -74,7 +74,7 @@ def point_index(text: str) -> int:
 def factor(text: str) -> float:
     """Return a number above 0."""
     number = float(text)
-    if not 0.0 < number <= 1e6:  # NaN neither
+    if not 0.0 < number <= 1e6:  # or NaN
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
     return number
 
@@ -85,6 +85,6 @@ def seconds(text: str) -> float:
         number = float(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f'{error}; give seconds') from None
-    if not 0.0 <= number <= MAX_SECONDS:  # NaN neither
+    if not 0.0 <= number <= MAX_SECONDS:  # or NaN
         raise argparse.ArgumentTypeError(f'{number:g} s is not within 0 and {MAX_SECONDS:g} s')
     return number

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``check-robot``: what a robot tells, and experiments if a person agrees to each."""
+"""The command ``check-robot``: observe a robot, and run experiments to which a person agrees."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def experiment_findings(
     """
     Carry out the experiments to which a person agrees.
 
-    :param agrees: asks about a motion.
-    :param recordings: gets the samples of each.
+    :param agrees: asks the person about a motion, and returns whether the person agrees.
+    :param recordings: receives the samples of each experiment.
     """
     if problems := [f.check for f in observed if f.verdict is Verdict.PROBLEM]:
         reason = f'No motion, because of {", ".join(problems)}'
@@ -87,7 +87,7 @@ def experiment_findings(
 
 
 def _is_known_by(experiment: Experiment, observed: list[Finding]) -> bool:
-    """Tell whether the robot's software has what an experiment needs, as far as it was found."""
+    """Return whether the robot's software supports an experiment, or its version is unknown."""
     if not experiment.feature:
         return True
     versions = [finding.data['version'] for finding in observed if finding.check == 'software']
@@ -108,7 +108,7 @@ def _experiment(
             return skipped(experiment.check, f'No motion: {refusal}')
         if not agrees(experiment.motion):
             return skipped(experiment.check, 'Not wanted')
-        if refusal := asyncio.run(motion_refusal(address)):  # things change while a person thinks
+        if refusal := asyncio.run(motion_refusal(address)):  # again, after the person's answer
             return skipped(experiment.check, f'No motion: {refusal}')
         samples = asyncio.run(run_experiment(address, experiment))
     except (OSError, DriverError) as error:
@@ -119,7 +119,7 @@ def _experiment(
 
 
 def ask(motion: str) -> bool:
-    """Ask on the terminal; everything but yes is no."""
+    """Ask on the terminal; any answer other than yes means no."""
     return input(f'\n{motion} Move? [y/N] ').strip().lower() in ('y', 'yes')
 
 
@@ -129,7 +129,7 @@ def show(finding: Finding) -> None:
 
 
 def exit_status(findings: list[Finding]) -> int:
-    """Return 0 if the driver can work, 1 if something keeps it from that, 3 if nobody answers."""
+    """Return 0 if the driver can work, 1 if something prevents that, 3 if nothing answers."""
     problems = {finding.check for finding in findings if finding.verdict is Verdict.PROBLEM}
     if {'rtde', 'primary'} <= problems:
         return UNREACHABLE
@@ -137,7 +137,7 @@ def exit_status(findings: list[Finding]) -> int:
 
 
 def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dict[str, Any]:
-    """Return the part that is sent in: no address, no serial number, no names of programs."""
+    """Return the report to send in, without address, serial number and names of programs."""
     return {
         'format': 1,
         'driver': ElementTree.parse(share_path() / 'package.xml').findtext('version'),
@@ -156,7 +156,7 @@ def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dic
 
 
 def _without_nan(value: Any) -> Any:
-    """Return a value with null for numbers that the robot lacks: JSON knows no NaN."""
+    """Return a value with None in place of NaN (not reported), because JSON has no NaN."""
     if isinstance(value, dict):
         return {name: _without_nan(part) for name, part in value.items()}
     if isinstance(value, list | tuple):

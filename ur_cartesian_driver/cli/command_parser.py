@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The arguments of all commands, and which function each command runs."""
+"""The arguments of all commands, and the function that each command runs."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class CommandParser(argparse.ArgumentParser):
     """
     The parser of one command.
 
-    It gets its arguments when it is used, and they import the module of the command. So `where`
-    starts without a planner, `sim` without ROS, and all of them fast.
+    Its arguments are added when the command is used, because adding them imports the module of the
+    command. So `where` starts without a planner, `sim` without ROS, and every command fast.
     """
 
     def __init__(
@@ -46,12 +46,12 @@ class CommandParser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]  # as argparse calls it
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Add the arguments first."""
+        """Add the arguments, then parse."""
         self._complete()
         return super().parse_known_args(args, namespace)
 
     def format_help(self) -> str:
-        """Add the arguments first."""
+        """Add the arguments, then format the help."""
         self._complete()
         return super().format_help()
 
@@ -221,7 +221,7 @@ def _add_send(command: CommandParser) -> None:
 
 
 def _add_planning(command: CommandParser, optional: bool = False) -> None:
-    """Add the goal, which may be optional, and the facts that the driver reads from the robot."""
+    """Add the goal, and the options for what a driver would read from its robot."""
     _add_goal(command, optional)
     command.add_argument(
         '--ur-type',

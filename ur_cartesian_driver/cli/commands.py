@@ -62,7 +62,7 @@ def send(arguments: argparse.Namespace) -> int:
             return 1
     goal.validate_only = validate_only
     with (
-        # Without a buffer: a disk that is full is noticed while the arm moves.
+        # Without a buffer, so that a full disk is noticed while the arm moves.
         open(arguments.record, 'wb', buffering=0)
         if arguments.record
         else contextlib.nullcontext() as file,
@@ -103,7 +103,7 @@ def append(arguments: argparse.Namespace) -> int:
 
 
 def recover(arguments: argparse.Namespace) -> int:
-    """Bring a stopped robot back to where it takes goals; say what a person has to do."""
+    """Bring a stopped robot back until it accepts goals, and say what a person has to do."""
     from ur_cartesian_driver.ros import client
 
     with client.GoalClient(arguments.driver) as caller:
@@ -120,9 +120,9 @@ def _named_file(arguments: argparse.Namespace) -> Path:
 
 def _resumed(goal: Any, place: PathPlace, arguments: argparse.Namespace) -> tuple[Any, Any]:
     """
-    Return the rest of a goal, as a message and in our own terms.
+    Return the rest of a goal, as a message and as a resumed goal.
 
-    :raises InvalidGoal: it cannot be resumed.
+    :raises InvalidGoal: the goal cannot be resumed.
     """
     from ur_cartesian_driver.ros import client
 
@@ -137,7 +137,7 @@ def _note_place(arguments: argparse.Namespace, result: Any, left: Any) -> None:
     outcome = outcome_of(result)
     place = outcome.stopped
     if place is None and not outcome.succeeded:
-        return  # nothing has moved: what was known before still holds
+        return  # nothing has moved, so the place noted before is still right
     if place is not None and left is not None:
         place = left.original(place)
     if place is not None:
@@ -184,7 +184,7 @@ class FeedbackLog:
     """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
 
     def __init__(self, file: BinaryIO | None) -> None:
-        """Take the file that is written; None = no file."""
+        """Take the file to write to; None = write no file."""
         self._file = file
         self._next_line = 0.0
 
@@ -222,7 +222,7 @@ class FeedbackLog:
             ) from None
 
     def _show(self, line: str) -> None:
-        """Rewrite one line on a terminal; elsewhere print a line a second."""
+        """Rewrite one line on a terminal; elsewhere print one line per second."""
         if sys.stdout.isatty():
             print(f'\r{line}\033[K', end='', flush=True)
         elif monotonic() >= self._next_line:

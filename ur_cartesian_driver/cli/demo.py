@@ -3,8 +3,8 @@
 """
 ``ur-cartesian demo``: simulated controller, driver node and client, a process each.
 
-The processes are the commands that a user starts by hand, but with free ports, so that the demo
-disturbs nothing that runs. With two arms each driver has a namespace and a ``tf_prefix``.
+The processes are the commands that a user would start by hand, but on free ports, so that the demo
+disturbs no other program. With two arms, each driver has a namespace and a ``tf_prefix``.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
         'trajectory_port': 0,
         'script_command_port': 0,
     }
-    if arm.name:  # without a value, a parameter has no type
+    if arm.name:  # ROS cannot tell the type of an empty value
         parameters['tf_prefix'] = arm.tf_prefix
     names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
     settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
@@ -151,7 +151,7 @@ def _clients(options: Mapping[DemoArm, Sequence[str]], environment: dict[str, st
                     arm.tf_prefix,
                     *extra_options,
                     environment=environment,
-                    # A terminal shows the progress of one client in one line.
+                    # Only a single client may show its progress in one line of the terminal.
                     stdout=subprocess.PIPE if arm.label else None,
                 )
             )
@@ -179,7 +179,7 @@ def _draw(arm: DemoArm, record: Path) -> None:
 def _show(arm: DemoArm, environment: dict[str, str]) -> None:
     """Write the page with the arm on its planned path."""
     options = ['--ur-type', arm.model]
-    if arm.name:  # in the goal, and for the driver that would plan it
+    if arm.name:  # for the names in the goal, and for the parameters of the planning
         options += ['--tf-prefix', arm.tf_prefix, '-p', f'tf_prefix:={arm.tf_prefix}']
     page = str(arm.drawing.with_suffix('.html'))
     with process('show', str(arm.goal), *options, '-o', page, environment=environment) as running:

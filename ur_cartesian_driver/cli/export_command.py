@@ -14,7 +14,7 @@ from ur_cartesian_driver.driver.recordings.export_options import Exporter, Expor
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.file_formats import FileFormats
 
-#: By their suffixes.
+#: The exporters, by suffix.
 EXPORTERS: FileFormats[Exporter] = FileFormats(
     'ur_cartesian_driver.exporters',
     {
@@ -26,7 +26,7 @@ EXPORTERS: FileFormats[Exporter] = FileFormats(
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a recording in the format of the suffix; a file that is not whole is never there."""
+    """Write a recording in the format of the suffix; no incomplete file is left behind."""
     source = newest_recording(Path(arguments.file))
     target = Path(arguments.output or source.with_suffix('.mcap'))
     suffix = target.suffix.lower()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``ur-cartesian import``: make a goal file of a file of others."""
+"""``ur-cartesian import``: make a goal file from a file of another format."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ur_cartesian_driver.sim.command_line.simulate import calibration
 
 __all__ = ['FORMATS', 'import_goal', 'options_of']
 
-#: From so many points on a goal is written in flat arrays.
+#: Goals with at least this many points are written in flat arrays.
 MANY_POINTS = 200
 
 

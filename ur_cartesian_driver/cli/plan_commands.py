@@ -3,7 +3,7 @@
 """
 ``ur-cartesian validate`` and ``show``: check and plan a goal without driver and robot.
 
-The command line gives what the driver reads from the robot: model, calibration, joint positions
+The command line gives what a driver would read from its robot: model, calibration, joint positions
 and TCP. tf2 frames are not available.
 """
 
@@ -40,9 +40,9 @@ from ur_cartesian_driver.sim.command_line.simulate import calibration
 if TYPE_CHECKING:
     from ur_cartesian_driver.preview.live_page import LivePage
 
-#: Where pages are served unless told otherwise.
+#: Default address on which pages are served.
 LOOPBACK = '127.0.0.1'
-#: Packets per second, and how long to wait before a lost robot is dialled again [s].
+#: Packets per second, and the wait before a new connection to a lost robot [s].
 LIVE_RATE, RECONNECT_PERIOD = 20.0, 1.0
 
 
@@ -69,7 +69,7 @@ def validate(arguments: argparse.Namespace) -> int:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Write or open the page of a goal, also of a refused one, or follow a robot."""
+    """Write or open the page of a goal, even of a refused one, or follow a robot."""
     from ur_cartesian_driver.preview import motion_page, refusal_page
 
     if arguments.live:
@@ -140,7 +140,7 @@ def _show_live(arguments: argparse.Namespace) -> int:
 
 
 async def _follow(page: LivePage, host: str, port: int) -> NoReturn:
-    """Show the states of a robot, and connect again when it is lost."""
+    """Show the states of a robot, and connect again when the connection is lost."""
     while True:
         stream = StateStream(LIVE_RATE, 0.0, page.update)
         try:
@@ -161,7 +161,7 @@ class GoalPlanning:
         """
         Read the parameters and the goal.
 
-        :param robot: where the arm stands; None = as the arguments say.
+        :param robot: the state of the robot; None = as the arguments say.
         """
         from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings

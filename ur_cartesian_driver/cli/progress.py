@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Progress of what takes longer than a second: on standard error, and only on a terminal."""
+"""Progress of work that takes longer than a second, on standard error and only on terminals."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import threading
 
 from tqdm import tqdm
 
-#: Shorter work shows nothing [s].
+#: Time after which progress is shown [s].
 DELAY = 1.0
 _PERIOD = 0.2
 
 
 @contextmanager
 def counted(what: str, total: int) -> Iterator[Callable[[], object]]:
-    """Show a bar; the yielded function is called after each part."""
+    """Show a progress bar; the caller calls the yielded function after each part."""
     with tqdm(
         desc=what, total=total, delay=DELAY, disable=None, leave=False, mininterval=0.1
     ) as bar:
@@ -26,7 +26,7 @@ def counted(what: str, total: int) -> Iterator[Callable[[], object]]:
 
 @contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Show how long something takes whose parts are not known."""
+    """Show the elapsed time of work that cannot be counted in parts."""
     with tqdm(
         desc=what, delay=DELAY, disable=None, leave=False, bar_format='{desc} {elapsed}'
     ) as bar:

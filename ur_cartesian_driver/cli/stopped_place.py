@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place where a file's goal was stopped, kept beside it for ``ur-cartesian send --resume``.
+The place where a file's goal was stopped, kept next to it for ``ur-cartesian send --resume``.
 
-``seam.yaml.stopped`` holds the place, and a hash of the goal in ``seam.yaml``. It is written to
-the working directory if the goal is an example of the package, or its folder is read-only.
+``seam.yaml.stopped`` holds the place, and a hash of the goal in ``seam.yaml``. The file is written
+to the working directory if the goal is an example of the package, or its folder is read-only.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ _SUFFIX = '.stopped'
 
 def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
     """
-    Note where a goal was stopped, None = nowhere: nothing is left to resume.
+    Note the place where a goal was stopped; None = remove the note, nothing is left to resume.
 
-    :returns: the file, None = there is none.
-    :raises OSError: it cannot be written.
+    :returns: the written file, or None.
+    :raises OSError: the file cannot be written.
     """
     file = _file(goal_file)
     if place is None:
@@ -39,9 +39,9 @@ def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
 
 def read_place(goal_file: Path) -> PathPlace:
     """
-    Return where a goal was stopped.
+    Return the place where a goal was stopped.
 
-    :raises ValueError: that is not known, or the goal is another one since.
+    :raises ValueError: the place is not known, or the goal has changed since.
     """
     file = _file(goal_file)
     try:

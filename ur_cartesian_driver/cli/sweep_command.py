@@ -36,12 +36,12 @@ from ur_cartesian_driver.sweep import (
     Variant,
 )
 
-#: What a map can show.
+#: The quantities that a map can show.
 MARGINS = tuple(COLUMNS)
 
 
 def sweep_goal(arguments: argparse.Namespace) -> int:
-    """Print what each variant comes to; the status is 0 if all of them pass."""
+    """Print the result of each variant; the status is 0 if all of them pass."""
     variants = variants_of(arguments)
     count = arguments.processes
     with counted('variants', len(variants)) as one_done:

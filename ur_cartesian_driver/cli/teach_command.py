@@ -20,13 +20,13 @@ HELP = (
     'Enter takes a point like the one before; l: a line to it, j: a joint motion, p: a line of a '
     'process, a: here is the middle of an arc, and the next Enter its end; u: undo, q: write, end'
 )
-#: Until the arm can be guided, and until it is held again [s].
+#: Longest time until the arm can be guided, and until the robot holds it again [s].
 FREEDRIVE_TIME = 10.0
 _KINDS = {'l': 'line', 'j': 'joint', 'p': 'process'}
 
 
 def teach_path(arguments: argparse.Namespace) -> int:
-    """Connect, let a person guide the arm, and write what was taken, also after Ctrl-C."""
+    """Connect, let a person guide the arm, and write the taken points, even after Ctrl-C."""
     config = DriverConfig(
         robot_ip=arguments.robot_ip,
         ur_type=arguments.ur_type,
@@ -54,7 +54,7 @@ def guide(
     driver: Driver, lesson: Lesson, keys: Iterable[str], say: Callable[[str], object]
 ) -> None:
     """
-    Let the arm be guided while keys come; it is held again at the end, however that comes.
+    Keep freedrive on while keys are read; in any case the robot holds the arm again at the end.
 
     :raises RobotNotReady: freedrive does not begin, or ends by itself.
     """
@@ -84,7 +84,7 @@ class Lesson:
     """The points taken so far."""
 
     def __init__(self, beginning: Path) -> None:
-        """Begin with a path without points, which may have speeds."""
+        """Begin with a path without points, which may set speeds."""
         self._paths = [beginning]
         self._kind, self._via = 'l', None  # type: str, Pose | None
 
@@ -95,9 +95,9 @@ class Lesson:
 
     def press(self, key: str, state: RobotState) -> str:
         """
-        Do what a key says where the robot is, and return what was done.
+        Carry out a key at the robot's present pose, and return a text about the result.
 
-        :raises InvalidGoal: the point cannot be one of the path.
+        :raises InvalidGoal: the point cannot be added to the path.
         """
         pose = state.actual_tcp_pose
         if key == 'u':
@@ -111,7 +111,7 @@ class Lesson:
             return f'{key!r} means nothing. {HELP}'
         self._kind = key or self._kind
         posture = dict(zip(JOINT_NAMES, state.actual_q, strict=True))
-        if not self.path.poses:  # from wherever the arm will stand
+        if not self.path.poses:  # a joint motion, from wherever the arm will start
             name, path = 'joint', self.path.joint(pose, posture=posture)
         elif self._via is not None:
             name, path = 'arc', self.path.arc(pose, via=self._via.position)

@@ -12,10 +12,11 @@ import gc
 @contextmanager
 def uncollected() -> Iterator[None]:
     """
-    Let the garbage collector rest; also a decorator.
+    Pause the garbage collector; also a decorator.
 
-    It would visit all new objects again and again: files of 10,000 lines are read and written in
-    half the time. Objects dropped meanwhile are freed at once, unless they are part of a cycle.
+    The collector would visit all new objects again and again: without it, files of 10,000 lines
+    are read and written in half the time. Objects dropped meanwhile are freed at once, unless they
+    are part of a cycle.
     """
     was_enabled = gc.isenabled()
     gc.disable()

@@ -14,14 +14,14 @@ import yaml
 from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
-#: A goal nests less. The loaders end by a crash, an exception or a sentence of their own where a
-#: text nests a thousand times as much.
+#: No goal nests as deeply. If a text nests a thousand times as deeply, the loaders crash, raise an
+#: exception or refuse it, depending on the loader.
 _MAX_DEPTH = 100
-_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # ten times as fast, where it was built
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # ten times as fast, if built with libyaml
 
 
 class GoalFileError(ValueError):
-    """A text is not a goal; the sentence names the key."""
+    """A text is not a goal; the message names the key."""
 
 
 @uncollected()
@@ -37,13 +37,13 @@ def read_goal_file(source: str | os.PathLike[str]) -> Message:
     name = '' if isinstance(source, str) else f'{os.fspath(source)}: '
     try:
         _check_depth(text)
-        values = yaml.load(text, Loader=_Loader)  # both of them are safe
+        values = yaml.load(text, Loader=_Loader)  # both loaders are safe
         return with_defaults({} if values is None else values)
     except yaml.YAMLError as error:
         raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
     except FieldError as error:
         raise GoalFileError(f'{name}{error}') from None
-    except ValueError as error:  # Python's, of a date that does not exist, say
+    except ValueError as error:  # from Python, such as that of an impossible date
         raise GoalFileError(
             f'{name}a value cannot be read: {str(error).rstrip(".")}; correct it, or put it in '
             'quotes.'
@@ -63,7 +63,7 @@ def _check_depth(text: str) -> None:
     """
     Refuse a text that nests more than any goal.
 
-    :raises FieldError: it does.
+    :raises FieldError: the text is nested too deeply.
     """
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
@@ -77,7 +77,7 @@ def _check_depth(text: str) -> None:
 
 
 class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]  # chosen at run time
-    """Ten times as fast where PyYAML was built with libyaml; writes equal parts out in full."""
+    """Writes equal parts out in full; ten times as fast if PyYAML was built with libyaml."""
 
     def ignore_aliases(self, data: object) -> bool:
         return True

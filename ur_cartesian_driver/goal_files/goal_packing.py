@@ -3,7 +3,7 @@
 """
 Points and segments in flat arrays: from rows to the fields of a ``PackedPoints``.
 
-:mod:`~ur_cartesian_driver.goal_files.goal_reading` is the way back.
+:mod:`~ur_cartesian_driver.goal_files.goal_reading` does the reverse.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
     """
     Return points and segments as the fields of a message: arrays, and names of joints.
 
-    :returns: None if the message cannot hold them: a jerk, a posture with names and values that do
-        not fit, or numbers of types that do not exist.
+    :returns: None if the message cannot hold them: a jerk, a posture whose names and values do not
+        match, or a type number that does not fit into a byte.
     """
     names = _joint_names([*points.postures.values(), *segments.via_postures.values()])
     if names is None:
@@ -56,21 +56,21 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
 
 
 def _joint_names(postures: Sequence[Posture]) -> tuple[str, ...] | None:
-    """Return the joints that postures name, None if one of them is malformed."""
+    """Return the joints that postures name; None = a posture is malformed."""
     names: dict[str, None] = {}
     for posture in postures:
         if len(posture.names) != len(posture.values) or len(set(posture.names)) != len(
             posture.names
         ):
             return None
-        if any(value != value for value in posture.values):  # NaN means something else here
+        if any(value != value for value in posture.values):  # NaN means no preference in arrays
             return None
         names.update(dict.fromkeys(posture.names))
     return tuple(names)
 
 
 def _posture_numbers(postures: Mapping[int, Posture], n: int, names: Sequence[str]) -> Floats:
-    """Return postures as an array (n, joints); NaN stands for no preference."""
+    """Return postures as an array (n, joints); NaN = no preference."""
     values = np.full((n, len(names)), np.nan)
     column = {name: k for k, name in enumerate(names)}
     for row, posture in postures.items():

@@ -3,9 +3,9 @@
 """
 From a goal message, or an object with its fields, to the goal itself.
 
-The table of a goal says what to read. Only errors of the message itself are refused here: invalid
-enumerations, and both forms of points at once. Points become rows of arrays at once, from either
-form; of the plain form each attribute lookup counts.
+The table of goal fields determines what is read. Only errors of the message itself are refused
+here: invalid enumerations, and both forms of points together. Points of either form become rows of
+arrays directly; with the plain form, attribute lookups take most of the time.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _Enum = TypeVar('_Enum', bound=IntEnum)
 
 def goal_from_fields(message: Message) -> GoalTable:
     """
-    Return the goal of a ``FollowCartesianTrajectory.Goal``; its frames only have their names.
+    Return the goal of a ``FollowCartesianTrajectory.Goal``; its frames are names, not yet poses.
 
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
@@ -138,10 +138,10 @@ def rows_of_points(
     message: Message, points: Sequence[Message], field: str
 ) -> tuple[WaypointRows, SegmentRows]:
     """
-    Return the points and segments of a message, whichever form they have.
+    Return the points and segments of a message, in either form.
 
-    :raises InvalidGoal: it has both forms, an array does not fit the number of points, or an
-        enumeration has no such value; the text names the field.
+    :raises InvalidGoal: the message has both forms, an array does not fit the number of points, or
+        an enumeration has no such value; the text names the field.
     """
     if not is_packed(message.packed):
         return point_rows(points), segment_rows(message.segments)
@@ -168,7 +168,7 @@ def segment_rows(segments: Sequence[Message]) -> SegmentRows:
 
 
 def _columns(kind: type[GoalRows[Any]], messages: Sequence[Message]) -> dict[str, Any]:
-    """Return the columns of messages; None where they are empty."""
+    """Return the columns of messages; each is None if there are no messages."""
     if not messages:
         return {each.name: None for each in kind.columns()}
     return {
@@ -204,7 +204,7 @@ def _posture(posture: Message) -> Posture:
 
 
 def _check_numbers(each: GoalColumn, column: Any, where: str) -> None:
-    """Refuse the first number of a column that is no member of its enumeration."""
+    """Refuse a column with a number that is no member of its enumeration."""
     if each.field.form is Form.CHOICE and column is not None:
         for i in rows_where(~np.isin(column, list(each.field.type)))[:1]:
             enum_member(each.field.type, int(column[i]), where.format(i))
@@ -212,9 +212,10 @@ def _check_numbers(each: GoalColumn, column: Any, where: str) -> None:
 
 def _with_vias(n: int, columns: Mapping[str, Any]) -> SegmentRows:
     """
-    Return segments of columns; where no pose on the arc is set, a message has the identity.
+    Return segments made of columns; a message without a pose on the arc has the identity there.
 
-    On an arc that counts, and elsewhere another pose, so that it is refused and not ignored.
+    An arc is given its pose even if that is the identity. Another segment is given a pose that is
+    not the identity, so that the pose is refused and not ignored.
     """
     types, vias = columns['types'], columns['vias']
     has_via = np.zeros(n, dtype=np.bool_)
@@ -229,7 +230,7 @@ def _with_vias(n: int, columns: Mapping[str, Any]) -> SegmentRows:
 
 
 def is_packed(packed: Message) -> bool:
-    """Tell whether a ``PackedPoints`` holds anything."""
+    """Return whether a ``PackedPoints`` holds anything."""
     return any(len(getattr(packed, name)) for name in PACKED)
 
 
@@ -252,7 +253,7 @@ def _unpacked(packed: Message) -> tuple[WaypointRows, SegmentRows]:
 
 
 def _unpacked_columns(kind: type[GoalRows[Any]], packed: Message, n: int) -> dict[str, Any]:
-    """Return the columns of flat arrays; None where they are empty."""
+    """Return the columns of flat arrays; None = the array is empty."""
     columns = {}
     for each in kind.columns():
         values = [] if each.packed is None else getattr(packed, each.packed)

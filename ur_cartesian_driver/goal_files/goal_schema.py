@@ -3,9 +3,9 @@
 """
 The fields of ``FollowCartesianTrajectory.Goal``, without the generated messages.
 
-They follow from the table of a goal; a test compares them with the messages. A dict stands for a
-message, a list for a sequence of its only element, and every other value is the default of its
-field.
+The fields follow from the table of goal fields; a test compares them with the messages. In a
+schema, a dict means a message, a list means a sequence of elements like its only one, and every
+other value is the default of its field.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _packed_schema() -> dict[str, Any]:
 
 
 PACKED = _packed_schema()
-#: The fields of the message beside the goal, by the field that each of them follows.
+#: The fields of the message that are not in the goal, by the field after which they come.
 _BESIDE: Mapping[str, Any] = {
     'execution': {'validate_only': False},
     'safe_outputs': {'packed': PACKED},
@@ -101,7 +101,7 @@ GOAL: Mapping[str, Any] = _goal_schema()
 
 
 class FieldError(ValueError):
-    """A value does not fit its field; the sentence names the key."""
+    """A value does not fit its field; the message names the key."""
 
 
 def with_defaults(values: object, schema: Any = GOAL, key: str = '') -> Message:
@@ -155,9 +155,9 @@ def default(schema: Any) -> Any:
 
 def message_of(plain: Message, kind: type[Any]) -> Any:
     """
-    Return a generated message with the fields of an object, which has all of them.
+    Return a generated message with the values of an object that has all its fields.
 
-    :param kind: its class.
+    :param kind: the class of the message.
     """
     names = kind.get_fields_and_field_types()
     return kind(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From a goal to the fields of its message, those that are not the default."""
+"""From a goal to the fields of its message that do not have their default."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NANOSECONDS = 1_000_000_000
 
 def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
     """
-    Return the fields of a goal, as YAML has them and messages are made from.
+    Return the fields of a goal, in the form for YAML and for making messages.
 
     Frames are written by their names; a stamp is not written.
 
@@ -65,7 +65,7 @@ def _rows(rows: GoalRows[Any]) -> list[Fields]:
 
 
 def _write(each: GoalField, value: Any, fields: Fields) -> None:
-    """Put a field among others, unless it has its default; NaN is none."""
+    """Add a field to others, unless it has its default; NaN is never the default."""
     default = each.default if each.has_default else 0
     if value == default and not each.is_always_sent:
         return

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals from files of others: CSV, G-code, DXF, messages of ROS, recordings, URScript.
+Goals from foreign files: CSV, G-code, DXF, messages of ROS, recordings, URScript.
 
-Each format has a module that collects points; `imported_goal` makes a goal of them, the same for
-all. Remarks list everything that the goal lacks, with the lines of the file: nothing is dropped in
-silence.
+Each format has a module that collects points; `imported_goal` makes a goal of them, in the same
+way for all formats. Remarks list everything that the goal lacks, with the lines of the file:
+nothing is dropped in silence.
 Other packages add formats: doc/adding_a_format.md.
 """
 
@@ -63,7 +63,7 @@ __all__ = [
     'term_table',
 ]
 
-#: The formats by their names and suffixes.
+#: The formats by name and suffix.
 FORMATS: FileFormats[ImportFormat] = FileFormats(
     'ur_cartesian_driver.importers',
     {
@@ -86,10 +86,10 @@ def import_file(
     file: str | os.PathLike[str], options: ImportOptions | None = None, form: str = ''
 ) -> ImportedGoal:
     """
-    Read a file.
+    Read a file as a goal.
 
-    :param form: one of the names of :data:`FORMATS`; empty = as the suffix of its name says.
-    :raises BrokenFile: it cannot be read; the sentence has the line.
+    :param form: one of the names of :data:`FORMATS`; empty = the format of the file's suffix.
+    :raises BrokenFile: the file cannot be read; the message has the line.
     :raises ImportError: a package for this format is not installed, or broken.
     :raises OSError: the file cannot be opened.
     """
@@ -111,9 +111,9 @@ def import_message(message: Any, options: ImportOptions | None = None) -> Import
     """
     Read a nav_msgs/Path, a trajectory_msgs/JointTrajectory, or another message with a path.
 
-    The lines of remarks are the numbers of the points from 1.
+    In the remarks, numbers of points (from 1) take the place of lines.
 
-    :raises BrokenFile: it has no path, or a value is none of its field.
+    :raises BrokenFile: the message has no path, or a value does not suit its field.
     """
     from ur_cartesian_driver.importing.messages.ros_messages_file import collect_message
 

@@ -3,7 +3,7 @@
 """
 A format of files: its reader, and the treatment of each term that it knows.
 
-Reader and documentation use the same table of terms, so the reader keeps the promises of the page.
+The reader and its documentation use the same table of terms, so they cannot contradict each other.
 Nothing is read as something else, and nothing is dropped in silence.
 """
 
@@ -23,24 +23,24 @@ from ur_cartesian_driver.importing.imported_path import PathCollector
 class Treatment(Enum):
     """The treatment of a term by the reader of its format."""
 
-    #: It has its effect on the goal.
+    #: The term has its effect on the goal.
     HONOURED = 'honoured'
-    #: It has none; a remark says so with its lines.
+    #: The term has no effect; a remark says so and names its lines.
     LEFT_OUT = 'left out, and said'
-    #: The file is refused, with the line.
+    #: The file is refused; the error names the line of the term.
     REFUSED = 'refused'
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word, code, entity, column or statement that the documents of a format name."""
+    """A word, code, entity, column or statement that the documentation of a format names."""
 
-    #: As the format writes it.
+    #: The term as the format writes it.
     name: str
-    #: The row of the documentation that it stands in.
+    #: The row of the documentation that lists the term.
     topic: str
     treatment: Treatment
-    #: Why it is left out, or what to do instead: the words of the remark or the refusal.
+    #: Why the term is left out, or what to do instead: the text of the remark or the refusal.
     reason: str = ''
 
 
@@ -48,9 +48,9 @@ class Term:
 class ImportFormat:
     """A format, as :func:`~ur_cartesian_driver.importing.import_file` uses it."""
 
-    #: Reads a file; raises BrokenFile, ImportError where a package is missing, or OSError.
+    #: Reads a file; raises BrokenFile, ImportError if a package is missing, or OSError.
     collect: Callable[[Path, ImportOptions, PathCollector], None]
-    #: The terms that the reader knows, and a sentence on all others: for the documentation.
+    #: For the documentation: the terms that the reader knows, and a sentence on all others.
     terms: Mapping[str, Term] = field(default_factory=dict)
     others: str = ''
 
@@ -62,7 +62,7 @@ def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
     """
     Return terms by their names.
 
-    :raises ValueError: a name stands twice.
+    :raises ValueError: two terms have the same name.
     """
     table: dict[str, _T] = {}
     for row in rows:
@@ -73,15 +73,15 @@ def term_table(*rows: Iterable[_T]) -> Mapping[str, _T]:
 
 
 def honoured(topic: str, *names: str) -> tuple[Term, ...]:
-    """Return terms that have their effect."""
+    """Return terms that have their effect on the goal."""
     return tuple(Term(name, topic, Treatment.HONOURED) for name in names)
 
 
 def left_out(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
-    """Return terms that are left out and said."""
+    """Return terms that are left out, with a remark."""
     return tuple(Term(name, topic, Treatment.LEFT_OUT, reason) for name in names)
 
 
 def refused(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
-    """Return terms that refuse the file."""
+    """Return terms because of which a file is refused."""
     return tuple(Term(name, topic, Treatment.REFUSED, reason) for name in names)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of an import, the same for all formats, and how outputs are named in them."""
+"""The options of an import, the same for all formats, and the notation of outputs in them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _KINDS = {
 }
 _LENGTH = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*)\s*', re.IGNORECASE)
 _CODE_WORD = re.compile(r'([A-Z])(-?[0-9]+(?:\.[0-9]+)?)')
-#: S, or an M-code with the values that it has to have.
+#: S, or an M-code with the values that a program has to give with it.
 _CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 
 
@@ -42,9 +42,9 @@ class ToolOrientation(Enum):
 
     #: The orientations of the file, else its normals, else down.
     FILE = 'file'
-    #: Against the normals of the file.
+    #: The tool's axis z against the normals of the file.
     NORMALS = 'normals'
-    #: The tool's axis z against z of the frame, its x along y.
+    #: The tool's axis z against z of the frame, and its x along y of the frame.
     DOWN = 'down'
 
 
@@ -54,14 +54,14 @@ class CodeOutput:
 
     kind: OutputKind
     pin: int
-    #: Digital 0 or 1; of a code with a number of its own (S) the number that means 1.
+    #: The value that the output gets, 0 to 1; for S, the number in a program that means 1.
     value: float
 
     def command(self, value: float) -> IOCommand:
         """
-        Return the command.
+        Return the command that sets the output to a value.
 
-        :raises ValueError: the output does not take the value.
+        :raises ValueError: the output cannot have the value.
         """
         if (fault := output_fault(self.kind, self.pin, value)) is not None:
             raise ValueError(f'{output_name(self.kind, self.pin)} {fault[1]}')
@@ -99,7 +99,7 @@ def parse_length(text: str) -> float:
     """
     Return a length with its unit, such as ``0.1mm`` [m].
 
-    :raises ValueError: it is none, or has no unit.
+    :raises ValueError: the text is no length, has no unit, or is not within 0 and 100 m.
     """
     match = _LENGTH.fullmatch(text)
     if match is None or match[2].lower() not in LENGTH_UNITS:
@@ -114,34 +114,35 @@ def parse_length(text: str) -> float:
 class ImportOptions:
     """Options for making a goal of a file."""
 
-    #: The frame of the points; empty = the file's, else the robot's base.
+    #: The frame of the points; empty = the frame of the file, else the robot's base.
     frame: str = ''
-    #: Where the origin of the file is in the frame.
+    #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
-    #: Unit of lengths of a file that does not say it; empty = such a file is refused.
+    #: Unit of lengths that have none in the file, and of any DXF drawing; empty = a file that
+    #: lacks a unit is refused, but G-code is in mm.
     unit: str = ''
     #: Factor on all lengths, about the origin of the file.
     scale: float = 1.0
     orientation: ToolOrientation = ToolOrientation.FILE
-    #: Of all motions but travel [m/s]; None = the file's, else the driver's parameter.
+    #: Speed of lines and arcs except travel [m/s]; None = the file's, else the driver's parameter.
     speed: float | None = None
-    #: Of travel (G0, and between two contours) [m/s]; None = the driver's parameter.
+    #: Speed of travel (G0, and between two contours) [m/s]; None = the driver's parameter.
     travel_speed: float | None = None
-    #: Of all motions [m/s^2]; None = the file's, else the driver's parameter.
+    #: Acceleration of lines and arcs [m/s^2]; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: For the way to the first point [s], where the file has times; None = the file's.
+    #: Time of the motion to the first point [s], for a file that has times; None = the file's.
     approach_time: float | None = None
-    #: At inner points [m]; smaller where the lines are short.
+    #: Blend radius at inner points [m] unless the file has one; smaller where the lines are short.
     blend: float = 0.0
-    #: Largest distance of the simplified path [m]; 0 = all points are kept.
+    #: Largest distance of the simplified path from that of the file [m]; 0 = all points are kept.
     simplify: float = 0.0
-    #: Largest distance of lines from curves that have no arcs [m].
+    #: Largest distance [m] of lines from the curves that arcs cannot replace.
     tolerance: float = 5e-5
-    #: How far the tool goes back between two contours [m].
+    #: Distance by which the tool retracts between two contours [m].
     lift: float = 0.0
-    #: Outputs by M-code, and S.
+    #: Outputs by the code that switches them: S, or an M-code with its values.
     outputs: Mapping[str, CodeOutput] = field(default_factory=dict)
-    #: The arm, for joint positions.
+    #: The arm for which a file's joint positions are meant.
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
-    #: The active TCP, for joint positions.
+    #: The active TCP for which a file's joint positions are meant.
     T_flange_tcp: Pose = IDENTITY

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From the points of a file to a goal: units, orientation, speeds, blends."""
+"""The goal made of the points of a file: scale, orientation, speeds, blends."""
 
 from __future__ import annotations
 
@@ -39,33 +39,33 @@ from ur_cartesian_driver.motion.goal.goal_table import (
     WaypointRows,
 )
 
-#: Straight down, x along y of the frame.
+#: The tool straight down, with its x along y of the frame.
 _DOWN = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
-#: The share of a line that one blend takes at most.
+#: The largest share of a line that one blend uses.
 _BLEND_SHARE = 0.45
-#: A blend takes at least so long [s]: the cycle of the slowest controller is 8 ms, and arcs and
-#: processes with a blend that is passed in one are refused. At this speed where it is not known.
+#: Shortest time of a blend [s]: arcs and processes whose blend is passed in one cycle are refused,
+#: and the slowest controller's cycle is 8 ms. Assumed speed of a segment without one [m/s].
 _MIN_BLEND_TIME, _UNKNOWN_SPEED = 0.01, 0.25
 _MIN_BLEND = 1e-4
-#: Lower arcs are straight lines to the robot [m].
+#: The robot moves in a straight line instead of an arc of a smaller height [m].
 _MIN_ARC_HEIGHT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedGoal:
-    """A goal, with remarks on everything in the file that it lacks."""
+    """A goal, with remarks on everything in the file that the goal lacks."""
 
     goal: GoalTable
     remarks: tuple[ImportNote, ...]
-    #: (n,) lines of the points; 0 = added by an option.
+    #: (n,) lines of the points; 0 = the point was added by an option.
     lines: Int64s
 
 
 def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedGoal:
     """
-    Apply the options.
+    Return the goal of a path, with the options applied.
 
-    :raises BrokenFile: the points cannot be meant, such as one that is 3 km away.
+    :raises BrokenFile: a point must be a mistake, such as one that is 3 km away.
     """
     path = _scaled(path, options.scale)
     path = replace(path, quaternions=_orientations(path, options, remarks))
@@ -176,12 +176,12 @@ def _orientations(path: ImportedPath, options: ImportOptions, remarks: ImportNot
 
 
 def _against(normals: Floats, lines: Int64s) -> Floats:
-    """Return orientations with z against the normals, and x along y of the frame, or x."""
+    """Return orientations with z against the normals, and x along y (or x) of the frame."""
     lengths = np.linalg.norm(normals, axis=1)
     if not (lengths > 1e-6).all():
         raise BrokenFile(int(lines[int(np.argmin(lengths))]), 'the normal is zero')
     ez = -normals / lengths[:, None]
-    # Away from y, so that x does not jump where the surface turns by a little.
+    # Not along y if z is near it: x would jump with the slightest turn of the surface.
     reference = np.where((np.abs(ez[:, 1]) > 0.95)[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     ex = reference - np.einsum('ij,ij->i', reference, ez)[:, None] * ez
     ex = ex / np.linalg.norm(ex, axis=1)[:, None]
@@ -190,7 +190,7 @@ def _against(normals: Floats, lines: Int64s) -> Floats:
 
 
 def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
-    """Return unit quaternions (n, 4) of frames: each by its largest component."""
+    """Return unit quaternions (n, 4) of frames, each computed from its largest component."""
     squares = np.stack(
         (
             1.0 + ex[:, 0] - ey[:, 1] - ez[:, 2],
@@ -212,15 +212,14 @@ def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
 
 def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> tuple[ImportedPath, Floats]:
     """
-    Leave out lines that lead nowhere: the robot has no motion for them.
+    Leave out points that repeat the one before: the robot has no motion to them.
 
-    :returns: the path, and how long the tool rests at its points (n,) [s].
+    :returns: the path, and the times for which the tool rests at its points (n,) [s].
     """
     still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
         angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
     )
-    # An arc that ends where it begins is no arc through a third point; the joints may turn at a
-    # place, and the arm rest there.
+    # Kept are the ends of arcs, and points at which the joints turn or the arm rests.
     still &= path.types[1:] != SegmentType.CIRCULAR
     for row in rows_where(still):
         posture = path.postures.get(row + 1)
@@ -229,7 +228,7 @@ def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> tuple[Importe
     rests = np.zeros(len(path))
     if not still.any():
         return path, rests
-    # Of slow drifts every now and then one point has to stay.
+    # In a slow drift, all points are near the one before, but some of them have to be kept.
     rows, last = [0], 0
     for row in range(1, len(path)):
         if still[row - 1] and _is_same(path, row, last):
@@ -251,7 +250,7 @@ def _is_same(path: ImportedPath, row: int, other: int) -> bool:
 
 
 def _without_flat_arcs(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
-    """Make lines of arcs that are lines to the robot, and of those without a point before."""
+    """Turn an arc into a line if it is too flat for the robot, or ends at the first point."""
     arcs = path.types == SegmentType.CIRCULAR
     if not arcs.any():
         return path
@@ -274,7 +273,7 @@ def _without_flat_arcs(path: ImportedPath, remarks: ImportNotes) -> ImportedPath
 
 
 def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
-    """Go back from the surface before a contour that begins elsewhere."""
+    """Retract the tool from the surface before a contour that begins elsewhere."""
     rows = [row for row in rows_where(path.lifts) if row]
     if not rows:
         return path
@@ -284,7 +283,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
                 int(path.lines[row]), 'a contour begins elsewhere', 'straight to it, without lift'
             )
         return path
-    # Twice the row before and the row itself: up, across, down.
+    # Such a row becomes three: up from the row before, across, and down to the row itself.
     count = np.ones(len(path), dtype=np.int64)
     count[rows] = 3
     order = np.repeat(np.arange(len(path)), count)
@@ -324,7 +323,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
 
 
 def _speeds(path: ImportedPath, options: ImportOptions) -> Floats:
-    """Return the speeds (n,), 0 where the driver has to choose."""
+    """Return the speeds (n,) [m/s]; 0 = the driver chooses."""
     plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
     found = path.speeds if options.speed is None else np.where(plain, options.speed, path.speeds)
     travel = np.nan if options.travel_speed is None else options.travel_speed
@@ -344,7 +343,7 @@ def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
 def _blends(
     path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: ImportNotes
 ) -> Floats:
-    """Return radii (n,) that fit between the points; where none fits the arm stops."""
+    """Return blend radii (n,) that fit between the points [m]; 0 = none fits, the arm stops."""
     radii = np.where(np.isnan(path.blends), options.blend, path.blends)
     radii[path.rests] = 0.0
     radii[-1] = 0.0
@@ -354,7 +353,7 @@ def _blends(
     fits = radii.copy()
     fits[1:] = np.minimum(fits[1:], _BLEND_SHARE * lengths)
     fits[:-1] = np.minimum(fits[:-1], _BLEND_SHARE * lengths)
-    # The first line begins where the arm is, which nobody knows here: its blend may be long.
+    # The first line begins at an unknown place of the arm, so its length does not limit its blend.
     special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
     special[:-1] |= special[1:]
     rates = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)

@@ -3,7 +3,7 @@
 """
 The contents of an imported file, before the options are applied.
 
-Each point remembers its line, so that all that is said about it can name it.
+Each point keeps its line of the file, so that remarks and errors can name the line.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     SegmentType,
 )
 
-#: The numbers of a point that a file may leave out, and how many each has.
+#: The optional columns of a point, and the number of values in each.
 _OPTIONAL = {
     'vias': 3,
     'quaternions': 4,
@@ -35,21 +35,21 @@ _OPTIONAL = {
     'times': 1,
     'dwells': 1,
 }
-#: Farther away is no robot arm: millimetres read as metres, say [m].
+#: No arm reaches a point beyond this distance [m]: millimetres were read as metres, for example.
 MAX_DISTANCE = 20.0
 UNKNOWN3: Vector3 = (nan, nan, nan)
-#: A point that is as near as this to the one before, and turned as little, is the same one.
+#: Two points at most this far apart [m] and turned by at most this angle [rad] are the same.
 SAME_POINT, SAME_TURN = 5e-6, 1e-4
 
 
 class BrokenFile(ValueError):
-    """A file cannot be read; the sentence has the number of the line."""
+    """A file cannot be read; the message has the number of the line."""
 
     def __init__(self, line: int, text: str, unit: str = 'line') -> None:
         """
-        Put the line before a sentence without a full stop; 0 = no line to blame.
+        Put the line before a sentence without a full stop; 0 = no line is to blame.
 
-        :param unit: the unit that is counted in a file without lines.
+        :param unit: the word for a numbered item, for a file without lines.
         """
         super().__init__(f'{unit} {line}: {text}.' if line else f'{text}.')
         self.line = line
@@ -59,7 +59,7 @@ class BrokenFile(ValueError):
 class ImportNote:
     """Something that was left out, or taken in another form."""
 
-    #: 1-based, in rising order; empty = it concerns the whole file.
+    #: 1-based lines, in rising order; empty = the note concerns the whole file.
     lines: tuple[int, ...]
     what: str
     why: str
@@ -68,7 +68,7 @@ class ImportNote:
         """
         Return one line of text.
 
-        :param max_ranges: ranges of lines that are named; of the others only the number of lines.
+        :param max_ranges: number of ranges of lines that are named; other lines are only counted.
         """
         if not self.lines:
             return f'{self.what}: {self.why}'
@@ -94,20 +94,20 @@ def _ranges(lines: Sequence[int]) -> Iterator[tuple[int, int]]:
 
 
 class ImportNotes:
-    """Collects remarks; the lines of equal ones come together."""
+    """Collects remarks; equal remarks are merged into one with all their lines."""
 
     def __init__(self) -> None:
         """Begin with none."""
         self._lines: dict[tuple[str, str], set[int]] = {}
 
     def add(self, line: int, what: str, why: str) -> None:
-        """Say something about a line; 0 = about the whole file."""
+        """Add a remark on a line; 0 = on the whole file."""
         lines = self._lines.setdefault((what, why), set())
         if line:
             lines.add(line)
 
     def result(self) -> tuple[ImportNote, ...]:
-        """Return the remarks in the order in which they came first."""
+        """Return the remarks in the order of their first occurrence."""
         return tuple(
             ImportNote(lines=tuple(sorted(lines)), what=what, why=why)
             for (what, why), lines in self._lines.items()
@@ -117,7 +117,7 @@ class ImportNotes:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ImportedPath:
     """
-    Points in columns, n rows [m, m/s, s]; NaN where the file says nothing.
+    Points in columns, n rows [m, m/s, s]; NaN = the file has no value.
 
     The motion of a row ends at its point.
     """
@@ -127,7 +127,7 @@ class ImportedPath:
     lines: Int64s
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
     types: Int64s
-    #: (n,) whether the tool only travels, and whether it has to be lifted for that.
+    #: (n,) whether a motion is only travel, and whether the tool has to be lifted for it.
     travels: Flags
     lifts: Flags
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`.
@@ -136,14 +136,14 @@ class ImportedPath:
     vias: Floats
     quaternions: Floats
     normals: Floats
-    #: (n,)
+    #: (n,) numbers in each of the following columns.
     speeds: Floats
     accelerations: Floats
     blends: Floats
     times: Floats
-    #: (n,) how long the arm rests at the point.
+    #: (n,) time for which the arm rests at the point.
     dwells: Floats
-    #: By row.
+    #: The postures that the file gives, by row.
     postures: Mapping[int, Posture] = field(default_factory=dict)
     outputs: tuple[IOCommand, ...] = ()
     waits: tuple[InputWait, ...] = ()
@@ -155,13 +155,13 @@ class ImportedPath:
 
     @property
     def rests(self) -> Flags:
-        """At which points (n,) the arm rests for a time, or waits for an input."""
+        """Flags (n,) of the points at which the arm rests for a time, or waits for an input."""
         found = self.dwells > 0.0
         found[[wait.waypoint for wait in self.waits]] = True
         return found
 
     def take(self, rows: Int64s) -> ImportedPath:
-        """Return rows, in rising order; outputs of a row that is gone move to the one before."""
+        """Return some rows, in rising order; outputs of others move to the kept row before."""
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,
@@ -185,7 +185,7 @@ _COLUMNS = (
 
 
 class PathCollector:
-    """Takes the points of a file one by one."""
+    """Collects the points of a file."""
 
     def __init__(self) -> None:
         """Begin without points."""
@@ -246,7 +246,7 @@ class PathCollector:
     def add_lines(
         self, lines: Sequence[int], positions: Floats, **optional: Floats | None
     ) -> None:
-        """Add points of a table, the columns as in :class:`ImportedPath`, None = unknown."""
+        """Add points of a table, in columns as in :class:`ImportedPath`; None = unknown."""
         row = len(self._positions)
         self._positions.extend(positions.tolist())
         plain = (SegmentType.LINEAR, False, False, ArcMode.UNCONSTRAINED)
@@ -256,11 +256,11 @@ class PathCollector:
                 self._optional[name].update(enumerate(values.tolist(), row))
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the newest point, at the first one if there is none yet."""
+        """Switch an output at the newest point, or at the first one if there is none yet."""
         self._outputs.append(replace(output, waypoint=max(0, len(self) - 1)))
 
     def leave_out(self, rows: range, what: str, why: str) -> None:
-        """Take points back, and say so; the tool is lifted before the next point."""
+        """Remove points again, with a remark; the tool is lifted before the next point."""
         self._left_out.update(rows)
         for row in rows:
             self.remarks.add(self._plain[row][0], what, why)
@@ -271,9 +271,9 @@ class PathCollector:
 
     def path(self) -> ImportedPath:
         """
-        Return what was collected.
+        Return the collected points.
 
-        :raises BrokenFile: that are no points.
+        :raises BrokenFile: there are no points.
         """
         kept = [row for row in range(len(self)) if row not in self._left_out]
         if not kept:

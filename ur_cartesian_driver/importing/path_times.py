@@ -3,8 +3,8 @@
 """
 Times of the points of a file.
 
-They come from any clock: seconds since the robot was switched on, Unix times. In a goal the first
-one is the time for the way to the first point, which is 0 only where the arm stands already.
+They can come from any clock: seconds since the robot was switched on, or Unix times. In a goal,
+the first time is that of the motion to the first point; it is 0 only if the arm is already there.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ur_cartesian_driver.importing.imported_path import ImportedPath, ImportNote
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
-#: A tool that stands for so long rests [s]; shorter, it may be slow: it has 5 um to go.
+#: Shortest standstill that is a rest [s]; in a shorter one the tool may move slowly within 5 um.
 _MIN_REST = 0.5
-#: A step in time that is as long as this [s], and so many times the median, is a gap.
+#: A gap is a step in time that is longer than this [s] and than this multiple of the median step.
 _MIN_GAP, _GAP = 1.0, 20.0
 
 
@@ -28,9 +28,9 @@ def with_times(
     path: ImportedPath, rests: Floats, options: ImportOptions, remarks: ImportNotes
 ) -> ImportedPath:
     """
-    Keep times that rise, unless there are speeds.
+    Return the path with times from the start of the goal, or without if they cannot be kept.
 
-    :param rests: (n,) how long the tool stands at its points by these times [s].
+    :param rests: (n,) times for which the tool stands still at the points [s].
     """
     if np.isnan(path.times).all():
         return path
@@ -55,7 +55,7 @@ def with_times(
     begin, rests = rests[0], np.where(rests > _MIN_REST, rests, 0.0)
     steps -= rests[:-1]
     if first == 0.0:
-        # Nothing leads to a point where the arm stands already: the motion begins at once.
+        # The arm is already at the first point, so the motion begins at once.
         if rests[0]:
             remarks.add(0, f'a rest of {begin:.3g} s at the first point', 'it is left out')
         times[1:] -= begin

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Our own recordings (doc/recordings.md): the measured path of the tool, freedriven or not."""
+"""Our recordings (doc/recordings.md): the measured path of the tool, which may be freedriven."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes,
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Posture, SegmentType
 
-#: Of the bits of a recording.
+#: The outputs of the bits in a recording.
 _OUTPUTS = (
     *((OutputKind.STANDARD_DIGITAL, pin) for pin in range(8)),
     *((OutputKind.CONFIGURABLE_DIGITAL, pin) for pin in range(8)),
     *((OutputKind.TOOL_DIGITAL, pin) for pin in range(2)),
 )
-#: No pose, angle or time of a recording is as large.
+#: All poses, angles and times of a recording are smaller than this.
 _MAX_NUMBER = 1e9
 
 TERMS = term_table(
@@ -59,11 +59,11 @@ TERMS = term_table(
 
 def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
-    Read a recording; its lines are packets, counted from 1.
+    Read a recording; the numbers of its packets, from 1, take the place of lines.
 
     The arm first goes to the beginning by a joint motion, in the posture of the recording.
 
-    :raises BrokenFile: it is no recording, or a damaged one.
+    :raises BrokenFile: the file is no recording, or is damaged.
     """
     try:
         recording = Recording.load(str(file))
@@ -80,7 +80,6 @@ def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -
         for i in np.flatnonzero(bits[1:] != bits[:-1])
         if bits[i] >= 0 and bits[i + 1] >= 0
     }
-    # A packet in which nothing moves is no point.
     first = (
         Posture(names=JOINT_NAMES, values=tuple(recording.actual_q[0].tolist()))
         if len(recording.time)
@@ -104,7 +103,7 @@ def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -
 
 
 def _say_others(remarks: ImportNotes) -> None:
-    """Say which streams are left out."""
+    """Add remarks on the arrays of recordings that are left out."""
     by_reason: dict[str, list[str]] = {}
     for term in TERMS.values():
         if term.treatment is Treatment.LEFT_OUT:
@@ -114,7 +113,7 @@ def _say_others(remarks: ImportNotes) -> None:
 
 
 def _check_packets(recording: Recording) -> None:
-    """Refuse the first packet that no robot has sent."""
+    """Refuse a recording with a packet that no robot can have sent."""
     poses, times = recording.actual_pose, recording.time
     if poses.shape != (len(times), 7):
         raise BrokenFile(0, f'the poses are an array of {poses.shape}, not of seven columns')
@@ -128,7 +127,7 @@ def _check_packets(recording: Recording) -> None:
 
 
 def _refuse_first(wrong: ArrayLike, why: str) -> None:
-    """Refuse the first packet that is wrong."""
+    """Refuse the recording if packets are wrong, and name the first of them."""
     for row in np.flatnonzero(wrong)[:1]:
         raise BrokenFile(int(row) + 1, why, 'packet')
 

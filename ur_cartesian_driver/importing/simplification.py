@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Fewer points: rows of short lines become long lines and arcs.
+Fewer points: sequences of short lines become long lines and arcs.
 
-The bound holds in both directions: no place of the old path is farther from the new one than the
-tolerance, and no place of the new path is farther from the old one. A line holds it if the points
-between do, because both paths are straight between them. An arc is compared with the points and
-with the place of each short line that is nearest to its centre. Along it the angle only grows, so
-every place of the arc has one of the old path beside it.
+The tolerance holds in both directions: it bounds the distance of each place of the old path from
+the new one, and of each place of the new path from the old one. A line is within it if the points
+between its ends are, because both paths are straight between them. An arc is compared with the
+points, and with the place of each short line that is nearest to the arc's centre. Along the old
+path the angle only grows, so every place of the arc has a place of the old path beside it.
 
-Points with an output, a posture, another speed, or a turn of the tool that is not even stay.
+A point stays if it has an output, a posture or another speed, or if the tool turns unevenly there.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, interpolate_rows
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
-#: How far the orientation of a point that is left out may be from the new path [rad].
+#: Largest angle between the orientations of a point that is left out and of the new path [rad].
 MAX_TURN = radians(0.5)
-#: An arc replaces at least so many lines, and turns by no more [rad].
+#: The smallest number of lines that an arc replaces, and the largest angle of an arc [rad].
 _MIN_LINES = 4
 _MAX_ARC = 0.9 * pi
-#: Flatter arcs are lines to the robot: their height [m].
+#: Smallest height of an arc [m]: the robot treats flatter arcs as lines.
 _MIN_HEIGHT = 2e-5
-#: Of the bound, for the rounding of numbers.
+#: Factor on the tolerance that allows for rounding errors.
 _ROUNDING = 1.0 - 1e-9
 
 
@@ -46,10 +46,10 @@ class _Piece(NamedTuple):
 
 def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> ImportedPath:
     """
-    Return a path with fewer points that is nowhere farther from the old one.
+    Return a path with fewer points that is nowhere farther than a tolerance from the old one.
 
     :param tolerance: the largest distance [m].
-    :param orientations: (n, 4) of the tool at the points.
+    :param orientations: (n, 4) orientations of the tool at the points.
     """
     if tolerance <= 0.0 or len(path) < 3:
         return path
@@ -74,10 +74,10 @@ def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> Impo
 
 def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], object]) -> int:
     """
-    Return an end of a piece that holds: twice as far each time, then in between.
+    Return an end to which a piece is possible, found by doubling the step and then by bisection.
 
-    :param first: the nearest end to try; where it does not hold, the end is the next row.
-    :param holds: asked with start and end.
+    :param first: the nearest end to try; if it is not possible, return the row after the start.
+    :param holds: returns whether a piece from a start to an end is possible.
     """
     if not holds(start, first):
         return start + 1
@@ -99,7 +99,7 @@ def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], 
 
 
 def _ends_of_runs(path: ImportedPath) -> list[int]:
-    """Return the rows that have to stay, beside the first: between them are equal lines."""
+    """Return the rows after the first that have to stay; only similar lines are between them."""
     stays = path.rests
     stays[-1] = True
     lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
@@ -136,7 +136,7 @@ class _Simplifier:
         return _Piece(end, via)
 
     def _first_test(self) -> Flags:
-        """Return for each row whether the point after it may be left out: a quick look at all."""
+        """Return for each row whether the next point could be left out: a quick test of all."""
         a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
         chord = c - a
         square = np.einsum('ij,ij->i', chord, chord)
@@ -153,7 +153,7 @@ class _Simplifier:
             return False
         along = (between - a) @ chord / length**2
         off = between - a - along[:, None] * chord
-        # Past the ends the path would go to and fro.
+        # If a point is past the ends, the old path goes back and forth there.
         if along.min() < 0.0 or along.max() > 1.0:
             return False
         if np.einsum('ij,ij->i', off, off).max() > self.tolerance**2:
@@ -161,7 +161,7 @@ class _Simplifier:
         return self._turns_evenly(start, end, along)
 
     def _arc(self, start: int, end: int) -> Floats | None:
-        """Return the middle of the arc from one row to another; None = it is none."""
+        """Return the middle of the arc from one row to another; None = no arc fits."""
         p = self.points[start : end + 1]
         a, m, b = p[0], p[(end - start) // 2], p[-1]
         u, v = m - a, b - a

@@ -27,8 +27,8 @@ def file_text(path: Path) -> str:
     """
     Return the text of a file: UTF-8, UTF-16 or UTF-32 by its mark, or Windows-1252.
 
-    :raises BrokenFile: it is binary.
-    :raises OSError: it cannot be opened.
+    :raises BrokenFile: the file is binary.
+    :raises OSError: the file cannot be opened.
     """
     return decoded(path.read_bytes())
 
@@ -37,8 +37,8 @@ def decoded(data: bytes, code_page: str = 'cp1252') -> str:
     """
     Return the text of a file as :func:`file_text` does.
 
-    :param code_page: the codec if the text is no UTF-8; an unknown one counts as Windows-1252.
-    :raises BrokenFile: it is binary.
+    :param code_page: the codec if the text is no UTF-8; Windows-1252 replaces an unknown one.
+    :raises BrokenFile: the file is binary.
     """
     encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')
     try:
@@ -56,7 +56,8 @@ def _by_code_page(data: bytes, code_page: str) -> str:
     try:
         return data.decode(code_page)
     except (LookupError, UnicodeDecodeError):
-        # Old programs write the code page of their Windows; Latin-1 has its five missing bytes.
+        # Old programs write the code page of their Windows. Windows-1252 lacks five bytes, such as
+        # 0x81, which Latin-1 has.
         return data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
 
 

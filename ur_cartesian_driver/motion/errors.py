@@ -23,7 +23,7 @@ The errors of this package: one class, and one code of the action, for each way 
     |   |-- ProtectiveStop, EmergencyStop, ProgramStopped, ConnectionLost
     |   |-- Preempted, Cancelled
     |   `-- ExecutionFailed          the robot program failed, or the robot left the plan
-    `-- ProtocolError            counts as a lost connection
+    `-- ProtocolError            ends a goal like a lost connection
         |-- LocalProtocolError       we tried to send something illegal; nothing was sent
         `-- RemoteProtocolError      the robot sent nonsense; its bytes are in the text
 
@@ -68,11 +68,11 @@ class DriverError(Exception):
 
     #: The action's code for this error.
     code: ClassVar[ErrorCode]
-    #: The report of the goal that failed, where the error was raised from its outcome.
+    #: The report of the failed goal if the error was raised from its outcome; else empty.
     report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle and copy by the finished sentence, because constructors take facts."""
+        """Pickle and copy with the finished sentence, because constructors take its parts."""
         return _restore, (type(self), str(self)), self.__dict__
 
 
@@ -80,7 +80,7 @@ class GoalRefused(DriverError):
     """A goal was refused before anything moved."""
 
     def reworded(self, sentence: str) -> GoalRefused:
-        """Return the same refusal in another sentence."""
+        """Return the same refusal with another sentence."""
         return _restore(type(self), sentence)
 
 
@@ -88,16 +88,16 @@ class InvalidGoal(GoalRefused):
     """The goal contradicts itself or the rules; the text names point and field."""
 
     code = ErrorCode.INVALID_GOAL
-    #: The field that is wrong; empty where the error was raised from an outcome.
+    #: The wrong field; empty if the error was raised from an outcome.
     field = ''
 
     def __init__(self, field: str, problem: str, remedy: str = '') -> None:
         """
         Build the sentence.
 
-        :param field: where, for example ``trajectory.points[2].pose.orientation``.
-        :param problem: the fault there, with value and bound.
-        :param remedy: what to do.
+        :param field: the wrong field, for example ``trajectory.points[2].pose.orientation``.
+        :param problem: its fault, with value and bound.
+        :param remedy: the advice, if there is any.
         """
         super().__init__(f'{field} {problem}' + (f'; {remedy}.' if remedy else '.'))
         self.field = field
@@ -108,14 +108,14 @@ class NotAvailable(InvalidGoal):
 
 
 class AlreadySent(InvalidGoal):
-    """Points that are to be replaced have been sent; the text says which ones can be."""
+    """Points to be replaced were sent already; the text names the first replaceable one."""
 
     #: The first point that can be replaced, and the earliest time [s].
     first_point = 0
     first_time = 0.0
 
     def __init__(self, first_point: int, first_time: float) -> None:
-        """Take the replaceable tail; its time counts as the points' [s]."""
+        """Take the first replaceable point and time, which is meant as ``time_from_start`` [s]."""
         DriverError.__init__(
             self,
             'What is to be replaced has been sent to the robot; replace from point '
@@ -129,7 +129,7 @@ class TooFast(InvalidGoal):
 
 
 class InvalidJoints(GoalRefused):
-    """Posture joints are unknown or doubled, or names and values differ in number."""
+    """Posture joints are unknown or named twice, or names and values differ in number."""
 
     code = ErrorCode.INVALID_JOINTS
 
@@ -171,7 +171,7 @@ class CollisionPredicted(GoalRefused):
 
 
 class RobotNotReady(GoalRefused):
-    """The robot cannot take a goal now; the text names the next step."""
+    """The robot cannot accept a goal now; the text names the next step."""
 
     code = ErrorCode.ROBOT_NOT_READY
 
@@ -211,13 +211,13 @@ class ProgramStopped(ExecutionEnded):
 
 
 class ConnectionLost(ExecutionEnded):
-    """A connection to the robot broke, or its states come too late."""
+    """A connection to the robot broke, or its states arrive too late."""
 
     code = ErrorCode.CONNECTION_LOST
 
 
 class Preempted(ExecutionEnded):
-    """A newer goal took its place."""
+    """A newer goal took the place of this one."""
 
     code = ErrorCode.PREEMPTED
 
@@ -252,8 +252,8 @@ class RemoteProtocolError(ProtocolError):
     """
 
 
-#: The error of every code but SUCCESSFUL: the direct subclasses of :class:`GoalRefused`, raised
-#: before the motion, and of :class:`ExecutionEnded`, which end it.
+#: The error class for every code but SUCCESSFUL: the direct subclasses of :class:`GoalRefused`
+#: (raised before the motion) and of :class:`ExecutionEnded` (which end it).
 ERRORS: Mapping[ErrorCode, type[DriverError]] = {
     error.code: error
     for error in sorted(

@@ -24,9 +24,9 @@ class TrajectoryResult(IntEnum):
     SUCCESS = 0
     CANCELED = 1
     FAILURE = 2
-    #: Of our own program only, and those that follow.
+    #: This result and the following ones come from our own robot program only.
     INPUT_MISSING = 3
-    #: The tool has touched, where that ends the trajectory, or has not.
+    #: The tool made contact, which ends the trajectory; or a required contact did not come.
     CONTACT = 4
     NO_CONTACT = 5
 
@@ -60,7 +60,7 @@ class PreemptRequested:
     by: str = 'a newer motion'
 
 
-#: The connection to the RTDE inputs, as :class:`LinkLost` names it.
+#: The name of the connection to the RTDE inputs in :class:`LinkLost`.
 INPUTS_LINK = 'RTDE inputs'
 
 
@@ -74,7 +74,7 @@ class LinkLost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tick:
-    """Time passed; sent every 20 ms, so that timeouts end when nothing else happens."""
+    """Time passed; sent every 20 ms, so that timeouts expire even if nothing else happens."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,11 +93,11 @@ class OffsetReceived:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputsSecured:
-    """The outputs that have to be safe were written to the robot, as far as possible."""
+    """The safe outputs were written to the robot, as far as possible."""
 
-    #: Those that had another value, with that value.
+    #: The outputs whose values were changed, with the values before.
     changed: tuple[SafeOutput, ...] = ()
-    #: Which ones are as they were, and why, as a sentence; empty = all are safe.
+    #: The sentence that names the outputs that were not written, and why; empty = all are safe.
     failure: str = ''
 
 
@@ -133,12 +133,12 @@ class Progress:
     actual_pose: Pose
     actual_twist: Vector6 = ZERO6
     actual_acceleration: Vector6 | None = None
-    #: Joints as the controller wants them and as they are [rad], [rad/s].
+    #: Joint positions [rad] and velocities [rad/s], as desired by the controller and as measured.
     desired_q: Vector6 = ZERO6
     desired_qd: Vector6 = ZERO6
     actual_q: Vector6 = ZERO6
     actual_qd: Vector6 = ZERO6
-    #: Expected time of the desired pose from the start of the motion [s].
+    #: Expected time of the desired pose, from the start of the motion [s].
     time: float = 0.0
     #: Planned time that is left, at full speed scaling [s].
     time_remaining: float = 0.0
@@ -147,13 +147,13 @@ class Progress:
     points_received: int = 0
     #: Motion time of the points that the robot holds and has not begun [s].
     buffered: float = 0.0
-    #: SERVO: how far the arm is behind the newest set-point, as nominal time [s].
+    #: SERVO: nominal time by which the arm is behind the newest set-point [s].
     lag: float = nan
     #: The controller's clock [s].
     timestamp: float = 0.0
     #: Whether the arm is at rest and the goal waits for more points (keep_open).
     awaiting_points: bool = False
-    #: How far the path has given way: along, across, normal [m].
+    #: Displacement of the tool by path offsets: along, across, normal [m].
     path_offset: Vector3 = ZERO3
 
 
@@ -163,8 +163,9 @@ class PathPlace:
 
     #: Index of the point to which its segment leads.
     point: int
-    #: How much of the segment lies before it, 0 to 1: of its length, of a joint motion's travel,
-    #: of a spline's time. In a blend it runs on to the point, and on from there.
+    #: Fraction of the segment before the place, 0 to 1: of its length, of the travel of a joint
+    #: motion, of the time of a spline. In the first half of a blend it rises to 1; the second half
+    #: belongs to the next segment, whose fraction rises from 0 there.
     fraction: float
 
 
@@ -175,13 +176,13 @@ class Outcome:
     code: ErrorCode
     text: str
     report: tuple[str, ...] = ()
-    #: Where on its path a goal was when it was stopped; the arm came to rest some millimetres
-    #: later. None = it succeeded, the arm had not begun to move, or nobody knows.
+    #: The place on the path at which the goal was stopped; the arm came to rest some millimetres
+    #: farther on. None = the goal succeeded, the arm had not begun to move, or it is not known.
     stopped: PathPlace | None = None
 
     @property
     def succeeded(self) -> bool:
-        """Tell whether the goal was reached (or passed all checks, when only these were asked)."""
+        """Whether the goal was reached (or passed all checks, if only these were requested)."""
         return self.code is ErrorCode.SUCCESSFUL
 
     def raise_for_error(self) -> Outcome:
@@ -192,8 +193,8 @@ class Outcome:
         the table of codes and classes is :data:`~ur_cartesian_driver.motion.errors.ERRORS`.
 
         :raises GoalRefused: nothing has moved.
-        :raises ExecutionEnded: the goal ended before its last point. Both carry the text and the
-            ``report`` of this outcome.
+        :raises ExecutionEnded: the goal ended before its last point. Like GoalRefused, the error
+            carries the text and the ``report`` of this outcome.
         """
         if not self.succeeded:
             raise error_of_outcome(self.code, self.text, self.report)

@@ -1,19 +1,19 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The functions of others in the robot program: goals call them by name, it by number."""
+"""The user's functions in the robot program: goals call them by name, the program by number."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-#: How many arguments a trajectory point carries.
+#: The largest number of arguments in a trajectory point.
 MAX_ARGUMENTS = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreludeFunction:
-    """A function, and how many arguments it takes."""
+    """A function, and the numbers of its required and of all its arguments."""
 
     name: str
     required: int = 0
@@ -21,16 +21,16 @@ class PreludeFunction:
 
     @property
     def counts(self) -> str:
-        """The number of its arguments, as part of a sentence."""
+        """The number of arguments, as part of a sentence."""
         between = '' if self.required == self.allowed else f'{self.required} to '
         return f'{between}{self.allowed or "no"} argument{"s" * (self.allowed != 1)}'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prelude:
-    """URScript of others that has been checked, and the functions that it defines."""
+    """The user's URScript after its check, and the functions that it defines."""
 
-    #: Where it comes from, for sentences.
+    #: The file from which it comes, for error messages.
     file: str = ''
     lines: tuple[str, ...] = ()
     functions: tuple[PreludeFunction, ...] = ()
@@ -40,7 +40,7 @@ class Prelude:
         return next((function for function in self.functions if function.name == name), None)
 
     def number(self, name: str, arguments: int) -> int:
-        """Return the number by which the program calls a function with so many arguments."""
+        """Return the number by which the program calls a function with that many arguments."""
         return self._calls().index((name, arguments))
 
     def dispatch(self) -> Iterator[str]:

@@ -14,15 +14,15 @@ program that start with ``#!`` are instructions for this module:
 ``#! prelude``
     insert the script prelude, as it is.
 ``#! calls``
-    insert the code that calls its functions by their numbers.
+    insert the code that calls the functions of the prelude by their numbers.
 ``#! if FEATURE`` ... ``#! end``
     keep these lines only if the controller's software has the feature, because a controller
-    refuses a program that names an unknown function. ``freedrive`` does not depend on the
-    software: its lines are kept if freedrive is allowed. Nor does ``prelude``: if there is one.
+    refuses a program that names an unknown function. Two features do not depend on the software:
+    lines for ``freedrive`` are kept if freedrive is allowed, and for ``prelude`` if there is one.
 
 The program is sent without empty lines, and without comments except the markers of the External
 Control node. Programs on the pendant share one name space with ours, so each name that the program
-defines on its first level (variables, functions, threads) gets a :data:`PREFIX` there.
+defines on its first level (variables, functions, threads) is sent with the :data:`PREFIX`.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 
-#: Begins the name of every global variable, function and thread on the robot.
+#: Prefix of the name of every global variable, function and thread on the robot.
 PREFIX = 'urcd_'
 
 #: Comments by which the External Control node divides the program.
@@ -62,13 +62,13 @@ _DEFINITION = re.compile(r'(?:def|thread) (\w+)\(|(\w+) = ')
 _STRING_OR_NAME = re.compile(r'"[^"]*"|\w+')
 
 #: The buffered servo repeats a set-point until each joint is within this tolerance [rad], but at
-#: most so many times, as in the manufacturer's guide.
+#: most this number of times, as in the manufacturer's guide.
 SERVO_TOLERANCE = 0.2
 SERVO_MAX_REPEATS = 500
-#: A set-point that comes more steps after the previous one counts as one step, as in the guide.
+#: If more than this many steps lie between two set-points, one step is assumed, as in the guide.
 SERVO_MAX_STEPS = 50
 
-#: None is known to have it.
+#: For a feature that no version is known to have.
 _NO_VERSION = (1000, 0, 0)
 #: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -79,36 +79,36 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 
 #: Constants of the spline interpolation.
 SPLINE_CONSTANTS: dict[str, float] = {
-    #: The least acceleration of speedj brakes the fastest joint in this time [s], between these
-    #: bounds [rad/s^2].
+    #: The smallest acceleration for speedj brakes the fastest joint in this time [s], but lies
+    #: within these bounds [rad/s^2].
     'BRAKING_TIME': 0.025,
     'MIN_BRAKING': 1.0,
     'MAX_ACCELERATION': 40.0,
-    #: A call that takes so many steps has ended late: the arm has coasted.
+    #: A call that takes at least this number of steps has ended late: the arm has coasted.
     'COASTED': 2.0,
-    #: Fraction of its time for which a step that the slider shortens calls speedj.
+    #: If the slider shortens a step, speedj is called for this fraction of its time.
     'SHORT_CALL': 0.9,
-    #: From this fraction on the arm moves at full speed, and below this one it nearly stands.
+    #: Above the first fraction the arm moves at full speed; below the second it nearly stands.
     'FULL_SPEED': 0.999,
     'MIN_FRACTION': 0.01,
-    #: A call that moves the arm by this fraction more or less than expected took one step.
+    #: A call took one step if the arm moved as far as expected, give or take this fraction.
     'SAME_STEP': 0.02,
     #: Fraction of the position error that is corrected in one step.
     'CORRECTION': 0.4,
     #: Deceleration at the end of the last piece [rad/s^2], and the highest mean joint speed of a
-    #: piece [rad/s]; the client library's numbers, as the next one.
+    #: piece [rad/s]; these numbers and START_TOLERANCE are the client library's.
     'MAX_DECELERATION': 15.0,
     'MAX_SPEED': 20.0,
-    #: Largest distance of a first point without time from the arm [rad].
+    #: Largest distance from the arm to a first point that has no time [rad].
     'START_TOLERANCE': 0.01,
-    #: A spline ends at most so far from its end [rad]: the rest is a movej, at an acceleration
-    #: [rad/s^2] and a speed [rad/s].
+    #: If a spline stops farther than this from its end [rad], a movej covers the rest, at an
+    #: acceleration [rad/s^2] and a speed [rad/s].
     'END_TOLERANCE': 1e-05,
     'END_ACCELERATION': 15.0,
     'END_SPEED': 1.0,
     #: Below this speed the arm is at rest [rad/s].
     'REST_SPEED': 0.0001,
-    #: The progress of a smaller step cannot be measured [rad].
+    #: Smallest step whose progress can be measured [rad].
     'MIN_STEP': 1e-06,
     #: Smaller differences [s] or [rad] are rounding errors.
     'ROUNDING': 1e-10,
@@ -116,39 +116,39 @@ SPLINE_CONSTANTS: dict[str, float] = {
 
 #: Constants of force mode.
 PRESS_CONSTANTS: dict[str, float] = {
-    #: The arm stands for so long before it begins [s], as the manual advises.
+    #: The arm stands still for this time before force mode begins [s], as the manual advises.
     'REST_TIME': 0.02,
-    #: Way back to where the tool touched, at an acceleration [m/s^2] and a speed [m/s].
+    #: Acceleration [m/s^2] and speed [m/s] of the way back to the place of contact.
     'RETURN_ACCELERATION': 0.5,
     'RETURN_SPEED': 0.02,
-    #: The step of a CB3 controller [s], which has no gain of force mode.
+    #: The step of a CB3 controller [s], whose force mode has no gain.
     'STEP_WITHOUT_GAIN': 0.008,
 }
 
 #: Constants of path offsets.
 OFFSET_CONSTANTS: dict[str, float] = {
-    #: Frame of an offset for the controller: the axes of the base.
+    #: The controller's number for offsets along the axes of the base.
     'FRAME_BASE': 1,
     #: Time constant of the controller's filter [s]: a coefficient of 0.1 at 500 Hz, which the
     #: manual calls a good compromise for welding.
     'FILTER_TIME': 0.018,
-    #: The controller's limit of rotational offsets as it comes [rad]; there are none here.
+    #: The controller's default limit of rotational offsets [rad], which are not used here.
     'MAX_TURN': 0.52,
-    #: An offset brakes with this part of its acceleration, and is at its target when it is as
-    #: near [m]; in the driver too.
+    #: An offset brakes with this fraction of its acceleration, and has reached its target within
+    #: this distance [m]; both as in the driver.
     'BRAKING': BRAKING_FRACTION,
     'TOLERANCE': ARRIVAL_TOLERANCE,
-    #: Largest change of the offset's time rate, which follows the motion's [1/s].
+    #: Largest change of the offset's time rate, which follows that of the motion [1/s].
     'RATE_CHANGE': 10.0,
-    #: In a shorter time the offset does not move [s].
+    #: Shortest time in which the offset moves [s].
     'MIN_TIME': 1e-6,
-    #: A tool that is no farther away is on its path [m].
+    #: The tool is on its path if it is no farther away than this [m].
     'GONE': 1e-6,
 }
 
 #: Cycles by which an output is switched early: it takes effect at the end of its cycle.
 OUTPUT_LEAD = 1.5
-#: Number of words kept for a pending output, and the names of their columns.
+#: The number of words kept for a pending output, and the names of the columns that are used.
 OUTPUT_WORDS = 18
 OUTPUT_COLUMNS = {
     point_fields.PointField.OUTPUT_KIND: 'KIND',
@@ -159,8 +159,8 @@ OUTPUT_COLUMNS = {
 }
 
 
-#: State of an analog output that follows the speed: its law as a record has it, whether it
-#: follows, and the filtered speed [m/s].
+#: State of an analog output that follows the speed: its law in the order of a record, whether it
+#: follows now, and the filtered speed [m/s].
 FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
 
 
@@ -173,7 +173,7 @@ class ProgramSettings:
     reverse_port: int
     trajectory_port: int
     script_command_port: int
-    #: By which the driver recognises this program; drawn by lot, not 0.
+    #: The number by which the driver recognises this program; random, not 0.
     number: int = 1
     #: Software version of the controller: major, minor, bugfix.
     version: tuple[int, int, int] = (5, 21, 0)
@@ -188,11 +188,11 @@ class ProgramSettings:
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may switch to freedrive.
     allow_freedrive: bool = False
-    #: The functions of others that it contains.
+    #: The user's functions that the program contains.
     prelude: Prelude = NO_PRELUDE
 
     def __post_init__(self) -> None:
-        """Refuse a host that could not stand in a quoted string."""
+        """Refuse a host whose characters could break the quoted string in the program."""
         if not self.host or not all(c.isalnum() or c in '.-_:' for c in self.host):
             raise LocalProtocolError(
                 f'reverse_ip: {self.host!r} is not a host name or address; set it to the address '
@@ -219,7 +219,7 @@ def render(settings: ProgramSettings) -> str:
 
 
 class _ForeignLine(str):
-    """A line whose names are not ours."""
+    """A line of the prelude or its calls, whose names get no prefix."""
 
     __slots__ = ()
 
@@ -244,12 +244,12 @@ def wrap_in_program(text: str) -> str:
 
 
 def _is_comment(line: str) -> bool:
-    """Tell whether the robot does not need a line."""
+    """Return whether a line is empty or a comment, so that the robot does not need it."""
     return line not in MARKERS and line.lstrip()[:1] in ('', '#')
 
 
 def has_feature(feature: str, version: tuple[int, int, int]) -> bool:
-    """Tell whether the controller's software has a feature of :data:`FEATURES`."""
+    """Return whether the controller's software has a feature of :data:`FEATURES`."""
     classic, polyscope_x = FEATURES[feature]
     return version >= (polyscope_x if version[0] >= 10 else classic)
 
@@ -314,7 +314,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
 
 
 def _message_constants() -> Iterator[str]:
-    """Yield the numbers that stand in messages of the driver."""
+    """Yield the numbers that occur in messages of the driver."""
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', point_fields.MotionType)
@@ -329,7 +329,7 @@ def _message_constants() -> Iterator[str]:
 def _output_constants() -> Iterator[str]:
     """Yield the constants of safe outputs, and of outputs that are due along the path."""
     yield from _enum('SAFE_OUTPUTS', script_command.SafeOutputsAction)
-    # Index in the list that the robot reads: behind its length, command, action and token.
+    # Index in the list that the robot reads: after its length, command, action and token.
     yield 'SAFE_DIGITAL = 4'
     yield f'SAFE_ANALOG = {4 + script_command.DIGITAL_OUTPUTS}'
     yield f'DIGITAL_OUTPUTS = {script_command.DIGITAL_OUTPUTS}'
@@ -377,7 +377,7 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVOJ_LOOKAHEAD_TIME = {settings.servoj_lookahead_time}'
     yield f'SERVO_ALLOW_FREEDRIVE = {settings.allow_freedrive}'
     yield f'SERVO_BUFFER_DEPTH = {settings.servo_buffer_depth}'
-    # A list as long as the buffer: old controllers cannot make one in another way.
+    # A list as long as the buffer, written out because old controllers cannot make it otherwise.
     yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
     yield f'SERVO_ROW = {[0.0] * 6}'
     yield f'SERVO_MAX_STEPS = {SERVO_MAX_STEPS}'

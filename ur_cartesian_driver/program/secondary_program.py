@@ -3,7 +3,7 @@
 """
 Secondary programs: they run beside the running program, within one step of the controller.
 
-They do what has to be done while our own program does not run.
+They are used while our own program does not run.
 """
 
 from __future__ import annotations

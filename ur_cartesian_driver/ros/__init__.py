@@ -3,7 +3,7 @@
 """
 The ROS interface: the node, its action, topics, services and parameters, and their messages.
 
-No package below this one knows ROS::
+No package of a lower layer imports ROS. The node in a program::
 
     rclpy.init()
     node = CartesianDriverNode(parameter_overrides={'robot_ip': '192.168.56.101'})

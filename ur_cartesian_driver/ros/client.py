@@ -54,9 +54,9 @@ STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: 'CANCELED',
     GoalStatus.STATUS_ABORTED: 'ABORTED',
 }
-#: Time without a server after which the driver counts as gone [s].
+#: Time without a server after which the driver is considered gone [s].
 SERVER_TIMEOUT = 3.0
-#: How long to wait for the list of goals; a driver that has had none publishes none [s].
+#: How long to wait for the list of goals [s]; a driver that has had no goal publishes no list.
 _GOALS_TIMEOUT = 2.0
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -99,10 +99,10 @@ def resumed_goal(
     goal: FollowCartesianTrajectory.Goal, place: PathPlace, *, overlap: float, approach: float
 ) -> tuple[FollowCartesianTrajectory.Goal, ResumedGoal]:
     """
-    Return the rest of a goal that was stopped at a place, as a message and in our own terms.
+    Return the rest of a goal that was stopped at a place, as a message and as a resumed goal.
 
-    :param overlap: as ``approach`` a length [m], see :func:`~ur_cartesian_driver.path.resume`.
-    :raises InvalidGoal: it cannot be resumed.
+    :param overlap: like ``approach`` a length [m], see :func:`~ur_cartesian_driver.path.resume`.
+    :raises InvalidGoal: the goal cannot be resumed.
     """
     left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
     fields = with_defaults(fields_of_goal(left.goal))
@@ -136,24 +136,24 @@ class GoalClient:
         :param node: an existing node to use instead. If an executor spins it, call the client
             outside the executor's thread; if none does, the client spins it while it waits.
         """
-        #: The signal that cancelled the goal sent last; 0 = none.
+        #: The signal that cancelled the last goal; 0 = none.
         self.signal_number = 0
         self._driver = f'/{driver.strip("/")}'
         self.action = f'{self._driver}/follow_cartesian_trajectory'
         self._closed = False
         self._own_context: Context | None = None
         if node is None:
-            # It installs no signal handlers: a goal can be cancelled after Ctrl-C.
+            # This context installs no signal handlers: a goal can be cancelled after Ctrl-C.
             self._own_context = Context()
             rclpy.init(args=[], context=self._own_context)
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
         self._offsets: Any = None
         self._append_service: Any = None
-        #: Of the goal that runs.
+        #: The appender of the goal that runs.
         self._appender: GoalAppender | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
-        #: None: another one spins the node.
+        #: None = another executor spins the node.
         self._executor: SingleThreadedExecutor | None = None
         if node.executor is None:
             self._executor = SingleThreadedExecutor(context=node.context)
@@ -173,12 +173,12 @@ class GoalClient:
             return
         self._closed = True
         if self._executor is not None:
-            self._node.executor = None  # type: ignore[assignment]  # takes the node out
+            self._node.executor = None  # type: ignore[assignment]  # removes the node
             self._executor.shutdown()
             self._client.destroy()
         else:
-            # An executor that is about to wait would fail on a client that is destroyed meanwhile;
-            # this one goes with its last reference.
+            # An executor that is about to wait would fail on a client that is destroyed meanwhile.
+            # So the client is only removed here; its last reference destroys it.
             self._node.remove_waitable(self._client)
         if self._append_service is not None:
             self._node.destroy_client(self._append_service)
@@ -199,13 +199,14 @@ class GoalClient:
 
         A goal of many points is sent in flat arrays.
 
-        The first SIGINT, SIGTERM or SIGHUP cancels the goal and waits for its result, and
-        :attr:`signal_number` is set; the second one gives up.
+        On the first SIGINT, SIGTERM or SIGHUP, the client cancels the goal, waits for its result
+        and sets :attr:`signal_number`; on the second one, it gives up.
 
         :param on_feedback: called with each feedback; if it raises, the goal is cancelled, and its
             exception is raised when the goal has ended, with a note that says how.
         :param timeout: how long to look for the driver [s].
-        :param cancel: whether what ends the client cancels the goal; False = the goal goes on.
+        :param cancel: whether a signal or a failed ``on_feedback`` cancels the goal; if not, the
+            goal goes on.
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the driver is gone; how the goal ended is not known.
         """
@@ -262,10 +263,10 @@ class GoalClient:
         timeout: float = 10.0,
     ) -> Outcome:
         """
-        Send a path and return how it ended, as ``Driver.execute`` does; as :meth:`send`.
+        Send a path and return its outcome, like ``Driver.execute``; parameters as in :meth:`send`.
 
-        The node knows the frames that the path names. Where the arm stands is not compared with
-        the start of the path, which a message does not hold.
+        The driver node resolves the frames that the path names. It does not compare the pose of
+        the arm with the start of the path, because messages do not contain the start.
         """
         _, result = self.send(path.to_message(), on_feedback, timeout)
         return outcome_of(result)
@@ -276,10 +277,10 @@ class GoalClient:
         """
         Displace the tool from its path from now on, if the goal that runs permits it.
 
-        May be called from anywhere while the goal runs, also from the callback of :meth:`send`.
+        This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
 
-        :param along: [m], in the frame of the path, as ``across`` and ``normal``; cut at the
-            ``path_offset.limits`` of the goal.
+        :param along: offset [m] in the frame of the path, like ``across`` and ``normal``; limited
+            to the ``path_offset.limits`` of the goal.
         """
         if self._offsets is None:
             self._offsets = self._node.create_publisher(
@@ -300,17 +301,17 @@ class GoalClient:
         """
         Append the points of a path to the goal that runs (``keep_open``), or replace its tail.
 
-        May be called from anywhere while the goal runs, also from the callback of :meth:`send`,
-        and does not wait; requests leave one after the other.
+        This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
+        It does not wait; requests are sent one after the other.
 
-        :param path: with times from the start of the goal; of a message count the points, segments
-            and outputs. None = no point, with ``last``.
-        :param last: nothing follows.
+        :param path: with times from the start of the goal; of a message, only points, segments
+            and outputs are used. None = no points, allowed only with ``last``.
+        :param last: whether these are the last points of the goal.
         :param replace_from_point: the first point that the new ones replace, together with all
-            points behind it.
-        :param replace_from_time: or the time from which on they replace the old ones [s].
-        :return: a future of the response of ``~/append_points``. A refusal is such a response,
-            too: ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
+            later points.
+        :param replace_from_time: alternatively, the time from which they replace the old ones [s].
+        :return: a future of the response of ``~/append_points``. After a refusal, its ``accepted``
+            is false, ``message`` says why, and the goal goes on as it was.
         :raises RuntimeError: no goal of this client runs.
         :raises ValueError: both places are given.
         """
@@ -334,10 +335,12 @@ class GoalClient:
         **where: Any,
     ) -> AppendPoints.Response:
         """
-        Append to the goal that moves the arm, whoever sent it; return the response.
+        Append to the goal that moves the arm, from any client; return the response.
 
-        :param path: as ``where`` (``last``, ``replace_from_point``, ``replace_from_time``) and the
-            response, see :meth:`append`. That no goal runs is such a refusal, too.
+        If no goal runs, the response is a refusal.
+
+        :param path: see :meth:`append`, also for the response.
+        :param where: ``last``, ``replace_from_point`` or ``replace_from_time``, see there.
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the driver is gone.
@@ -356,7 +359,7 @@ class GoalClient:
             self._appender = None
 
     def _running_goal(self) -> Any:
-        """Return the id of the goal that moves the arm, the oldest one: others wait or preempt."""
+        """Return the id of the goal that moves the arm: the oldest, as newer ones still wait."""
         latest: list[GoalStatusArray] = []
         subscription = self._node.create_subscription(
             GoalStatusArray,
@@ -380,10 +383,10 @@ class GoalClient:
 
     def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
         """
-        Bring a stopped robot back to READY, as far as software may; return the response.
+        Bring a stopped robot back to READY, as far as software may do so; return the response.
 
-        :param unlock_protective_stop: a person has looked at the cause of a protective stop and
-            removed it; otherwise the stop is left to a person.
+        :param unlock_protective_stop: whether a person has found and removed the cause of a
+            protective stop; if not, unlocking the stop is left to a person.
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the driver is gone.
@@ -456,7 +459,7 @@ class GoalClient:
         return future.result()
 
     def _spin_or_wait(self, done: threading.Event | None = None) -> None:
-        """Handle what has come in, or let the node's own executor do that, for 0.1 s at most."""
+        """Spin for at most 0.1 s, or wait that long while another executor spins the node."""
         if self._executor is not None:
             self._executor.spin_once(timeout_sec=0.1)
         else:
@@ -477,7 +480,7 @@ class GoalClient:
         before = {
             number: signal.signal(number, received)
             for number in _SIGNALS
-            # nohup: SIGHUP is to be ignored.
+            # Under nohup, SIGHUP stays ignored.
             if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN
         }
         try:

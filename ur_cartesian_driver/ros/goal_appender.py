@@ -12,18 +12,18 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.srv import AppendPoints
 
-#: An index that no goal has: the refusal of it says how many points the goal has.
+#: An index that no goal has; the refusal of a request with it says how many points there are.
 UNKNOWN_POINT = 2**32 - 1
 
 
 class GoalAppender:
-    """Appends points to a goal, or replaces its tail; requests leave one after the other."""
+    """Appends points to a goal, or replaces its tail; sends one request after the other."""
 
     def __init__(self, client: Any, goal_id: Any, points: int | None = None) -> None:
         """
         Take the client of the service and the id of a goal that was accepted.
 
-        :param points: how many points it has; None = not known, because another client sent it.
+        :param points: the number of the goal's points; None = not known (another client's goal).
         """
         self._client = client
         self._goal_id = goal_id
@@ -39,9 +39,9 @@ class GoalAppender:
         replace_from_time: float | None,
     ) -> Future:
         """
-        Request it once the requests before are answered; return a future of the response.
+        Send a request once all earlier ones are answered; return a future of the response.
 
-        :param goal: with the points, segments and outputs; for this and the others see
+        :param goal: holds points, segments and outputs; for it and the other parameters see
             :meth:`~ur_cartesian_driver.ros.client.GoalClient.append`.
         :raises ValueError: both places are given.
         """
@@ -68,7 +68,7 @@ class GoalAppender:
     def _ask(self, request: AppendPoints.Request, answer: Future) -> None:
         is_appended = request.replace == request.APPEND
         is_known = self._points is not None
-        if is_appended:  # where, is known once the requests before are taken
+        if is_appended:  # the index is known once the earlier requests are answered
             request.first_index = self._points if is_known else UNKNOWN_POINT
 
         def take(done: Future) -> None:

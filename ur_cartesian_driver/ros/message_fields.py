@@ -29,7 +29,7 @@ _MAX_SECONDS = 2**31 - 1
 
 
 def duration_message(time: float) -> Duration:
-    """Return seconds to the nearest nanosecond; infinity becomes the largest duration."""
+    """Return seconds as a duration, rounded to 1 ns; infinity becomes the largest duration."""
     sec, nanosec = divmod(round(min(time, _MAX_SECONDS) * 1_000_000_000), 1_000_000_000)
     return Duration(sec=sec, nanosec=nanosec)
 

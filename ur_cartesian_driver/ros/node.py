@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The node, which creates and connects its components; its :func:`main` is a command."""
+"""The node, which creates and connects its components, and the command that runs it."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 
-#: Longest period of the heartbeat that says that the executor of the node is alive [s].
+#: Longest period of the heartbeat, which reports that the node's executor is alive [s].
 HEARTBEAT_PERIOD = 0.5
 #: Time for the discovery of other nodes [s].
 DISCOVERY_TIME = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_TIMEOUT = 5.0
-#: Arrays of this size go back to the system when they are freed [bytes].
+#: The memory of arrays of at least this size goes back to the system when it is freed [bytes].
 LARGE_ARRAY = 4 * 2**20
 #: Parameters of mallopt, from malloc.h.
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8
@@ -52,8 +52,8 @@ class CartesianDriverNode(Node):
     """
     The driver of one arm as a ROS node.
 
-    It connects to the robot by itself, from its construction until :meth:`destroy_node`. Add it to
-    any executor that does not hang for ``node_timeout``: then the arm is stopped.
+    From its construction until :meth:`destroy_node`, it connects to the robot by itself. Add it to
+    any executor; if the executor hangs for ``node_timeout``, the arm is stopped.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class CartesianDriverNode(Node):
         self.create_timer(
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
             self.driver.heartbeat,
-            # Served beside other callbacks, by a clock that no simulation stops.
+            # Served while other callbacks run, by a clock that does not stop with simulated time.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
@@ -132,11 +132,11 @@ class CartesianDriverNode(Node):
         )
 
     def _is_idle(self) -> bool:
-        """Tell whether no goal or session depends on the present TCP and payload."""
+        """Return whether no goal or session depends on the present TCP and payload."""
         return self.action_server.idle and not self.action_server.arbiter.holder
 
     def _warn_if_name_is_taken(self) -> None:
-        """Log once that another node has the same name: each would answer for both."""
+        """Log once if another node has the same name: either could get the other's goals."""
         self._name_check_timer.cancel()
         own_name = self.get_name(), self.get_namespace()
         if self.get_node_names_and_namespaces().count(own_name) > 1:
@@ -195,8 +195,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     Run the node until SIGINT or SIGTERM.
 
-    The first signal stops the arm and lets running goals end with a result; a second one does not
-    wait for that.
+    The first signal stops the arm, and the node waits until running goals have ended with a
+    result; a second signal ends this wait.
     """
     _share_freed_memory()
     # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
@@ -237,16 +237,16 @@ def _end_goals(
     deadline = monotonic() + SHUTDOWN_TIMEOUT
     while not node.action_server.idle and monotonic() < deadline and signals.count < 2:
         executor.spin_once(timeout_sec=0.05)
-    for _ in range(3):  # the executor still sends the results
+    for _ in range(3):  # the executor still has to send the results
         executor.spin_once(timeout_sec=0.02)
 
 
 def _share_freed_memory() -> None:
     """
-    Let all threads use the same memory, and give large arrays back (glibc, mallopt(3)).
+    Make all threads share one memory arena, and return large arrays (glibc, mallopt(3)).
 
-    Each goal is planned in a thread of its own. With an arena for each of them, what one has freed
-    stays with it: five goals of 100,000 points then take 200 MB more.
+    Each goal is planned in a thread of its own. With an arena for each thread, the memory that it
+    frees stays in its arena: five goals of 100,000 points then take 200 MB more.
     """
     mallopt = getattr(ctypes.CDLL(None), 'mallopt', None)  # other C libraries have none
     if mallopt is not None:
@@ -258,8 +258,8 @@ def _give_freed_memory_back() -> None:
     """
     Return unused heap pages to the system (glibc, malloc_trim(3)).
 
-    What remains of a goal keeps the next one from using its memory again. This takes one to five
-    milliseconds.
+    Without this, leftovers of a goal keep the next one from reusing its memory. The call takes one
+    to five milliseconds.
     """
     malloc_trim = getattr(ctypes.CDLL(None), 'malloc_trim', None)
     if malloc_trim is not None:

@@ -3,8 +3,8 @@
 """
 The methods of lists, matrices and structs, which controllers have since PolyScope 5.15.
 
-They change the variable that they are called on. A list may grow here whatever its capacity is, up
-to the bound of `make_list`.
+Methods such as `append` change the variable on which they are called. A list can grow here beyond
+its capacity, up to the bound of `make_list`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def call_method(target: Value, method: str, arguments: Sequence[Value]) -> Value
     """
     Call a method of a value of the language.
 
-    :raises RuntimeException: the type has no such method, or it cannot do this.
+    :raises RuntimeException: the type has no such method, or the arguments do not suit it.
     """
     function = _METHODS.get(type(target), {}).get(method)
     if function is None:
@@ -52,7 +52,7 @@ def _item(value: Value) -> Value:
 
 
 def _place(items: list[Value], index: Value, length: int) -> int:
-    """Return an index that lies within a length."""
+    """Return an index, or refuse one that is not within a length."""
     if type(index) is not int or not 0 <= index < length:
         raise RuntimeException(
             f'Index out of range: {to_text(index)} is not within 0..{length - 1} '

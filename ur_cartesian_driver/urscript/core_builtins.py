@@ -3,7 +3,7 @@
 """
 Builtins of every controller that need no robot: mathematics, lists, text.
 
-Parameters are named as in the script manual, because programs may pass arguments by name.
+Parameters are named as in the script manual, because programs can pass arguments by name.
 Outside its domain a function raises an error instead of returning nan.
 """
 
@@ -36,7 +36,7 @@ from ur_cartesian_driver.urscript.script_values import (
     make_list as make_list_value,
 )
 
-#: Rows of a matrix that can be inverted: the time grows with their cube. The manual has no limit.
+#: Most rows of a matrix to invert, as the time grows with their cube. The manual gives no limit.
 MAX_INVERSE = 100
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
@@ -102,7 +102,7 @@ def str_len(str: Value) -> int:
 
 
 def str_empty(str: Value) -> bool:
-    """Tell whether a string has no characters."""
+    """Return whether a string has no characters."""
     return not _string(str)
 
 
@@ -315,12 +315,12 @@ def core_builtins(seed: int = 0) -> dict[str, Callable[..., Any]]:
     """
     Return the functions of the language that need no robot, by name.
 
-    :param seed: of `random()`, so that a run can be repeated.
+    :param seed: the seed of `random()`, so that a run can be repeated.
     """
     generator = random.Random(seed)
 
     def random_number() -> float:
-        """Return a number from 0 (included) to 1 (not)."""
+        """Return a number from 0 (included) to 1 (excluded)."""
         return generator.random()
 
     named = (

@@ -46,7 +46,7 @@ class RuntimeException(Exception):
         self.column = column
 
     def at(self, line: int, column: int) -> RuntimeException:
-        """Return this error with a position; the innermost position wins."""
+        """Return this error with a position; a position that it already has is kept."""
         return self if self.line else RuntimeException(self.text, line, column)
 
     def __str__(self) -> str:

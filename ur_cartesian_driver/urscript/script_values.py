@@ -6,11 +6,12 @@ The values of URScript programs.
 A value is an int, float, bool, str or None of Python; a `list` of values; a `ScriptPose`; a
 `Matrix` (a list of lists of equal length); a `Struct`; a `ThreadHandle`; or a `RemoteObject`.
 Lists, matrices and structs are values, not references: they are copied (`copy`) when they are
-assigned, passed or returned, so a builtin may keep its arguments.
+assigned, passed or returned, so a builtin can keep its arguments.
 
 Our decisions where the controller's behaviour is not documented: integers have 32 bits and an
-overflow raises, `/` is always a true division, `%` takes the sign of the dividend (as in C), True
-and False are not numbers in arithmetic, and values of different types are unequal, not an error.
+overflow is an error; `/` is always a true division; `%` has the sign of the dividend (as in C);
+True and False are not numbers in arithmetic; values of different types can be compared, and are
+unequal.
 """
 
 from __future__ import annotations
@@ -83,10 +84,10 @@ class RemoteObject(ABC):
 
     @abstractmethod
     def call(self, method: str, arguments: Sequence[Value]) -> Value:
-        """Call a method; may return a generator, which then takes frames like a builtin."""
+        """Call a method; a generator that it returns takes frames, as that of a builtin does."""
 
     def part(self, name: str) -> RemoteObject:
-        """Return the object whose methods are `name.method` of this one."""
+        """Return an object whose methods are this object's methods `name.method`."""
         return _RemotePart(self, name)
 
 
@@ -113,7 +114,7 @@ _NUMBERS = frozenset({int, float})
 
 
 def is_number(value: Value) -> TypeGuard[int | float]:
-    """Tell whether a value is an int or a float; a bool is neither."""
+    """Return whether a value is an int or a float; a bool is neither."""
     return type(value) is float or type(value) is int
 
 
@@ -134,7 +135,7 @@ SIZED = frozenset({list, Matrix, Struct})
 
 
 def size_of(value: Value) -> int:
-    """Return how many plain values a value holds."""
+    """Return the number of plain values that a value holds."""
     kind = type(value)
     if kind is list:
         return sum(map(size_of, value)) if Struct in map(type, value) else len(value)
@@ -144,14 +145,14 @@ def size_of(value: Value) -> int:
 
 
 def work_on(a: Value, b: Value) -> int:
-    """Return how many plain values an operation on two values looks at."""
+    """Return the number of plain values that an operation on two values handles."""
     if isinstance(a, Matrix) and isinstance(b, Matrix):
         return size_of(a) * b.shape[1]
     return size_of(a) + size_of(b)
 
 
 def check_size(value: T) -> T:
-    """Return a value that holds others if it is not too large; structs in structs may double."""
+    """Return a value that holds others, or refuse one that is too large; nested structs can be."""
     if size_of(value) > MAX_LIST_LENGTH:
         raise RuntimeException(f'more than {MAX_LIST_LENGTH} items are not possible')
     return value
@@ -207,21 +208,21 @@ def _unsupported(symbol: str, a: Value, b: Value) -> RuntimeException:
 
 
 def bounded(text: str) -> str:
-    """Return a computed string if a controller makes one of that length."""
+    """Return a computed string, or refuse one that is longer than a controller makes."""
     if len(text) > MAX_STRING:
         raise RuntimeException(f'The string is longer than {MAX_STRING} characters.')
     return text
 
 
 def _add(a: Value, b: Value) -> Value:
-    """Return a sum, or two strings, one after the other."""
+    """Return a sum, or the concatenation of two strings."""
     if type(a) is str and type(b) is str:
         return bounded(a + b)
     return _sum(a, b)
 
 
 def _checked(result: int | float) -> int | float:
-    """Return a computed number if it fits into 32 bits."""
+    """Return a computed number, or refuse an int that does not fit into 32 bits."""
     if type(result) is int and not INT_MIN <= result <= INT_MAX:
         raise RuntimeException(f'Integer overflow: {result} does not fit into 32 bits')
     return result
@@ -345,7 +346,7 @@ BINARY: dict[str, Callable[[Value, Value], Value]] = {
     '>=': _ordering('>=', operator.ge),
 }
 
-#: The operations of BINARY on two floats that cannot fail.
+#: The operations of BINARY that cannot fail on two floats.
 ON_FLOATS: dict[str, Callable[[Value, Value], Value]] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '==': operator.eq,
     '!=': operator.ne, '<': operator.lt, '<=': operator.le, '>': operator.gt, '>=': operator.ge,
@@ -380,9 +381,9 @@ def get_part(container: Value, key: Key) -> Value:
 
 def set_part(container: Value, path: Sequence[Key], value: Value) -> Value:
     """
-    Assign to the part of a value that a path of keys leads to.
+    Assign to the part of a value at the end of a path of keys.
 
-    :returns: the container: the same object, or another one where it is a pose.
+    :returns: the container: a new object if it is a pose, else the same object.
     """
     key = path[0]
     if len(path) > 1:

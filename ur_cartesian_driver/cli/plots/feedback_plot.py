@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of planned and executed path that the demo draws; needs matplotlib."""
+"""The demo's picture of the planned and the executed path; needs matplotlib."""
 
 from __future__ import annotations
 

@@ -3,8 +3,8 @@
 """
 ``ur-cartesian plot``: draw a recorded motion.
 
-The picture shows on the left the planned and executed path, and on the right over time: deviation
-from the plan, tool speed, effective speed, and points, outputs and events.
+On the left, the picture shows the planned and the executed path. On the right, it shows over time:
+deviation from the plan, tool speed, effective speed, and points, outputs and events.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _title(recording: Recording) -> str:
 
 
 def _draw_path(figure: Any, recording: Recording) -> None:
-    """Draw the path in space, and from above, or from the side if it is mainly vertical."""
+    """Draw the path in space, and flat: from above, or from the side if mainly vertical."""
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))

@@ -40,7 +40,7 @@ class Affine:
         return mapped
 
     def after(self, first: Affine) -> Affine:
-        """Return the map that does another one first."""
+        """Return the map that applies the map `first`, and then this one."""
         return Affine(
             self.direction(first.x),
             self.direction(first.y),
@@ -49,12 +49,12 @@ class Affine:
         )
 
     def is_within(self, bound: float) -> bool:
-        """Tell whether all lengths are smaller."""
+        """Return whether the axes and the origin are all shorter than a bound."""
         return max(norm(v) for v in (self.x, self.y, self.z, self.origin)) < bound
 
 
 def scaled(x: float, y: float, z: float) -> Affine:
-    """Return the map with a factor for each axis."""
+    """Return the map that multiplies each axis by a factor."""
     return Affine((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
 
 
@@ -69,7 +69,7 @@ def turned(angle: float) -> Affine:
 
 
 def object_axes(extrusion: Vector3) -> Affine:
-    """Return the object coordinates of an extrusion: the arbitrary axis algorithm of DXF."""
+    """Return the object coordinate system of an extrusion (DXF's arbitrary axis algorithm)."""
     z = unit(extrusion)
     is_near_z = abs(z[0]) < 1.0 / 64.0 and abs(z[1]) < 1.0 / 64.0
     x = unit(cross((0.0, 1.0, 0.0) if is_near_z else (0.0, 0.0, 1.0), z))

@@ -3,9 +3,9 @@
 """
 Contours: stretches whose ends meet, whatever their order and direction in the file.
 
-A contour goes on where exactly two ends meet, and ends where three or more do, so that it does not
-depend on the order of the file. It is followed in the direction of the stretch that comes first
-there; a closed one also begins with it.
+A contour continues where exactly two ends meet, and ends where three or more do, so that it does
+not depend on the order of the file. Its direction is that of its first stretch in the file; a
+closed contour also begins with that stretch.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut
 from ur_cartesian_driver.importing.dxf.entity_curves import Stretch
 from ur_cartesian_driver.motion.geometry.vectors import norm, subtract, Vector3
 
-# Shares of the distance of ends that meet:
-#: Stretches whose points are as near as this are one that was drawn twice.
+# As shares of the distance within which ends meet:
+#: Two stretches whose points are this near each other are one stretch that was drawn twice.
 _SAME = 0.1
-#: Ends of stretches that are shorter than the distance of a joint have to be as near as this.
+#: The ends of stretches that are shorter than that distance have to be this near to meet.
 _NEARER = 1e-3
-#: A stretch, and 0 for its begin or 1 for its end.
+#: The index of a stretch, and 0 for its start or 1 for its end.
 _End = tuple[int, int]
 
 
@@ -33,7 +33,7 @@ def contours(
     """
     Yield contours in the order of their first stretches.
 
-    :param distance: of ends that meet [m].
+    :param distance: ends that are as near as this meet [m].
     """
     stretches = _without_copies(stretches, _SAME * distance, left_out)
     partners = _partners(stretches, distance, left_out)
@@ -51,7 +51,7 @@ def contours(
 
 
 def _follow(end: _End, partners: dict[_End, _End]) -> tuple[list[_End], bool]:
-    """Return the ends at which stretches are entered from one on, and whether they come back."""
+    """Return the ends at which a contour enters its stretches after one, and whether it closes."""
     first = end[0]
     found: list[_End] = []
     while (entered := partners.get(end)) is not None:
@@ -65,7 +65,7 @@ def _follow(end: _End, partners: dict[_End, _End]) -> tuple[list[_End], bool]:
 def _without_copies(
     stretches: Sequence[Stretch], distance: float, left_out: LeftOut
 ) -> list[Stretch]:
-    """Return the stretches that do not lie on one before, in either direction."""
+    """Return the stretches that are no copy of an earlier one, in either direction."""
     kept: list[Stretch] = []
     places = _places(_ends(stretches), distance)
     like: dict[tuple[int, int, int], list[Stretch]] = {}
@@ -98,11 +98,11 @@ def _ends(stretches: Sequence[Stretch]) -> list[Vector3]:
 def _partners(
     stretches: Sequence[Stretch], distance: float, left_out: LeftOut
 ) -> dict[_End, _End]:
-    """Return which end goes on with which; others are free, or at a junction."""
+    """Return the partner of each end; ends that are free or at a junction have none."""
     places = _places(_ends(stretches), distance)
     gaps = [_distance(s.points[0], s.points[-1]) for s in stretches]
     open_ones = [i for i, gap in enumerate(gaps) if gap > _NEARER * distance]
-    # Between short stretches all ends are near each other: only those that coincide meet.
+    # All ends of short stretches are near each other, so only ends that coincide meet.
     short = {places[2 * i] for i in open_ones if places[2 * i] == places[2 * i + 1]}
     close = [(i, side) for i in open_ones for side in (0, 1) if places[2 * i + side] in short]
     nearer = _places([stretches[i].points[-side] for i, side in close], _NEARER * distance)
@@ -124,7 +124,7 @@ def _partners(
 
 
 def _places(points: Sequence[Vector3], distance: float) -> list[int]:
-    """Return a number for each point; those within a distance, by others too, have the same."""
+    """Return a number for each point, the same for points that a chain of near points connects."""
     numbers: dict[Vector3, int] = {}
     for point in points:
         numbers.setdefault(point, len(numbers))
@@ -136,7 +136,7 @@ def _places(points: Sequence[Vector3], distance: float) -> list[int]:
             i = root[i]
         return i
 
-    # Cells of twice the distance: near points are in the same one, or in its nearer neighbours.
+    # Cells are twice the distance wide: near points share a cell, or are in its nearer neighbours.
     cells: dict[tuple[int, ...], list[Vector3]] = {}
     for point, number in numbers.items():
         scaled = [value / (2.0 * distance) for value in point]

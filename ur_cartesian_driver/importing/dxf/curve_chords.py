@@ -1,20 +1,20 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Chords of curves: rational Bézier curves as lines that are nowhere farther away than a tolerance.
+Chords of curves: lines that lie within a tolerance of rational Bézier curves.
 
 The bound is proven, not sampled. A curve lies in the convex hull of its control points, so it is
-no farther from its chord than they are. If they go on along the chord, so does the curve, which
-meets a plane no more often than its control polygon; then every place of the chord has one of the
-curve beside it, and the bound holds in both directions. (G. Farin, Curves and Surfaces for CAGD:
-both properties hold for positive weights.) The curve is halved until each piece is within a small
-share of the tolerance.
+no farther from its chord than they are. If the control points advance along the chord, so does the
+curve, because it meets a plane no more often than its control polygon; then each point of the
+chord has a point of the curve beside it, and the bound holds in both directions. (G. Farin, Curves
+and Surfaces for CAGD: both properties hold for positive weights.) Each curve is halved until every
+piece is within a small share of the tolerance.
 
-Then greedily each chord takes as many pieces as the rest of the tolerance allows. The distance of
-a polyline from a line is largest at its points, and its feet cover the whole line. Where the curve
-turns back by more than the tolerance, a chord ends.
+Then each chord, greedily, spans as many pieces as the rest of the tolerance allows. A polyline is
+farthest from a line at one of its points, and its projection covers the whole line. A chord ends
+where the curve turns back by more than the tolerance.
 
-Curves are arrays (m, n + 1, 4): m of degree n with control points w x, w y, w z, w.
+Curves are arrays (m, n + 1, 4): m curves of degree n with control points (w x, w y, w z, w).
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ import numpy as np
 from ur_cartesian_driver.importing.simplification import farthest_row
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
-#: The share of the tolerance for the pieces; smaller ones take more time and save few chords.
+#: The share of the tolerance for the pieces; a smaller one takes more time and saves few chords.
 _FINE = 1.0 / 8.0
-#: Pieces of a chord that are tried at once; few take more.
+#: Up to this many pieces in a chord are tried for all points at once; few chords have more.
 _WINDOW = 10
 _MAX_PIECES = 200_000
-#: Of lengths along a chord [m].
+#: Rounding errors of lengths along a chord [m].
 _ROUNDING = 1e-12
 
 
 def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
     """
-    Return the Bézier curves of a B-spline, one for each span of its knots that has a length.
+    Return the Bézier curves of a B-spline, one for each knot span that is not empty.
 
     :param controls: (n, 4) weighted control points.
-    :raises ValueError: degree, knots and points do not belong together.
+    :raises ValueError: degree, knots and points do not make a spline in one piece.
     """
     if degree < 1:
         raise ValueError(f'its degree is {degree}')
@@ -60,7 +60,7 @@ def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
     rows = spans[:, None] + np.arange(-degree, 1)
     curves = np.empty((len(spans), degree + 1, 4))
     for k in range(degree + 1):
-        # The blossom of the span at k times its end and else its begin is its control point k.
+        # Control point k is the blossom with k arguments at the span's end, the rest at its start.
         points = controls[rows]
         for r in range(1, degree + 1):
             at = knots[spans + 1 if r <= k else spans]
@@ -75,7 +75,7 @@ def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
 
 
 def ellipse_curves(a: Floats, b: Floats, centre: Floats, begin: float, sweep: float) -> Floats:
-    """Return the Bézier curves of centre + a cos t + b sin t, t from begin on."""
+    """Return the Bézier curves of centre + a cos t + b sin t, t from begin to begin + sweep."""
     count = max(1, ceil(abs(sweep) / (0.5 * pi)))
     step = sweep / count
     weight = cos(0.5 * step)
@@ -83,7 +83,7 @@ def ellipse_curves(a: Floats, b: Floats, centre: Floats, begin: float, sweep: fl
     for i in range(count):
         for k, (t, w) in enumerate(((0.0, 1.0), (0.5, weight), (1.0, 1.0))):
             angle = begin + (i + t) * step
-            # The middle control point is where the tangents meet: the place of the arc over w.
+            # The tangents meet at the middle control point: centre + (point of the arc) / w.
             curves[i, k, :3] = w * centre + cos(angle) * a + sin(angle) * b
             curves[i, k, 3] = w
     return curves
@@ -91,11 +91,11 @@ def ellipse_curves(a: Floats, b: Floats, centre: Floats, begin: float, sweep: fl
 
 def chords(curves: Floats, tolerance: float) -> Floats:
     """
-    Return the ends (k, 3) of chords of curves that follow each other.
+    Return the ends (k, 3) of chords of consecutive curves.
 
-    :param tolerance: no place of the curves is farther from the chords, and none of those farther
-        from the curves [m].
-    :raises ValueError: it would be too many.
+    :param tolerance: the largest distance of the curves from the chords, and of the chords from
+        the curves [m].
+    :raises ValueError: there would be too many chords.
     """
     fine = _FINE * tolerance
     while True:
@@ -115,7 +115,7 @@ def _places(weighted: Floats) -> Floats:
 
 
 def _chord_errors(curves: Floats) -> Floats:
-    """Return a bound (m,) of the distance of each curve from its chord, and of that from it."""
+    """Return bounds (m,) on the distances of curves from chords, and of chords from curves."""
     windows = _places(curves)
     windows = windows - windows[:, :1]
     off, along = _beside(windows)
@@ -127,9 +127,9 @@ def _chord_errors(curves: Floats) -> Floats:
 
 def _beside(windows: Floats) -> tuple[Floats, Floats]:
     """
-    Return how points (m, k, 3) lie beside the line from the first, which is 0, to the last.
+    Measure points (m, k, 3) against the line from the first, which has to be 0, to the last.
 
-    :returns: distances from the line, and places along it (m, k).
+    :returns: distances from the line, and lengths along it, each (m, k).
     """
     chord = windows[:, -1:]
     length = np.sqrt(np.einsum('mij,mij->mi', chord, chord))
@@ -140,7 +140,7 @@ def _beside(windows: Floats) -> tuple[Floats, Floats]:
 
 
 def _halved(curves: Floats, which: Flags) -> Floats:
-    """Return the curves in their order, some as two halves (de Casteljau)."""
+    """Return the curves in order, the marked ones as two halves (de Casteljau)."""
     halves = curves[which]
     left, right = np.empty_like(halves), np.empty_like(halves)
     for k in range(curves.shape[1]):
@@ -153,11 +153,11 @@ def _halved(curves: Floats, which: Flags) -> Floats:
 
 
 def _merged(points: Floats, tolerance: float) -> list[int]:
-    """Return the rows of points that stay, so that the others are near the lines between."""
+    """Return the rows of the points to keep; the others are near the lines between these."""
     last = len(points) - 1
     reach = np.minimum(np.arange(1, len(points) + 1), last)
     rows = np.arange(len(points))
-    for count in range(2, _WINDOW + 1):  # of all rows at once
+    for count in range(2, _WINDOW + 1):  # for all rows at once
         rows = rows[rows + count <= last]
         rows = rows[_are_straight(points[rows[:, None] + np.arange(count + 1)], tolerance)]
         reach[rows] = rows + count
@@ -177,7 +177,7 @@ def _merged(points: Floats, tolerance: float) -> list[int]:
 
 
 def _are_straight(windows: Floats, tolerance: float) -> Flags:
-    """Tell of points (m, k, 3) in rows whether all are near the line from first to last."""
+    """Return for each row of points (m, k, 3) whether all are near the line from first to last."""
     off, along = _beside(windows - windows[:, :1])
     back = (np.maximum.accumulate(along, axis=1) - along).max(axis=1)
     straight: Flags = (off.max(axis=1) <= tolerance) & (back <= tolerance)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A drawing: its header, layers, blocks and entities, and what of them is seen."""
+"""A drawing: its header, layers, blocks and entities, and which of the entities are visible."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _SECTIONS = (
     *('HEADER', 'CLASSES', 'TABLES', 'BLOCKS', 'ENTITIES', 'OBJECTS', 'THUMBNAILIMAGE'),
     'ACDSDATA',
 )
-#: What ends up among entities only where a file was cut.
+#: Records that are among entities only if the file was cut.
 _NO_ENTITIES = ('TABLE', 'ENDTAB', 'LAYER', 'BLOCK', 'ENDBLK', 'BLOCK_RECORD', 'DICTIONARY')
-#: Entities of blocks, and blocks in blocks; more are taken for a mistake.
+#: Largest number of placed entities of blocks, and deepest nesting of blocks.
 _MAX_PLACED, _MAX_DEPTH = 100_000, 64
-#: Products with coordinates of a file have no overflow below.
+#: Below this bound, products with coordinates of a file do not overflow.
 _MAX_SCALE = 1e60
 
 
@@ -46,7 +46,7 @@ class DrawingBlock:
 
 @dataclass(slots=True)
 class Drawing:
-    """Records by their names, in upper case: CAD programs do not tell them apart."""
+    """Records by their names in upper case: CAD programs ignore the case."""
 
     header: dict[str, Record] = field(default_factory=dict)
     layers: dict[str, Record] = field(default_factory=dict)
@@ -60,7 +60,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
     """
     Read a drawing.
 
-    :raises BrokenFile: it is cut off, or no DXF.
+    :raises BrokenFile: the file is cut off, or is no DXF.
     :raises OSError: the file cannot be opened.
     """
     found = Drawing()
@@ -98,7 +98,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
 
 
 def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
-    """Return the name of a section that begins."""
+    """Return the name of the section that a record begins."""
     # Header variables follow in the same record, with codes of their own.
     name = next((value for code, value in record.tags if code == _NAME), '').upper()
     if name in before:
@@ -110,7 +110,7 @@ def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
 
 
 def _variables(header: Record) -> Iterator[tuple[str, Record]]:
-    """Yield the variables of a header: a code 9 with the name, and codes with values."""
+    """Yield the variables of a header: each is a code 9 with its name, then codes with values."""
     variable = header
     for index, (code, value) in enumerate(header.tags):
         if code == _VARIABLE:
@@ -121,7 +121,7 @@ def _variables(header: Record) -> Iterator[tuple[str, Record]]:
 
 
 def _add_entity(record: Record, into: list[Record] | None) -> None:
-    """Add an entity; vertices to their polyline."""
+    """Add an entity, or a vertex to its polyline."""
     if into is None:
         raise record.fault('it stands between blocks, in none; the file is broken')
     if record.kind in _NO_ENTITIES:
@@ -141,7 +141,7 @@ def _new_block(record: Record, blocks: dict[str, DrawingBlock]) -> DrawingBlock:
 
 
 def _clipped(objects: dict[str, Record]) -> set[str]:
-    """Return the entities with a clip that is on: the owners of the owners of filters."""
+    """Return the handles of the entities that own, through other objects, a clip that is on."""
     found = set()
     for record in objects.values():
         if record.kind == 'SPATIAL_FILTER' and record.integer(71, 1):
@@ -155,7 +155,7 @@ def _clipped(objects: dict[str, Record]) -> set[str]:
 
 
 class Seen:
-    """Walks through the model space, and says what nobody sees."""
+    """Walks through the model space, and adds remarks on entities that are not visible."""
 
     def __init__(self, drawing: Drawing, left_out: LeftOut) -> None:
         """Begin before the first entity."""
@@ -168,7 +168,7 @@ class Seen:
         """
         Yield the visible entities in the order of the file, with the map of their coordinates.
 
-        :param place: where the coordinates of the drawing are.
+        :param place: the map of the coordinates of the drawing.
         :raises BrokenFile: a block cannot be placed.
         """
         sheets = [b for name, b in self._drawing.blocks.items() if name.startswith(_SHEETS)]
@@ -182,7 +182,7 @@ class Seen:
                 yield from self._seen(record, place, '', ())
 
     def _model_space(self) -> Iterator[Record]:
-        for name in _MODEL_SPACES:  # empty, unless a program is strange
+        for name in _MODEL_SPACES:  # empty in files of most programs
             if name in self._drawing.blocks:
                 yield from self._drawing.blocks[name].entities
         yield from self._drawing.entities
@@ -197,7 +197,7 @@ class Seen:
         """
         Yield an entity; for an INSERT, the entities of its block.
 
-        :param layer: the layer of the enclosing INSERT, which entities on layer 0 take.
+        :param layer: the layer of the enclosing INSERT, which entities on layer 0 inherit.
         :param inside: names of the blocks that the entity is in.
         """
         own = record.text(8, '0').upper()
@@ -214,7 +214,7 @@ class Seen:
             yield record, place
 
     def _hidden(self, record: Record, layer: str) -> str:
-        """Return the term that hides an entity; an INSERT hides its block if it is frozen."""
+        """Return the term that hides an entity; a layer hides an INSERT only if it is frozen."""
         if record.integer(60):
             return '60'
         entry = self._drawing.layers.get(layer)
@@ -227,7 +227,7 @@ class Seen:
         return 'LAYER 62<0' if entry and entry.integer(62, 7) < 0 else ''
 
     def _show(self, layer: str) -> None:
-        """Say once what a layer has that the tool does not heed."""
+        """Add a remark, once for each layer, on properties that the tool ignores."""
         entry = self._drawing.layers.get(layer)
         if entry is None or layer in self._shown:
             return
@@ -258,7 +258,7 @@ class Seen:
                 yield from self._seen(entity, at, layer, (*inside, name))
 
     def _unplaced(self, record: Record, block: DrawingBlock | None) -> str:
-        """Return the term for which a block is left out."""
+        """Return the term because of which an INSERT is left out; empty = none."""
         if block is None:
             return 'INSERT without BLOCK'
         for bit in _EXTERNAL:
@@ -268,13 +268,13 @@ class Seen:
 
 
 def _places(record: Record, block: DrawingBlock, place: Affine) -> Iterator[Affine]:
-    """Yield where the coordinates of a block are, for each place of an array."""
+    """Yield the map of a block's coordinates for each place of an array of blocks."""
     axes = place.after(object_axes(record.extrusion()))
     x, y, z = (record.number(code, 1.0) for code in (41, 42, 43))
     if x == 0.0 or y == 0.0:
         raise record.fault('a scale is 0 (group codes 41 and 42)')
     turn = turned(radians(record.number(50, 0.0)))
-    z = z or 1.0  # plane programs write 0
+    z = z or 1.0  # 2D programs write 0
     shape = turn.after(scaled(x, y, z)).after(shifted(scale(block.record.point(10, ZERO3), -1.0)))
     across, up = record.number(44, 0.0), record.number(45, 0.0)
     columns = record.integer(70, 1) if across else 1

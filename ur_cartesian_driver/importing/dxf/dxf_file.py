@@ -22,13 +22,13 @@ def collect_dxf(file: Path, options: ImportOptions, into: PathCollector) -> None
     """
     Read the model space of a drawing.
 
-    :raises BrokenFile: it is cut off, a value cannot be meant, or its unit is not known.
+    :raises BrokenFile: the file is cut off, a value must be a mistake, or the unit is not known.
     :raises OSError: the file cannot be opened.
     """
     left_out = LeftOut()
     drawing = read_drawing(file, left_out)
     unit = _unit(drawing, options, left_out)
-    # The scale comes later, and lengths of the path are to hold after it.
+    # The scale is applied later, and these tolerances are meant for the scaled path.
     scale = 1.0 / abs(options.scale)
     found = [
         stretch_of(record, place, options.tolerance * scale, left_out)
@@ -47,7 +47,7 @@ def collect_dxf(file: Path, options: ImportOptions, into: PathCollector) -> None
 
 
 def _unit(drawing: Drawing, options: ImportOptions, left_out: LeftOut) -> float:
-    """Return the length of a unit [m], from the options or else from the drawing."""
+    """Return the unit of length [m] of the options, or else of the drawing."""
     variable = drawing.header.get('$INSUNITS')
     number = variable.integer(70) if variable else 0
     name, length = UNITS.get(number, ('', 0.0))

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Records of a DXF file: its entities and the entries of its tables, with the lines that they are on.
+Records of a DXF file: its entities and the entries of its tables, with their lines.
 
 A record is everything from one group code 0 to the next. The DXF reference warns readers not to
-rely on the order of group codes within it ("Common Group Codes for Entities"), so values are
+rely on the order of group codes within a record ("Common Group Codes for Entities"), so values are
 looked up by their code.
 """
 
@@ -19,7 +19,7 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import decoded, file_lines
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 
-#: The key of all extended data, which have the codes from here on.
+#: The first code of extended data, and the key under which all of them are stored.
 EXTENDED_DATA = 1001
 _MARKER, _EMBEDDED, _APPLICATION_GROUP, _ELEVATION = 100, 101, 102, 38
 _EXTRUSION, Z_AXIS = 210, (0.0, 0.0, 1.0)
@@ -41,7 +41,7 @@ _KINDS_WITH_MARKERS = {kind for kinds in _MARKED.values() for kind in kinds}
 _INTEGER = re.compile(r'[-+]?[0-9]{1,15}')
 _NUMBER = re.compile(r'[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?')
 _HANDLE = re.compile(r'[0-9A-Fa-f]{1,16}')
-#: Products of a few numbers within this bound have no overflow.
+#: Products of a few numbers within this bound do not overflow.
 _MAX_NUMBER = 1e12
 
 
@@ -57,12 +57,12 @@ class Record:
         self.kind = kind
         self.line = line
         self.tags = tags
-        #: Of a POLYLINE.
+        #: The vertices of a POLYLINE.
         self.vertices: list[Record] = []
 
     @cached_property
     def values(self) -> dict[int, list[tuple[str, int]]]:
-        """Values with their lines by group code, without groups that applications define."""
+        """Values and their lines by group code, without the groups that applications define."""
         found: dict[int, list[tuple[str, int]]] = {}
         for code, value, line in self._in_order():
             found.setdefault(code if code < 1000 else EXTENDED_DATA, []).append((value, line))
@@ -74,7 +74,7 @@ class Record:
             if code == _APPLICATION_GROUP:
                 inside = value.startswith('{')
             elif code == _EMBEDDED or (code == _MARKER and value == 'AcDbHelix'):
-                return  # what follows uses codes again; a HELIX is a SPLINE before it
+                return  # the rest reuses codes; before it, a HELIX is a SPLINE
             elif not inside:
                 line = self.line + 2 * index + 3
                 if code == _MARKER and self.kind in _KINDS_WITH_MARKERS:
@@ -85,12 +85,12 @@ class Record:
 
     @property
     def handle(self) -> str:
-        """The name that CAD programs show; empty = none."""
+        """The identifier of the record that CAD programs show; empty = none."""
         found = self.values.get(5)
         return found[0][0] if found and _HANDLE.fullmatch(found[0][0]) else ''
 
     def fault(self, text: str, line: int = 0) -> BrokenFile:
-        """Return the refusal of this record, by default with its first line."""
+        """Return the refusal of this record, at a line or else at its first one."""
         name = f'{self.kind} {self.handle}' if self.handle else self.kind
         return BrokenFile(line or self.line, f'{name}: {text}')
 
@@ -98,7 +98,7 @@ class Record:
         """
         Return the text of a group code.
 
-        :raises BrokenFile: there are two.
+        :raises BrokenFile: the code has two different texts.
         """
         found = self.values.get(code)
         if found is None:
@@ -112,8 +112,8 @@ class Record:
         """
         Return the number of a group code.
 
-        :param default: where there is none; None = it has to be there.
-        :raises BrokenFile: it is missing, no number, or there are two.
+        :param default: the number if the code is missing; None = the code is required.
+        :raises BrokenFile: the code is missing, no number, or has two different numbers.
         """
         found = self.values.get(code)
         if found is None:
@@ -130,7 +130,7 @@ class Record:
         """
         Return all numbers of a group code.
 
-        :raises BrokenFile: one is no number, or is too large to be meant.
+        :raises BrokenFile: a value is no number, or far too large.
         """
         return [self._number(code, text, line) for text, line in self.values.get(code, ())]
 
@@ -138,7 +138,7 @@ class Record:
         """
         Yield codes with their numbers and lines, in the order of the file.
 
-        :raises BrokenFile: one is no number, or is too large to be meant.
+        :raises BrokenFile: a value is no number, or far too large.
         """
         for code, text, line in self._in_order():
             if code in codes:
@@ -156,7 +156,7 @@ class Record:
         """
         Return the integer of a group code; some programs write it with a point.
 
-        :raises BrokenFile: it is none.
+        :raises BrokenFile: the value is no integer.
         """
         if code not in self.values:
             return default
@@ -169,7 +169,7 @@ class Record:
         """
         Return the point that begins with a group code.
 
-        Where it has no z, that is the elevation of the entity, as before AutoCAD R11.
+        A point without z has the elevation of the entity, as before AutoCAD R11.
 
         :raises BrokenFile: a coordinate is missing, or no number.
         """
@@ -181,9 +181,9 @@ class Record:
 
     def extrusion(self) -> Vector3:
         """
-        Return the direction in which the axis z of the entity points.
+        Return the direction of the entity's axis z.
 
-        :raises BrokenFile: it has no length.
+        :raises BrokenFile: the direction is a zero vector.
         """
         found = self.point(_EXTRUSION, Z_AXIS)
         if found == ZERO3:
@@ -194,7 +194,7 @@ class Record:
         """
         Return all points that begin with a group code.
 
-        :raises BrokenFile: they have not all their coordinates.
+        :raises BrokenFile: a point lacks a coordinate.
         """
         x, y, z = (self.numbers(code + step) for step in (0, 10, 20))
         if len(x) != len(y) or (z and len(z) != len(x)):
@@ -207,9 +207,9 @@ class Record:
 
 def read_records(file: Path) -> Iterator[Record]:
     """
-    Read a drawing; header variables are in the record of their section.
+    Yield the records of a drawing; the record of the section HEADER has all header variables.
 
-    :raises BrokenFile: a group code is none, or the file ends before its EOF.
+    :raises BrokenFile: the file is binary or empty, a group code is no integer, or EOF is missing.
     :raises OSError: the file cannot be opened.
     """
     data = file.read_bytes()
@@ -239,6 +239,6 @@ def read_records(file: Path) -> Iterator[Record]:
 
 
 def _code_page(data: bytes) -> str:
-    """Return the codec of an old drawing, of a name such as ANSI_1252 or dos850."""
+    """Return the codec of an old drawing, whose header names it as ANSI_1252 or dos850."""
     found = re.search(rb'\$DWGCODEPAGE\s+3\s+(?:ansi_|dos)(\d+)', data, re.IGNORECASE)
     return f'cp{found[1].decode() if found else 1252}'

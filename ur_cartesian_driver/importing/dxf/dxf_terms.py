@@ -3,9 +3,9 @@
 """
 Terms of DXF: kinds of entities, their group codes, units.
 
-A group code is named with its kind of entity, ``LWPOLYLINE 42``; alone, ``39``, it holds for all
-kinds. A point has its first code only: ``LINE 11`` stands for 11, 21 and 31. ``POLYLINE 70=16`` is
-a bit of a group code. Names and meanings follow the AutoCAD DXF reference.
+A group code is named with its kind of entity, as ``LWPOLYLINE 42``; a code alone, as ``39``, is
+that code of any entity. A point is named by its first code: ``LINE 11`` means 11, 21 and 31.
+``POLYLINE 70=16`` is a bit of a group code. Names and meanings follow the AutoCAD DXF reference.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ UNITS = {
     23: ('US survey yards', 3600.0 / 3937.0),
     24: ('US survey miles', 6336000.0 / 3937.0),
 }
-#: Numbers of the units that $MEASUREMENT 0 means; 1 means all others.
+#: Numbers of the units to which $MEASUREMENT 0 refers; 1 refers to all others.
 ENGLISH = (1, 2, 3, 8, 9, 10, 21, 22, 23, 24)
 _KINDS, _ANY, _NO_EFFECT = 'kinds of entities', 'any entity', 'without effect on a shape'
 _WIDTH = 'it has a width; the tool follows the middle'
@@ -141,7 +141,7 @@ TERMS = term_table(
     refused('INSERT', 'its block contains itself', 'INSERT in its own BLOCK'),
     honoured('BLOCK', 'BLOCK 2', 'BLOCK 10'),
     left_out('BLOCK', 'its entities are in another file', 'BLOCK 70=4', 'BLOCK 70=8'),
-    # How a shape was made, whose points and knots the file has as well.
+    # How a shape was made; the file also has its points and knots.
     honoured(
         _NO_EFFECT,
         *('5', '100', '102', '330', '360', '999', 'LINE 210', 'INSERT 66'),
@@ -167,7 +167,7 @@ TERMS = term_table(
     refused('file', 'save it as a text (ASCII) DXF', 'binary DXF'),
 )
 
-#: Values of a group code that say nothing, beside 0 and an empty one.
+#: Default values of group codes, in addition to 0 and the empty value.
 _DEFAULTS = {
     '6': ('BYLAYER', 'BYBLOCK', 'CONTINUOUS'),
     '48': ('1',),
@@ -176,13 +176,13 @@ _DEFAULTS = {
     '410': ('MODEL',),
 }
 _FLAGS = 70
-#: Of these each bit of their flags is a term.
+#: The kinds of entities for which each bit of the flags is a term.
 _HAVE_BITS = ('LWPOLYLINE', 'POLYLINE', 'VERTEX', 'SPLINE', 'HELIX')
 
 
 @cache
 def _term(kind: str, code: str) -> Term | None:
-    """Return the term of a group code, which may be one of all kinds; a HELIX is a SPLINE."""
+    """Return the term of a group code, of its kind or of any entity; a HELIX is a SPLINE."""
     if kind == 'HELIX':
         kind = 'SPLINE'
     return TERMS.get(f'{kind} {code}') or TERMS.get(code)
@@ -190,7 +190,7 @@ def _term(kind: str, code: str) -> Term | None:
 
 @cache
 def _first_code(code: int) -> int:
-    """Return the group code of a point's x for the code of its y or z."""
+    """Return the group code of a point's x if a code is that of its y or z, else the code."""
     for first, last, x in ((20, 28, 10), (30, 37, 10), (220, 223, 210), (230, 233, 210)):
         if first <= code <= last:
             return x + code - first
@@ -199,7 +199,7 @@ def _first_code(code: int) -> int:
 
 @cache
 def _notable(kind: str, codes: tuple[int, ...]) -> tuple[tuple[int, str], ...]:
-    """Return the group codes of a kind that are not honoured, with their names."""
+    """Return the group codes that are not honoured for a kind of entity, with their names."""
     named = ((code, str(_first_code(code))) for code in codes)
     return tuple(
         (code, name)
@@ -217,16 +217,16 @@ class LeftOut:
         self._found: dict[tuple[str, str], dict[Record, None]] = {}
 
     def add(self, record: Record, why: str, what: str = '') -> None:
-        """Say that a record is left out, or something else about it."""
+        """Note that a record is left out, or make another remark about it."""
         what = what or (record.kind if record.kind in TERMS else f'{record.kind!r:.40}')
         self._found.setdefault((what, why), {})[record] = None
 
     def add_term(self, record: Record, name: str, what: str = '') -> None:
-        """Say that a record is left out for the reason of a term."""
+        """Note that a record is left out for the reason of a term."""
         self.add(record, TERMS[name].reason, what)
 
     def add_entity(self, record: Record) -> None:
-        """Say that an entity is left out because of its kind."""
+        """Note that an entity is left out because of its kind."""
         term = TERMS.get(record.kind)
         if record.kind == 'VERTEX':
             self.add(record, 'it follows no POLYLINE')
@@ -234,7 +234,7 @@ class LeftOut:
             self.add(record, term.reason if term else 'it is no entity that is known here')
 
     def add_codes(self, record: Record) -> None:
-        """Say which group codes of an entity are left out, or not known."""
+        """Note the group codes of an entity that are left out, or not known."""
         for code, name in _notable(record.kind, tuple(record.values)):
             self._add_code(record, name, code)
         if _FLAGS in record.values and record.kind in _HAVE_BITS:
@@ -244,7 +244,7 @@ class LeftOut:
                     self._add_code(record, f'{_FLAGS}={1 << bit}', _FLAGS)
 
     def add_look(self, layer: Record) -> None:
-        """Say what a layer has that the tool does not heed."""
+        """Note the properties of a layer that the tool ignores."""
         for code in (6, 62, 370, 420):
             if code in layer.values:
                 self._add_code(layer, str(code), code)
@@ -260,7 +260,7 @@ class LeftOut:
             self.add(record, term.reason, what)
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Make remarks; each names some of the handles."""
+        """Add the remarks; each names the first handles of its records."""
         for (what, why), records in self._found.items():
             handles = _listed([record.handle for record in records if record.handle])
             for record in records:

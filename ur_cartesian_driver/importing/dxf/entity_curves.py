@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Entities of a drawing as stretches: points in a row with lines, arcs and chords between them."""
+"""Entities of a drawing as stretches: sequences of points with lines and arcs between them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     Vector3,
 )
 
-#: One arc of the robot turns by no more; longer ones are halved.
+#: Largest angle of one arc of the robot [rad]; longer arcs are halved.
 _LONGEST_ARC = 0.95 * pi
-#: Angles of a whole turn are often rounded [turns].
+#: Rounding of the angles of a whole turn in files [turns].
 _WHOLE_TURN = 1e-6
-#: Arcs of a smaller bulge are lines: they are lower than a billionth of their chord.
+#: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
 _CLOSED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 8, 16, 64, 16
 #: Ends that are as near as this are joined [m].
@@ -43,20 +43,20 @@ class _NoPathError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """The motion to each point but the first is a line, or an arc through its via [m]."""
+    """Points [m]: the motion to each but the first is a line, or an arc through its via."""
 
     record: Record
     points: list[Vector3]
     vias: list[Vector3 | None]
 
     def reversed(self) -> Stretch:
-        """Return it in the other direction."""
+        """Return the stretch in the opposite direction."""
         return Stretch(self.record, self.points[::-1], [None, *self.vias[:0:-1]])
 
 
 @dataclass(frozen=True, slots=True)
 class _Pen:
-    """Draws a stretch in coordinates of its entity."""
+    """Draws a stretch in the coordinates of its entity."""
 
     place: Affine
     tolerance: float
@@ -64,14 +64,14 @@ class _Pen:
     vias: list[Vector3 | None] = field(default_factory=list)
 
     def line_to(self, point: Vector3) -> None:
-        """Go straight, or begin."""
+        """Draw a line to a point, or begin there."""
         self.points.append(self.place.point(point))
         self.vias.append(None)
 
     def along_ellipse(
         self, centre: Vector3, a: Vector3, b: Vector3, begin: float, sweep: float
     ) -> None:
-        """Follow centre + a cos t + b sin t from where the pen is, at the angle begin."""
+        """Draw centre + a cos t + b sin t from t = begin, where the pen is, to begin + sweep."""
         centre, a, b = self.place.point(centre), self.place.direction(a), self.place.direction(b)
         if abs(dot(a, b)) > 1e-9 * dot(a, a) or not isclose(norm(a), norm(b), rel_tol=1e-9):
             c, d, e = (np.array(v) for v in (centre, a, b))
@@ -89,7 +89,7 @@ class _Pen:
         self.vias.extend(at[::2])
 
     def along_spline(self, degree: int, knots: Sequence[float], controls: object) -> None:
-        """Follow a B-spline of weighted control points from its begin."""
+        """Draw a whole B-spline with weighted control points."""
         curves = spline_curves(degree, np.array(knots), np.array(controls))
         places = chords(self.place.weighted_points(curves), self.tolerance).tolist()
         self.points.append(tuple(places[0]))
@@ -101,11 +101,11 @@ class _Pen:
         self.vias.extend([None] * (len(places) - 1))
 
     def gap(self) -> float:
-        """Return the distance of the ends [m]."""
+        """Return the distance between the ends [m]."""
         return norm(subtract(self.points[0], self.points[-1]))
 
     def arrive(self, point: Vector3) -> None:
-        """Put the end of a curve exactly where the file says."""
+        """Move the end of a curve exactly to the point that the file gives."""
         self.points[-1] = self.place.point(point)
 
 
@@ -113,11 +113,11 @@ def stretch_of(
     record: Record, place: Affine, tolerance: float, left_out: LeftOut
 ) -> Stretch | None:
     """
-    Return the stretch of an entity; None = it is left out, and said.
+    Return the stretch of an entity; None = the entity is left out, with a remark.
 
-    :param place: where the coordinates of the drawing are [m].
-    :param tolerance: of chords [m].
-    :raises BrokenFile: a value is missing or cannot be meant.
+    :param place: the map of the coordinates of the drawing to [m].
+    :param tolerance: the largest distance of chords from their curve [m].
+    :raises BrokenFile: a value is missing or must be a mistake.
     """
     draw = _DRAWN.get(record.kind)
     if draw is None:
@@ -141,7 +141,7 @@ def stretch_of(
 
 
 def _coordinates(record: Record, place: Affine) -> Affine:
-    """Return where the coordinates of an entity are: a plane one has its own axes."""
+    """Return the map of an entity's coordinates: a plane entity has axes of its own."""
     is_plane = record.kind in ('ARC', 'CIRCLE', 'LWPOLYLINE', 'POLYLINE')
     if not is_plane or (record.kind == 'POLYLINE' and record.integer(70) & _IN_SPACE):
         return place
@@ -188,7 +188,7 @@ def _closed_ellipse(
 
 
 def _sweep(begin: float, end: float) -> float:
-    """Return the angle from begin to end, counter-clockwise; equal ones are a whole turn."""
+    """Return the angle from begin to end, counter-clockwise; a whole turn if they are equal."""
     turns = (end - begin) / tau
     if abs(turns - round(turns)) < _WHOLE_TURN and (round(turns) or turns == 0.0):
         return tau
@@ -223,7 +223,7 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
     for bit in (_MESH, _FACES):
         if flags & bit:
             raise _NoPathError(f'POLYLINE 70={bit}')
-    # The frame of a spline-fit polyline is not seen.
+    # The control frame of a spline-fit polyline is not visible.
     vertices = [v for v in record.vertices if not v.integer(70) & _FRAME]
     for vertex in vertices:
         left_out.add_codes(vertex)
@@ -244,7 +244,7 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
 def _plane_polyline(
     pen: _Pen, corners: Sequence[tuple[float, float, float]], height: float, closed: bool
 ) -> None:
-    """Draw corners x, y with the bulge of what follows: tan(angle / 4)."""
+    """Draw corners (x, y, bulge); tan(angle / 4) is the bulge of the arc after a corner."""
     if not corners:
         return
     pen.line_to((*corners[0][:2], height))
@@ -252,7 +252,7 @@ def _plane_polyline(
         if abs(bulge) < _FLAT or (ax, ay) == (bx, by):
             pen.line_to((bx, by, height))
             continue
-        # The centre lies to the left of the chord where an arc turns left by less than a half.
+        # The centre is left of the chord if the arc turns left by less than half a turn.
         aside = (1.0 - bulge * bulge) / (4.0 * bulge)
         cx = 0.5 * (ax + bx) - aside * (by - ay)
         cy = 0.5 * (ay + by) + aside * (bx - ax)

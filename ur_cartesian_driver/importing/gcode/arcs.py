@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arcs, circles and helices of G2 and G3: their centre, and the points that describe them."""
+"""Arcs, circles and helices of G2 and G3: their centres, and the points that describe them."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-#: The radii at both ends of an arc may differ by so much [m], or by this share, but never by more
-#: than the last [m]: LinuxCNC and GRBL.
+#: The radii at both ends of an arc may differ by the larger of a length [m] and a share of the
+#: radius, but by no more than a second length [m], as in LinuxCNC and GRBL.
 _RADIUS_TOLERANCE, _RADIUS_SHARE, _MAX_RADIUS_TOLERANCE = 5e-6, 1e-3, 5e-4
-#: An arc that turns by less [rad] is a full circle: LinuxCNC.
+#: An arc that turns by less than this angle [rad] is a full circle, as in LinuxCNC.
 _FULL_CIRCLE = 1e-6
-#: Lower is no rise [m].
+#: Smallest rise of a helix, and smallest chord of an arc that is given by its radius [m].
 _MIN_RISE = 1e-6
 _MAX_LINES = 100_000
 
 
 class ArcPlane(NamedTuple):
-    """The plane of arcs: two axes, and the one that they may rise along, right-handed."""
+    """The plane of arcs: two axes, and the axis along which arcs can rise, right-handed."""
 
     name: str
     axes: tuple[int, int, int]
-    #: The letters of the centre along these axes.
+    #: The words that give the centre along these axes.
     letters: tuple[str, str, str]
 
 
@@ -44,18 +44,18 @@ class Arc(NamedTuple):
     start: Sequence[float]
     end: Sequence[float]
     begin: float
-    #: Signed, all turns.
+    #: The signed angle of all turns.
     sweep: float
     radii: tuple[float, float]
 
     @property
     def rises(self) -> bool:
-        """Tell whether it leaves its plane."""
+        """Return whether the arc leaves its plane."""
         axis = self.axes[2]
         return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
 
     def place(self, share: float) -> Vector3:
-        """Return a place on it; between two radii it is a spiral, as in LinuxCNC."""
+        """Return the point at a share of the arc, a spiral if the radii differ (LinuxCNC)."""
         if share == 1.0:
             x, y, z = self.end
             return (x, y, z)
@@ -70,9 +70,9 @@ class Arc(NamedTuple):
 
     def lines(self, tolerance: float) -> list[Vector3]:
         """
-        Return the ends of lines that are nowhere farther from it.
+        Return the ends of lines that are nowhere farther than a tolerance [m] from the arc.
 
-        :raises ValueError: there would be too many.
+        :raises ValueError: there would be too many lines.
         """
         step = 2.0 * acos(max(0.0, 1.0 - min(1.0, tolerance / max(self.radii))))
         count = max(2, ceil(abs(self.sweep) / max(step, 1e-6)))
@@ -81,8 +81,8 @@ class Arc(NamedTuple):
         return [self.place(i / count) for i in range(1, count + 1)]
 
     def arcs(self) -> Iterator[tuple[Vector3, Vector3]]:
-        """Return arcs through three points, as the robot takes them: the middle and the end."""
-        # A half circle is known best by three points.
+        """Yield the middle and the end of each of the robot's arcs, which go through 3 points."""
+        # Three points define an arc of about half a circle best.
         count = ceil(abs(self.sweep) / (0.9 * pi))
         for i in range(count):
             yield self.place((i + 0.5) / count), self.place((i + 1) / count)
@@ -97,11 +97,11 @@ def arc_between(
     turns: int,
 ) -> Arc:
     """
-    Return the arc from one place to another.
+    Return the arc from one point to another.
 
-    :param centre: in the plane; or a radius, negative for more than a half circle.
+    :param centre: the centre in the plane; or a radius, negative for more than a half circle.
     :param direction: clockwise -1 (G2), counterclockwise 1 (G3).
-    :raises ValueError: there is none; a sentence without a full stop.
+    :raises ValueError: there is no such arc; the message is a sentence without a full stop.
     """
     a, b, _ = plane.axes
     ax, ay, bx, by = start[a], start[b], end[a], end[b]
@@ -125,7 +125,7 @@ def arc_between(
 def _centre_of_radius(
     ax: float, ay: float, bx: float, by: float, radius: float, direction: int
 ) -> tuple[float, float]:
-    """Return the centre of an arc by its radius."""
+    """Return the centre of an arc that is given by its radius."""
     dx, dy = bx - ax, by - ay
     chord = hypot(dx, dy)
     if chord < _MIN_RISE:

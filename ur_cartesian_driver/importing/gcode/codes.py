@@ -19,7 +19,7 @@ from ur_cartesian_driver.importing.import_format import Term, term_table, Treatm
 
 
 class Stage(IntEnum):
-    """When a code acts within its line: the order of execution of RS274/NGC."""
+    """The stage of its line in which a code acts, in the order of execution of RS274/NGC."""
 
     MODE = 0
     OUTPUT = 1
@@ -32,18 +32,18 @@ class Stage(IntEnum):
 class Code(Term):
     """A code, or one of the other words of a line."""
 
-    #: The letters of the words that belong to it.
+    #: The letters of the words that belong to the code.
     words: str = ''
     stage: Stage = Stage.MODE
-    #: A line has one code of a group at most; empty = any number.
+    #: A line has at most one code of a group; empty = no such limit.
     group: str = ''
-    #: The letters among them that need no number.
+    #: The letters that need no number on the line of the code.
     bare: str = ''
-    #: All that follows on its line belongs to it, be it words or something else.
+    #: The rest of the line belongs to the code, even if it is not made of words.
     alone: bool = False
-    #: All that follows is a text, for people or the name of a file.
+    #: The rest of the line is a text: a message, or the name of a file.
     text: bool = False
-    #: Afterwards the tool is at a place of the machine.
+    #: The code moves the tool to a place of the machine, which is not known here.
     moves_away: bool = False
 
 
@@ -62,7 +62,7 @@ _refused = partial(_rows, Treatment.REFUSED)
 
 
 def _numbers(letter: str, *ranges: int | tuple[int, int]) -> tuple[str, ...]:
-    """Return the names of codes; a pair stands for all numbers from one to the other."""
+    """Return the names of codes; a pair means all numbers from its first to its last."""
     return tuple(
         f'{letter}{number}'
         for each in ranges
@@ -267,7 +267,7 @@ _PRINTERS = (
     _left_out('printers', _PRINTER, 'RESPOND', 'RESTART', 'RESUME', 'STATUS'),
 )
 
-#: By name. Where a word changes the meaning of its code, both have a row: ``G10 L20``.
+#: Codes by name. A code whose meaning a word changes has a row with that word: ``G10 L20``.
 CODES: Mapping[str, Code] = term_table(
     *_MOTION, *_MODES, *_OFFSETS, *_OUTPUTS, *_TOOLS, *_PROGRAM, *_PRINTERS
 )
@@ -276,18 +276,18 @@ _CHANGED_BY_WORDS = frozenset(name.split()[0] for name in CODES if name[0] in 'G
 
 @lru_cache(maxsize=1024)
 def code_named(name: str) -> Code | None:
-    """Return the row of a code, of the family of a printer's code, or of a name; None = none."""
+    """Return the row of a code or name, or None; G29.5 of a printer uses the row of G29."""
     row = CODES.get(name)
     if row is None and '.' in name:
         family = CODES.get(name.partition('.')[0])
         return family if family and family.topic == 'printers' else None
-    # X_5 is a broken word, and no name.
+    # A name has at least three letters: X_5 is a broken word.
     is_name = '_' in name and sum(map(str.isalpha, name)) > 2
     return CODES['names with _'] if row is None and is_name else row
 
 
 def code_on_line(name: str, words: Mapping[str, float]) -> Code | None:
-    """Return the row of a code with the words of its line; None = it has none."""
+    """Return the row of a code with the words of its line; None = the code is not known."""
     if name in _CHANGED_BY_WORDS:
         if name == 'G10' and 'L' in words:
             return CODES.get(f'G10 L{words["L"]:g}')

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place of the tool in the frame of the file, and how coordinates of the program lead to it.
+The place of the tool in the frame of the file, from the coordinates of the program.
 
 A program does not say where the tool is when it begins, and the places of a machine (G28, G53)
-are not known here. So an axis is known from its first absolute coordinate on. One that begins
-with increments begins at 0, as in RS274/NGC, and one that no line names stays there.
+are not known here. So an axis is known from its first absolute coordinate on. An axis that begins
+with increments begins at 0, as in RS274/NGC; an axis that no line names stays at 0.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import NamedTuple
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 
 AXES = 'XYZ'
-#: The states of an axis; a number above 0 is the line that lost it.
+#: The states of an axis; a state above 0 is the line that made its place unknown.
 _KNOWN, _BEGIN = 0, -1
 
 
 class _Offset(NamedTuple):
-    """Added to a coordinate [m]; in another state than _KNOWN nobody knows it."""
+    """A length that is added to a coordinate [m]; it is unknown unless its state is _KNOWN."""
 
     length: float = 0.0
     state: int = _KNOWN
@@ -32,19 +32,19 @@ class Coordinates:
     """Follows the tool through coordinates and offsets [m]."""
 
     def __init__(self) -> None:
-        """Begin at a place that nobody has said."""
+        """Begin at an unknown place."""
         self.place = [0.0, 0.0, 0.0]
         self.states = [_BEGIN, _BEGIN, _BEGIN]
-        #: Since the last point, the tool went to a place of the machine, or states have changed.
+        #: Flags since the last point: the tool went to a place of the machine; states changed.
         self.is_away, self.has_changed = False, True
-        #: The offsets now, those without G92 and G52, and those that G92.2 has put aside.
+        #: The present offsets, the offsets without G92 and G52, and those that G92.2 suspended.
         self._offsets = self._origin = [_Offset(), _Offset(), _Offset()]
         self._suspended: list[_Offset] = []
-        #: G92 or G52, whose offsets are in use.
+        #: The code whose offsets are in use, G92 or G52; empty = neither.
         self._preset_by = ''
         self._is_named, self._was_known = [False, False, False], [False, False, False]
         self._counts_from_zero = [False, False, False]
-        #: From which row of the path on the axes have these states.
+        #: Rows of the path, and the states of the axes from each of these rows on.
         self._history: list[tuple[int, Sequence[int]]] = []
 
     # ---- moves ---------------------------------------------------------------------------------
@@ -66,7 +66,7 @@ class Coordinates:
             self._set_state(axis, _KNOWN)
 
     def is_named(self, axis: str) -> bool:
-        """Tell whether a coordinate of the program names an axis."""
+        """Return whether the program has given a coordinate on an axis."""
         return self._is_named[AXES.index(axis)]
 
     def absolute(self, axis: int, coordinate: float) -> float:
@@ -74,11 +74,11 @@ class Coordinates:
         return coordinate + self._offsets[axis].length
 
     def lose(self, axes: str, line: int) -> None:
-        """Go to a place of the machine along some axes."""
+        """Go to a place of the machine along some axes; their coordinates become unknown."""
         for axis in map(AXES.index, axes):
             self.is_away = True
             self._set_state(axis, line)
-            # Homing ends G92 in Marlin, and leaves it in RS274/NGC.
+            # Homing ends G92 in Marlin, but not in RS274/NGC.
             if self._preset_by == 'G92' and self._offsets[axis] != self._origin[axis]:
                 self._set_offset(axis, _Offset(state=line))
 
@@ -90,10 +90,10 @@ class Coordinates:
 
     def preset(self, line: int, coordinates: Mapping[int, float]) -> str:
         """
-        Give the place of the tool other coordinates (G92).
+        Set the coordinates of the present place of the tool (G92).
 
-        :returns: the axes of which nothing was known before.
-        :raises BrokenFile: the place was known before, and is not now.
+        :returns: the axes along which the place was not known before.
+        :raises BrokenFile: the place was known earlier in the program, but is not now.
         """
         begun = ''
         for axis, coordinate in coordinates.items():
@@ -104,7 +104,7 @@ class Coordinates:
                     f'{self.states[axis]}; move to a coordinate before',
                 )
             if self.states[axis] != _KNOWN:
-                # The first word on this axis defines the frame of the file.
+                # The first coordinate on this axis defines the frame of the file.
                 begun += AXES[axis]
                 self.place[axis] = coordinate
                 self._origin = [*self._origin]
@@ -117,7 +117,7 @@ class Coordinates:
 
     def preset_origin(self, line: int, coordinates: Mapping[int, float]) -> None:
         """
-        Give the place of the tool other coordinates for good (G10 L20).
+        Set the coordinates of the present place of the tool for good (G10 L20).
 
         :raises BrokenFile: G92 or G52 is in use, or as for :meth:`preset`.
         """
@@ -141,9 +141,9 @@ class Coordinates:
 
     def cancel_preset(self, code: str, line: int) -> None:
         """
-        End G92 and G52 (G92.1, G92.2), or use the offsets again that G92.2 put aside (G92.3).
+        End G92 and G52 (G92.1, G92.2), or restore the offsets that G92.2 suspended (G92.3).
 
-        :raises BrokenFile: there are none.
+        :raises BrokenFile: there are no suspended offsets.
         """
         if code == 'G92.3':
             if not self._suspended:
@@ -163,7 +163,7 @@ class Coordinates:
     # ---- rows of the path ----------------------------------------------------------------------
 
     def start_is_known(self, states_before: Sequence[int]) -> bool:
-        """Tell whether the motion just made began at a known place, or counts from its start."""
+        """Return whether the axes known after the last motion were also known at its start."""
         return self.states == states_before or all(
             before == after or (before == _BEGIN and from_zero)
             for before, after, from_zero in zip(
@@ -172,14 +172,14 @@ class Coordinates:
         )
 
     def record(self, row: int) -> None:
-        """Remember which axes are known from this row of the path on."""
+        """Remember the present states of the axes, from a row of the path on."""
         self._history.append((row, (*self.states,)))
         for axis, state in enumerate(self.states):
             self._was_known[axis] |= state == _KNOWN
         self.has_changed = self.is_away = False
 
     def finish(self, into: PathCollector) -> None:
-        """Leave out the rows whose place nobody has said, and name the assumptions."""
+        """Leave out the rows whose place is not known, and add remarks on the assumptions."""
         for axis, name in enumerate(AXES if len(into) else ''):
             if not self._is_named[axis]:
                 into.remarks.add(0, f'no {name} in the file', f'{name} is 0')

@@ -18,7 +18,7 @@ def collect_gcode(file: Path, options: ImportOptions, into: PathCollector) -> No
     """
     Read a program.
 
-    :raises BrokenFile: a line is no G-code, or cannot be done.
+    :raises BrokenFile: a line is no G-code, or cannot be executed.
     """
     GcodeMachine(file_lines(file_text(file)), options, into).run()
 

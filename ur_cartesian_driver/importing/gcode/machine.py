@@ -25,13 +25,13 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollecto
 
 _MOTIONS = frozenset(('G0', 'G1', 'G2', 'G3'))
 _OF_MOTION = frozenset('XYZIJKRP')
-# W of Prusa is no axis, and U and W of a lathe are X and Z.
+# Prusa's W is no axis, and U and W of a lathe are steps along X and Z.
 _AXIS_WORDS = frozenset('XYZABCE')
-#: They go to a place of the machine along the axes that they name, and all if none.
+#: Codes that go to a place of the machine along the axes that they name, or along all if none.
 _WITH_AXES = ('G28', 'G30', 'G53')
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
-#: The numbers of work offsets in G10.
+#: The codes of the work offsets; G10 numbers them from 1.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
 
 _Words = dict[str, float]
@@ -50,16 +50,16 @@ class GcodeMachine:
         self._has_begun = self._seen_percent = False
         self._frame = _FRAMES[0]
         self._feed_per_turn = self._surface_speed = self._is_lathe = False
-        #: The line of M622 whose M623 has not come.
+        #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
-        #: The lines of G0 while S is above 0.
+        #: The lines of G0 during which S keeps its output on.
         self._powered_travels: list[int] = []
 
     def run(self) -> None:
         """
         Execute the program.
 
-        :raises BrokenFile: a line is no G-code, or cannot be done.
+        :raises BrokenFile: a line is no G-code, or cannot be executed.
         """
         for number, line in self._sequence:
             self._line = number
@@ -70,7 +70,7 @@ class GcodeMachine:
         self._finish()
 
     def _finish(self) -> None:
-        """Say what only the whole program tells."""
+        """Make the remarks for which the whole program has to be known."""
         if self._condition:
             raise BrokenFile(self._condition, 'M622 begins a condition, and no M623 ends it')
         self._outputs.finish()
@@ -83,7 +83,7 @@ class GcodeMachine:
         self._path.coordinates.finish(self._into)
 
     def _pass_by(self, line: str) -> None:
-        """Leave a line out that a printer only executes under a condition."""
+        """Leave out a line that a printer executes only under a condition."""
         if _CONDITION_END.match(line):
             self._condition = 0
         elif line.strip() and line.lstrip()[0] != ';':
@@ -110,7 +110,7 @@ class GcodeMachine:
             self._move(words)
 
     def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
-        """Execute a line with other codes than one of a motion."""
+        """Execute a line with any codes but a single motion code."""
         rows = [self._row(code, words) for code in codes]
         if len(rows) == 1 and rows[0].alone:
             self._do(codes[0], rows[0], words, bare)
@@ -200,7 +200,7 @@ class GcodeMachine:
             )
 
     def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
-        """Take the words that belong to no code; the words of a motion are left."""
+        """Carry out and remove the words that belong to no code, except the words of a motion."""
         if words.keys() <= _OF_MOTION:
             return
         for letter in [each for each in words if each not in _OF_MOTION]:
@@ -297,7 +297,7 @@ class GcodeMachine:
         self._path.coordinates.cancel_preset(code, self._line)
 
     def _set_table(self, code: str, own: _Words) -> None:
-        """Set a work offset (G10 L2), or the coordinates in it of the present place (G10 L20)."""
+        """Set a work offset (G10 L2), or the present coordinates within it (G10 L20)."""
         number = own.get('P', 0.0)
         kind = f'{code} L{own["L"]:g}'
         if number and (number not in range(1, 10) or _FRAMES[int(number) - 1] != self._frame):
@@ -337,7 +337,7 @@ class GcodeMachine:
 
     @cached_property
     def _has_v(self) -> bool:
-        """Tell whether U and V are the second pair of axes of a wire, and no steps of a lathe."""
+        """Return whether the program has V words, so that U is an axis of a wire and no step."""
         return any(re.search(r'V\s*[-+.0-9]', line, re.I) for line in self._lines)
 
 

@@ -13,25 +13,25 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _NUMBER_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?[O:]\s*([0-9]{1,8})\s*(?:[(;].*)?', re.I)
 _END_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?M\s*0*(?:2|30)\b', re.I)
-#: As deep as Fanuc and LinuxCNC.
+#: Largest depth of nested calls, as of Fanuc and LinuxCNC.
 _MAX_DEPTH = 10
-#: Of all subprograms together.
+#: Largest number of executed lines of all subprograms together.
 _MAX_LINES = 200_000
-#: Fanuc writes repetitions and a number of four digits into one P: P51002 is 5 times O1002.
+#: Fanuc packs repetitions and a four-digit number into one P: P51002 is 5 times O1002.
 _PACKED = 10_000
 
 
 @dataclass(slots=True)
 class _Call:
     number: int
-    #: The index of its first line, and of the line to go on at.
+    #: The indices of the first line of the subprogram, and of the line after the call.
     first: int
     back: int
     repeats_left: int
 
 
 class LineSequence:
-    """Yields the lines of a program with their numbers; calls change what comes next."""
+    """Yields the lines of a program with their numbers; calls determine the next line."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         """Begin at the first line."""
@@ -41,7 +41,7 @@ class LineSequence:
         self._in_subprograms = 0
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
-        """Yield the number of the line from 1, and the line."""
+        """Yield the number of each line, from 1, and the line."""
         while self._next < len(self._lines):
             self._next += 1
             if self._calls:
@@ -62,7 +62,7 @@ class LineSequence:
         self._next = len(self._lines)
 
     def meet_number(self, line: int, number: int, *, is_first: bool) -> None:
-        """Pass the line with the number of a program; a program that runs into one is broken."""
+        """Accept the first number of a program; refuse a program that runs into another number."""
         if self._calls:
             raise BrokenFile(line, f'the subprogram O{self._calls[-1].number} has no M99 before')
         if not is_first:
@@ -70,9 +70,9 @@ class LineSequence:
 
     def call(self, line: int, words: dict[str, float]) -> None:
         """
-        Go on at a subprogram (M98 P- L-).
+        Continue at a subprogram (M98 P- L-).
 
-        :raises BrokenFile: the file has no such subprogram.
+        :raises BrokenFile: the call is wrong or too deep, or the file has no such subprogram.
         """
         number, repeats = words.get('P'), words.get('L', 1.0)
         if number is None or set(words) - {'P', 'L'}:
@@ -93,9 +93,9 @@ class LineSequence:
 
     def back(self, line: int, words: dict[str, float]) -> bool:
         """
-        Go on behind the call (M99); return False in the main program.
+        Repeat the subprogram or continue after its call (M99); return False in the main program.
 
-        :raises BrokenFile: it is to go on elsewhere.
+        :raises BrokenFile: M99 names a place, or is in the main program before an M2 or M30.
         """
         if words:
             raise BrokenFile(line, 'M99 with a place to go on at is not read')
@@ -116,7 +116,7 @@ class LineSequence:
         return True
 
     def _first_line(self, line: int, number: int) -> int | None:
-        """Return the index of the first line of a subprogram; None = it is not there."""
+        """Return the index of the first line of a subprogram; None = it is not in the file."""
         found = self._first_lines.get(number, [])
         if len(found) > 1:
             raise BrokenFile(line, f'O{number} is there twice, in lines {found[0]} and {found[1]}')

@@ -3,8 +3,8 @@
 """
 The outputs that codes switch.
 
-S is the power of a spindle or a laser. It drives its output while M3 or M4 is active, also where
-it changes without a code, as GRBL's ``G1 X1 S200``. M5, M2 and M30 set the output to 0.
+S is the power of a spindle or a laser. It drives its output while M3 or M4 is active, even if S
+changes on a line without them, such as GRBL's ``G1 X1 S200``. M5, M2 and M30 set the output to 0.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class CodeOutputs:
     """Switches outputs at the newest point of a path."""
 
     def __init__(self, outputs: Mapping[str, CodeOutput], into: PathCollector) -> None:
-        """Begin with a spindle that stands and a coolant that is off."""
+        """Begin with spindle and coolant off."""
         self._outputs, self._into = outputs, into
         self._keys: dict[str, list[tuple[str, ...]]] = {}
         for key in outputs:
@@ -35,12 +35,12 @@ class CodeOutputs:
         self._ever_on = False
 
     def __contains__(self, code: str) -> bool:
-        """Tell whether a code has an output."""
+        """Return whether a code has an output."""
         return code in self._keys
 
     @property
     def drives_power(self) -> bool:
-        """Tell whether S keeps an output on."""
+        """Return whether S keeps an output on."""
         return bool(self._power_output and self._power and self._spindle != _SPINDLE_OFF)
 
     def set_power(self, line: int, value: float, *, beside_spindle: bool) -> None:
@@ -60,10 +60,11 @@ class CodeOutputs:
 
     def switch(self, line: int, code: str, values: Mapping[str, float]) -> None:
         """
-        Carry out a code for which outputs may be given.
+        Switch the outputs that the options give for a code.
 
-        :param values: its own words.
-        :raises BrokenFile: its output names no values, or S is out of range.
+        :param values: the words that belong to the code.
+        :raises BrokenFile: the code has values but its output is given without any, or S is out of
+            range.
         """
         if code in ('M3', 'M4', 'M5'):
             was_on, self._spindle = self._spindle != _SPINDLE_OFF, code
@@ -88,7 +89,7 @@ class CodeOutputs:
             self._switch(line, code, {}, {})
 
     def finish(self) -> None:
-        """Say that S never had an effect."""
+        """Make a remark if S had no effect in the whole program."""
         if self._power_output and self._power is not None and not self._ever_on:
             self._into.remarks.add(0, 'S without M3 or M4', 'its output is never switched')
 
@@ -110,7 +111,7 @@ class CodeOutputs:
     def _switch(
         self, line: int, code: str, values: Mapping[str, float], modal: Mapping[str, float]
     ) -> None:
-        """Switch the output whose key names the most of the values."""
+        """Switch the output whose key matches the largest number of values."""
         own = [f'{letter}{value:g}' for letter, value in values.items()]
         here = {*own, *(f'{letter}{value:g}' for letter, value in modal.items())}
         keys = [key for key in self._keys.get(code, ()) if here.issuperset(key)]

@@ -28,11 +28,11 @@ class Toolpath:
         #: G17 to G19; empty = none has been given, so it is G17.
         self.plane = ''
         self.relative, self.relative_centre = False, True
-        #: [m]; None = not given.
+        #: The unit of lengths [m]; None = not given yet.
         self.unit = LENGTH_UNITS.get(options.unit)
-        #: [m/s]; None = not given, or of a kind that is no speed.
+        #: The feed [m/s]; None = not given, or given per turn of a spindle.
         self.feed: float | None = None
-        #: The part of X that counts: a half where X is a diameter; None = nobody has said.
+        #: Factor on X: 0.5 if X is a diameter (G7), 1 if it is a radius (G8); None = not given.
         self.share_of_x: float | None = None
         self._has_begun = False
 
@@ -44,7 +44,7 @@ class Toolpath:
         return self.unit
 
     def lengths(self, line: int, words: Mapping[str, float]) -> dict[int, float]:
-        """Return the coordinates among some words by their axes [m]."""
+        """Return the coordinates among some words, by axis [m]."""
         share = self.share_of_x or 1.0
         return {
             axis: words[name] * self.length(line) * (share if axis == 0 else 1.0)
@@ -56,8 +56,8 @@ class Toolpath:
         """
         Carry out a motion.
 
-        :param words: its coordinates, and the centre or radius of an arc.
-        :raises BrokenFile: it cannot be meant.
+        :param words: coordinates, and the centre or radius of an arc.
+        :raises BrokenFile: the motion is not complete, or must be a mistake.
         """
         if self.motion == 'G80':
             raise BrokenFile(line, 'coordinates without G0, G1, G2 or G3 since G80')
@@ -145,9 +145,9 @@ class Toolpath:
         self, line: int, plane: ArcPlane, start: Sequence[float], words: Mapping[str, float]
     ) -> tuple[float, float] | float:
         """
-        Return the centre that the words of an arc give, or its radius.
+        Return the centre of an arc, or its radius, whichever its words give.
 
-        :raises ValueError: they say too little, or contradict each other.
+        :raises ValueError: the words are incomplete, or contradict each other.
         """
         if not self.plane and 'Z' in words and 'Y' not in words and 'J' not in words:
             raise ValueError('an arc along X and Z needs G17 or G18 before, which say its plane')

@@ -4,7 +4,7 @@
 The codes and words of a line of a program.
 
 The grammar follows RS274/NGC: blanks and case mean nothing, a number has no exponent, a letter
-stands once in a line. Commands of printers have other forms; they are known by their beginning.
+occurs once in a line. Commands of printers have other forms and are recognised by their beginning.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _COMMENT = re.compile(r'\([^()]*\)|;.*')
 _MESSAGE = re.compile(r'\(\s*(MSG|DEBUG|PRINT|LOG)\s*,', re.I)
-# Stands for a comment until it is clear that it divides no word; no file has this character.
+# Replaces a comment until it is clear that it divides no word; no file has this character.
 _MARK = '\0'
 _DIVIDED_WORD = re.compile(rf'[A-Z]{_MARK}+[-+.0-9]|[-+.0-9]{_MARK}+[.0-9]')
-# Fifteen digits are more than a float keeps, and more than any length needs.
+# Fifteen digits are all that a float keeps, and more than any length needs.
 _NUMBER = r'[-+]?(?:[0-9]{1,15}(?:\.[0-9]*)?|\.[0-9]+)'
 _WORD = re.compile(rf'([A-Z])({_NUMBER})')
 _BLOCK = re.compile(rf'(?:[A-Z]{_NUMBER})+')
@@ -29,7 +29,7 @@ _WORDS_BEFORE = re.compile(rf'(?:[A-Z]{_NUMBER})*')
 _BARE_LETTER = re.compile(r'[A-Z](?![-+.0-9])')
 _LINE_NUMBER = re.compile(r'N-?[0-9]+(?:\.[0-9]+)?')
 _CHECKSUM = re.compile(r'\*[0-9]+$')
-# Behind the number of a code, as in G92E0, the letter is a word.
+# After the number of a code, as in G92E0, E is a word.
 _EXPONENT = re.compile(r'[A-FH-LN-Z][ \t]*[-+]?[0-9.]+E[-+]?[0-9]+(?![0-9.])', re.I)
 _M_CODE = re.compile(r'(?:N-?[0-9]+)?M([0-9]+(?:\.[0-9]+)?)')
 _QUOTED = re.compile(r'"[^"]*"')
@@ -50,17 +50,17 @@ def read_line(number: int, line: str) -> Block | None:
     """
     Return the codes and words of a line; None = it has none.
 
-    Lines that are no words, such as ``%``, come as a block with the name of their row in the
+    A line that has no words, such as ``%``, becomes a block with the name of its row in the
     table of codes.
 
-    :param number: of the line, for sentences about it.
-    :raises BrokenFile: it is no G-code.
+    :param number: the number of the line, for error messages.
+    :raises BrokenFile: the line is no G-code.
     """
     text = line
     if ';' in line or '(' in line:
         text = _COMMENT.sub(_MARK, line)
     text = text.replace(' ', '').replace('\t', '')
-    # Some foreign letters have capitals of ours.
+    # Some other letters have ASCII capitals, such as the long s.
     text = text.upper() if text.isascii() else text
     if not text:
         return None
@@ -83,7 +83,7 @@ def _block(number: int, line: str, text: str) -> Block:
         text = _LINE_NUMBER.sub('', text, count=1) if text[0] == 'N' else text
     if _BLOCK.fullmatch(text) is None or text[0] == 'O':
         return _odd_block(number, line, text)
-    # Blanks tell an exponent from the word of an extruder.
+    # A blank before it distinguishes the word of an extruder from an exponent.
     if 'E' in text and _EXPONENT.search(line) and _EXPONENT.search(_COMMENT.sub('', line)):
         raise BrokenFile(
             number,
@@ -109,7 +109,7 @@ def _code_name(letter: str, value: str) -> str:
 
 
 def _printer_code(text: str) -> str | None:
-    """Return the code of a line with a text behind, or with values that are no numbers."""
+    """Return the code of a line if a text, or values that are no numbers, follow it."""
     match = _M_CODE.match(text)
     entry = code_named(name := _code_name('M', match[1])) if match else None
     if match is None or entry is None:
@@ -120,7 +120,7 @@ def _printer_code(text: str) -> str | None:
 
 
 def _odd_block(number: int, line: str, text: str) -> Block:
-    """Return the block of a line that is no row of words with numbers."""
+    """Return the block of a line that does not consist of words with numbers."""
     first = text[:1]
     if first in ('%', '/', ''):
         return Block([first] if first else [], {})

@@ -3,9 +3,9 @@
 """
 Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
 
-That is YAML, a document for each message, of which nobody sees more than mappings, lists, numbers
-and texts. Here each of these knows its line. PyYAML only splits the text: the words of its errors,
-and the limits of its nesting, differ between versions.
+They are YAML, a document for each message, and consist of mappings, lists, numbers and texts only.
+Each of these values knows its line here. PyYAML only splits the text, because the wording of its
+errors and its limits on nesting differ between versions.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ import yaml
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
 
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-#: A message nests five deep.
+#: Deepest nesting; messages have about five levels.
 _MAX_DEPTH = 50
 _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
-#: Printed between two messages, and not ended by a line of its own.
+#: The notice of a lost message: its hyphens are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
-#: Line ends of YAML 1.1, which are none for anybody else: they would shift the numbers of lines.
+#: Characters that end lines only in YAML 1.1: they would shift the numbers of lines.
 _NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')
 _NO_TEXT = re.compile('[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
 
@@ -43,7 +43,7 @@ class MessagePart:
         """
         Return a field.
 
-        :raises BrokenFile: it is missing.
+        :raises BrokenFile: the field is missing.
         """
         if name.startswith('_'):
             raise AttributeError(name)
@@ -78,17 +78,17 @@ class MessageText(str):
 class EchoedMessage:
     """The text of a message."""
 
-    #: The first one, from 1.
+    #: The number of the message's first line, from 1.
     line: int
     text: str
-    #: Whether a line of three hyphens says that it is whole.
+    #: Whether a line of three hyphens ends the message, so that it is not cut off.
     is_whole: bool
 
     def read(self) -> MessagePart:
         """
         Return the fields.
 
-        :raises BrokenFile: they cannot be read.
+        :raises BrokenFile: the text is no message, or is cut off.
         """
         if strange := _NO_TEXT.search(self.text):
             line = self.line + self.text.count('\n', 0, strange.start())
@@ -108,7 +108,7 @@ class EchoedMessage:
         return values[0]
 
     def _no_message(self, row: int) -> BrokenFile:
-        """Return the refusal of a text that is no YAML, by the row where that shows."""
+        """Return the refusal of a text that is no YAML, at the row of PyYAML's error."""
         lines = self.text.split('\n')
         row = min(row, len(lines) - 1)
         if '\t' in lines[row][: len(lines[row]) - len(lines[row].lstrip())]:
@@ -118,7 +118,7 @@ class EchoedMessage:
 
 
 def echoed_messages(text: str, remarks: ImportNotes) -> list[EchoedMessage]:
-    """Return the messages of a text, which are not yet read."""
+    """Split a text into its messages, without reading them."""
     text = text.replace('\r\n', '\n').replace('\r', '\n').translate(_NO_LINE_ENDS)
     for lost in _LOST.finditer(text):
         line = text.count('\n', 0, lost.start()) + 1
@@ -141,8 +141,9 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
     """
     Return the value that begins with an event of PyYAML.
 
-    :param first: the line that PyYAML counts from.
-    :raises BrokenFile: messages have none of this kind.
+    :param first: the line of the file that is PyYAML's line 0.
+    :raises BrokenFile: the value is a reference or is nested too deeply, or a field in it has no
+        name or occurs twice.
     """
     line = first + event.start_mark.line
     if isinstance(event, yaml.ScalarEvent):
@@ -171,7 +172,7 @@ def _value(event: Any, events: Iterator[Any], first: int, depth: int) -> Any:
 
 
 def _scalar(event: Any, line: int) -> MessageNumber | MessageText:
-    """Return a number or a text; 1e-05 of ROS 1 is a number, which YAML 1.1 takes for a text."""
+    """Return a number or a text; ROS 1's 1e-05 is a number, although YAML 1.1 reads it as text."""
     scalar: MessageNumber | MessageText
     try:
         scalar = MessageText(event.value) if event.style else MessageNumber(event.value)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Types of messages by the fields that tell them, and fields."""
+"""The types of messages with the fields that identify them, and the treatment of fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PATH, POSE_ARRAY = 'nav_msgs/Path', 'geometry_msgs/PoseArray'
 JOINT_TRAJECTORY = 'trajectory_msgs/JointTrajectory'
 ROBOT_TRAJECTORY = 'moveit_msgs/RobotTrajectory'
 DISPLAY_TRAJECTORY = 'moveit_msgs/DisplayTrajectory'
-#: A point of the path for each message.
+#: Types of messages that have a single pose: each message is a point of the path.
 POSES = (
     'nav_msgs/Odometry',
     'geometry_msgs/PoseStamped',
@@ -78,7 +78,7 @@ TERMS = term_table(
     ),
     left_out('times of a whole path', 'a goal begins when it is sent', 'stamp'),
 )
-#: Fields that only messages of the type have all, in the order in which they are looked for.
+#: The fields that identify a type; a message has the first type all of whose fields it has.
 _TELLING: Mapping[str, tuple[str, ...]] = {
     PATH: ('poses',),
     JOINT_TRAJECTORY: ('joint_names', 'points'),
@@ -105,5 +105,5 @@ _TELLING: Mapping[str, tuple[str, ...]] = {
 
 
 def message_type(fields: Collection[str]) -> str:
-    """Return the type of a message by its fields; empty = none of the table."""
+    """Return the type of a message by its fields; empty = the type is not in the table."""
     return next((name for name, telling in _TELLING.items() if set(telling) <= set(fields)), '')

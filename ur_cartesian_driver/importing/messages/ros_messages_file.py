@@ -3,8 +3,8 @@
 """
 Paths and joint trajectories of ROS, and streams of poses.
 
-As echo prints them, or as the messages themselves: the reader of one reads the other, because a
-part of the text has the fields of a message as attributes.
+They come as text printed by echo, or as the messages themselves. One reader reads both, because
+the parsed text has the fields of a message as attributes.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows
 from ur_cartesian_driver.motion.goal.goal import Posture, SegmentType
 
 _WITHOUT_TURN = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0))
-#: Of the header of a pose.
+#: The fields that are read from the header of a pose.
 _STAMPED = ('frame_id', 'stamp')
 
 
 def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> None:
     """
-    Read the first message of a file; of single poses all messages.
+    Read the first message of a file, or all messages if they are single poses.
 
-    :raises BrokenFile: it is none of these messages, or a broken one.
+    :raises BrokenFile: the first message is of another type, or a message is broken.
     """
     messages = echoed_messages(file_text(file), into.remarks)
     if not messages:
@@ -65,9 +65,9 @@ def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> Non
 
 def collect_message(message: Any, options: ImportOptions, into: PathCollector) -> None:
     """
-    Read a message, or what has its fields.
+    Read a message, or an object with its fields.
 
-    :raises BrokenFile: it has no path, or a value is none of its field.
+    :raises BrokenFile: the message has no path, or a value does not suit its field.
     """
     name = _type(message)
     if name == PATH:
@@ -97,7 +97,7 @@ def _type(message: Any) -> str:
     """
     Return the type of a message that has a path or a pose.
 
-    :raises BrokenFile: it has none.
+    :raises BrokenFile: the message has neither.
     """
     line, fields = getattr(message, 'line', 0), _fields(message)
     name = message_type(fields)
@@ -116,7 +116,7 @@ def _stream(messages: Sequence[EchoedMessage], remarks: ImportNotes) -> Iterator
     """
     Yield the single poses of a stream, whose last message can be cut off.
 
-    :raises BrokenFile: another message is broken.
+    :raises BrokenFile: a message that is not cut off is broken.
     """
     for i, message in enumerate(messages):
         can_be_cut = i > 0 and not message.is_whole
@@ -145,7 +145,7 @@ def _fields(part: Any) -> Mapping[str, Any]:
 
 
 def _say_others(part: Any, read: Collection[str], remarks: ImportNotes, line: int = 0) -> None:
-    """Say which fields of a part are left out, unless they are empty or zero."""
+    """Add remarks on the fields of a part that are left out, unless they are empty or zero."""
     for name, value in _fields(part).items():
         if name not in read and not _is_default(value):
             term = TERMS.get(name) or TERMS.get(f'header.{name}')
@@ -154,7 +154,7 @@ def _say_others(part: Any, read: Collection[str], remarks: ImportNotes, line: in
 
 
 def _is_default(value: Any) -> bool:
-    """Tell whether a field has its default: nobody has set it."""
+    """Return whether a field has its default value, so that it was probably not set."""
     if isinstance(value, str | float | int):
         return not value
     if hasattr(value, '__len__'):
@@ -163,7 +163,7 @@ def _is_default(value: Any) -> bool:
 
 
 def _line(thing: Any, index: int) -> int:
-    """Return the line of a part; of a message its number from 1."""
+    """Return the line of a part of a text, or the number (from 1) of a part of a message."""
     return int(getattr(thing, 'line', index + 1))
 
 
@@ -179,7 +179,7 @@ def _part(value: Any, names: str, line: int) -> Any:
     """
     Return a part of a message.
 
-    :raises BrokenFile: it is a number, a text or a list.
+    :raises BrokenFile: the part is a number, a text or a list.
     """
     if isinstance(value, str | float | list):
         raise BrokenFile(getattr(value, 'line', line), f'a mapping of {names} is missing')
@@ -193,9 +193,9 @@ def _numbers(part: Any, names: str, line: int) -> tuple[float, ...]:
 
 def _sequence(value: Any, name: str, line: int) -> Sequence[Any]:
     """
-    Return a list.
+    Return a value that has to be a list.
 
-    :raises BrokenFile: it is none, or echo has cut it.
+    :raises BrokenFile: the value is no list, or echo has shortened it.
     """
     line = getattr(value, 'line', line)
     if isinstance(value, str) and value.startswith('<') and 'type:' in value:
@@ -220,7 +220,7 @@ def _seconds(part: Any, line: int) -> float:
 
 
 def _frame(header: Any, line: int) -> str:
-    """Return the frame of a header; empty where there is none."""
+    """Return the frame of a header; empty = none."""
     if header is None:
         return ''
     frame = _part(header, 'stamp, frame_id', line).frame_id
@@ -233,7 +233,7 @@ class _Pose(NamedTuple):
     line: int
     position: tuple[float, ...]
     quaternion: tuple[float, ...]
-    #: None = the message has no header.
+    #: The time in the header [s]; None = the message has no header.
     stamp: float | None
     frame: str
 
@@ -242,8 +242,8 @@ def _collect_poses(items: Sequence[Any] | Iterator[Any], frame: str, into: PathC
     """
     Read poses.
 
-    :param frame: of the header of the whole path.
-    :raises BrokenFile: they are in several frames, or a value is none of its field.
+    :param frame: the frame in the header of the whole path; empty = none.
+    :raises BrokenFile: the poses are in several frames, or a value does not suit its field.
     """
     items = list(items)
     poses = list(_poses(items))
@@ -278,7 +278,7 @@ def _poses(items: Sequence[Any]) -> Iterator[_Pose]:
     """
     Yield poses with or without a header, a covariance or a twist.
 
-    :raises BrokenFile: one is no pose.
+    :raises BrokenFile: an item is no pose.
     """
     for i, item in enumerate(items):
         line = _line(item, i)
@@ -296,7 +296,7 @@ def _poses(items: Sequence[Any]) -> Iterator[_Pose]:
 
 
 def _say_others_of_pose(item: Any, remarks: ImportNotes) -> None:
-    """Say which fields of a pose are left out."""
+    """Add remarks on the fields of a pose that are left out."""
     _say_others(item, ('header', 'pose', 'position', 'orientation'), remarks)
     if 'header' in _fields(item):
         _say_others(item.header, _STAMPED, remarks)
@@ -315,7 +315,8 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
     """
     Read a JointTrajectory.
 
-    :raises BrokenFile: it is none of this arm, or a value is none of its field.
+    :raises BrokenFile: an option moves the path, the joints are not those of the arm, or a value
+        does not suit its field.
     """
     line = getattr(message, 'line', 0)
     if options.frame not in ('', 'base') or options.origin != IDENTITY or options.scale != 1.0:
@@ -357,13 +358,13 @@ def _collect_joints(message: Any, options: ImportOptions, into: PathCollector) -
 
 def _joint_order(names: Sequence[str], line: int, remarks: ImportNotes) -> list[int]:
     """
-    Return where the joints of the arm are among names, from base to wrist 3.
+    Return the indices of the arm's joints among names, from base to wrist 3.
 
-    :raises BrokenFile: one is missing, or there are two.
+    :raises BrokenFile: a joint is missing, or occurs twice.
     """
     order = []
     for joint in JOINT_NAMES:
-        # A prefix tells the arms of a cell apart.
+        # Names can have a prefix that distinguishes the arms of a cell.
         found = [i for i, name in enumerate(names) if name.endswith(joint)]
         if len(found) != 1:
             raise BrokenFile(line, f'joint_names has {len(found)} of {joint}, but must have one')

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place of the arm while a program runs, as far as the file tells.
+The place of the arm while a program runs, as far as it follows from the file.
 
-Before the first move the place is unknown, and after nothing but lines the joints are. Most
-programs never ask for them, so inverse kinematics waits until one does.
+Before the first move the place is unknown, and if all moves were lines the joints still are. Most
+programs never ask for the joints, so inverse kinematics is put off until a program does.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 
 class ArmPlace:
-    """The place, kept also in the motion generator that the functions of the controller read."""
+    """The place, also kept in the motion generator, which the controller's functions read."""
 
     def __init__(self, controller: Controller, options: ImportOptions) -> None:
-        """Begin where nobody knows."""
+        """Begin at an unknown place."""
         self._motion, self._arm = controller.motion, options.arm
         self._model = options.arm.model.name
         self._motion.T_flange_tcp = options.T_flange_tcp
-        #: Whether the pose, and the joints, follow from the file.
+        #: Whether the pose follows from the file, and whether the joints do.
         self.is_known = self.knows_joints = False
         #: The last pose of the tool, and its TCP; None = the pose follows from the joints.
         self._last: tuple[Pose, Pose] | None = None
-        #: Poses of the flange since the joints were asked for last.
+        #: Poses of the flange since the joints were last solved.
         self._flange_poses: list[Pose] = []
-        #: The lines of the calls that set a TCP, and their poses as text.
+        #: For each TCP that was set: the line of the call, and the pose as text.
         self.set_tcps: dict[Pose, tuple[int, str]] = {}
-        #: Joint positions that a program has asked for by a pose, which is the same on any arm.
+        #: Joint positions that the program got for a pose; the pose is the same for any arm.
         self.solutions: set[tuple[Value, ...]] = set()
 
     @property
@@ -58,7 +58,7 @@ class ArmPlace:
         return not self._flange_poses
 
     def of_arm(self, tcp: Pose) -> str:
-        """Return the clause that names the arm and the TCP behind places of joint positions."""
+        """Return the clause that names the arm and the TCP assumed for joint positions."""
         return f'their places are those of a {self._model} with the TCP {_text(tcp)}'
 
     def forward(self, q: Vector6, tcp: Pose) -> Pose:
@@ -66,13 +66,13 @@ class ArmPlace:
         return self._arm.forward(q) @ tcp
 
     def go_to(self, pose: Pose) -> None:
-        """Put the tool to a pose."""
+        """Put the tool at a pose."""
         self._last = pose, self.tcp
         self._flange_poses.append(pose @ self.tcp.inverse())
         self.is_known = True
 
     def turn_to(self, q: Vector6) -> None:
-        """Put the arm to joint positions."""
+        """Put the arm at joint positions."""
         self._motion.teleport(q)
         self._last = None
         self._flange_poses.clear()
@@ -80,7 +80,7 @@ class ArmPlace:
 
     def joints(self) -> Vector6:
         """
-        Return the joints, each pose as near to the one before as can be.
+        Return the joints, solved pose by pose with the solution nearest to the one before.
 
         :raises RuntimeException: the arm cannot reach a pose.
         """
@@ -91,9 +91,9 @@ class ArmPlace:
 
     def solution(self, pose: Pose, near: Vector6) -> Vector6:
         """
-        Return the joints for a pose that are nearest to others.
+        Return the joints for a pose that are nearest to given joints.
 
-        :raises RuntimeException: there are none.
+        :raises RuntimeException: the arm cannot reach the pose.
         """
         q = nearest(self._arm, pose @ self.tcp.inverse(), near)
         if q is None:
@@ -101,14 +101,14 @@ class ArmPlace:
         return q
 
     def unreachable(self, pose: str) -> str:
-        """Return the clause about a pose that the arm cannot reach."""
+        """Return the clause that says that the arm cannot reach a pose."""
         return (
             f'a {self._model} cannot reach {pose} with the TCP {_text(self.tcp)}; name your arm '
             'and its TCP in the options'
         )
 
     def assumption(self, say: Callable[[str], None], *, of_joints: bool) -> None:
-        """Report the assumption for a place that is not in the file."""
+        """Report the place that is assumed, if the file does not determine it."""
         if not self.is_known:
             say(
                 'where the arm stands before its first move is not in the file; '

@@ -24,19 +24,19 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.urscript import RuntimeException
 
-#: What a function is that takes a cycle.
+#: The generator of a function that takes a cycle.
 Steps = Generator[None, None, None]
 
-#: Offset of outputs behind a wait [s]: without one they would be switched before it.
+#: Offset of outputs after a wait [s]: without an offset they would be switched before it.
 AFTER_WAIT = 0.01
 
 
 @dataclass(slots=True, kw_only=True)
 class CollectedPoint:
-    """A point, which later calls may still make a stop."""
+    """A point, which later calls can still turn into a stop."""
 
     kind: SegmentType
-    #: Of the active TCP; None = the pose follows from the joints.
+    #: The pose of the active TCP; None = it follows from the joints.
     pose: Pose | None
     joints: Vector6 | None = None
     acceleration: float
@@ -47,12 +47,12 @@ class CollectedPoint:
     line: int = 0
     dwell: float = 0.0
     waits: bool = False
-    #: Whether an output is switched some time after the arm has come.
+    #: Whether an output is switched some time after the arm's arrival.
     delays: bool = False
 
 
 class CollectedEvents:
-    """Points, outputs and waits in the order of the program; one thread moves."""
+    """Points, outputs and waits in the order of the program; one thread moves at a time."""
 
     def __init__(self, run: RunningScript, place: ArmPlace) -> None:
         """Begin without points."""
@@ -60,19 +60,19 @@ class CollectedEvents:
         #: The newest point.
         self.last: CollectedPoint | None = None
         self._events: list[CollectedPoint | IOCommand | InputWait] = []
-        #: The TCP that lines and arcs belong to.
+        #: The TCP of the lines and arcs; None = there are none yet.
         self._tcp: Pose | None = None
-        #: The thread that moved last, and the one within a motion call.
+        #: The thread that moved last, and the thread that is in a motion call.
         self._mover = MAIN
         self._moving: int | None = None
 
     def __len__(self) -> int:
-        """Return how many points, outputs and waits there are."""
+        """Return the number of points, outputs and waits."""
         return len(self._events)
 
     @property
     def acts(self) -> bool:
-        """Whether the running thread moves, or is the main one behind another that has moved."""
+        """Whether the running thread moved last, or is the main one and that thread has ended."""
         thread = self.run.thread
         return thread == self._mover or (thread == MAIN and not self.run.lives(self._mover))
 
@@ -83,16 +83,16 @@ class CollectedEvents:
 
     def take(self) -> None:
         """
-        Let the running thread move.
+        Begin a motion call of the running thread.
 
-        :raises RuntimeException: another one is within a motion call.
+        :raises RuntimeException: another thread is in a motion call.
         """
         if self._moving not in (None, self.run.thread):
             raise RuntimeException('another thread is already controlling the robot')
         self._moving = self._mover = self.run.thread
 
     def moved(self) -> Steps:
-        """Take the cycle of a move."""
+        """Spend one cycle on a motion call, then end the call."""
         try:
             yield
         finally:
@@ -102,7 +102,7 @@ class CollectedEvents:
         """
         Add a point.
 
-        :raises RuntimeException: its move is of another TCP than those before.
+        :raises RuntimeException: the move is of another TCP than the lines before it.
         """
         if point.joints is None:
             if self._tcp not in (None, self.place.tcp):
@@ -115,13 +115,13 @@ class CollectedEvents:
         self._events.append(point)
 
     def stop(self) -> None:
-        """Let the arm stop at the last point."""
+        """Make the arm stop at the last point."""
         if self.last is not None and self.last.blend > 0.0:
             self.run.say('a blend', f'the arm stops at the point of line {self.last.line}')
             self.last.blend = 0.0
 
     def rest(self, time: float) -> None:
-        """Let the arm rest at the last point [s]."""
+        """Make the arm rest at the last point for a time [s]."""
         if self.last is None:
             self.run.say('sleep()', 'a goal begins with a move')
         elif time > 0.0:
@@ -137,7 +137,7 @@ class CollectedEvents:
         """
         Wait for an input at the last point.
 
-        :raises RuntimeException: a goal does it in another order.
+        :raises RuntimeException: a goal cannot wait after another wait or a delayed output.
         """
         point = self.last
         if point is None:
@@ -174,7 +174,7 @@ class CollectedEvents:
         self._events.append(replace(output, offset=offset))
 
     def hand_over(self, into: PathCollector) -> None:
-        """Hand over all; joint positions reach the poses of the TCP that the lines have."""
+        """Hand over all events; joint positions become poses of the TCP of the lines."""
         tcp = self.place.tcp if self._tcp is None else self._tcp
         if (found := self.place.set_tcps.get(tcp)) is not None:
             line, pose = found

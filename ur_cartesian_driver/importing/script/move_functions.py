@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The moves of programs: each method is a function of theirs, and its target is a point.
+The moves of programs: each method is a URScript function whose target becomes a point.
 
-A move is done at once, and takes a cycle.
+A move reaches its target at once, and takes one cycle.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from ur_cartesian_driver.urscript.script_values import Value
 
 #: Defaults of the manual for the tool [m/s^2, m/s], and for fractions of the arm's limits.
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
-#: Larger numbers are millimetres or degrees [m], [rad].
+#: Larger lengths [m] and angles [rad] must be meant in millimetres and degrees.
 FAR, MAX_ANGLE = 3.0, 12.6
-#: Joints that turn less stand still [rad].
+#: Joints that turn by less than this stand still [rad].
 SAME_ANGLE = 1e-6
 
 #: Acceleration and speed, as a program gives them.
@@ -126,7 +126,7 @@ class MoveFunctions:
         yield from self._stop(a)
 
     def set_pos(self, q: Value) -> None:
-        """Put the arm to joint positions, as only a simulated robot does."""
+        """Put the arm at joint positions, which only a simulated robot can do."""
         self._place.turn_to(six(q, 'q'))
 
     def _stop(self, a: Value) -> Steps:
@@ -148,7 +148,7 @@ class MoveFunctions:
         else:
             pose, joints = None, self._angles(name, six(q, 'q'))
         length = None
-        # Joints that nobody has asked for take inverse kinematics of all poses since.
+        # Solving the joints takes inverse kinematics of all poses since they were last solved.
         if (
             joints is not None
             and place.knows_joints
@@ -188,7 +188,7 @@ class MoveFunctions:
                 here = self._place.pose
                 length = max(here.distance_to(target), here.angle_to(target) / TURN_RATIO)
                 if kind is SegmentType.LINEAR and here.distance_to(target) < SAME_POINT:
-                    # The tool only turns: a goal counts in rad, and the robot 4 rad as a metre.
+                    # The tool only turns: the rates are in rad in a goal, and 4 rad are a metre.
                     unit = TURN_RATIO
             a, v = self._rates(name, rates, length, time, blend, (TOOL_A, TOOL_V))
             self._events.add(
@@ -200,7 +200,7 @@ class MoveFunctions:
         yield from self._events.moved()
 
     def _is_here(self, pose: Pose) -> bool:
-        """Tell whether a pose is where the tool is known to be."""
+        """Return whether a pose is the known place of the tool."""
         here = self._place.pose
         return (
             self._place.is_known
@@ -218,7 +218,7 @@ class MoveFunctions:
         defaults: tuple[float, float],
     ) -> tuple[float, float]:
         """
-        Return acceleration and speed; with a time those by which the move takes it.
+        Return acceleration and speed; if a time is given, those with which the move takes it.
 
         The robot stretches the trapezoid of `a` and `v` to the time, as recordings of a UR3 show.
         """
@@ -242,7 +242,7 @@ class MoveFunctions:
         return a * stretch * stretch, v * stretch
 
     def _pose(self, name: str, value: Value) -> Pose:
-        """Return a target; of joint positions the pose that they reach."""
+        """Return the pose of a target, which can also be joint positions."""
         if not is_pose(value):
             tcp = self._place.tcp
             self._run.say('joint positions', self._place.of_arm(tcp))

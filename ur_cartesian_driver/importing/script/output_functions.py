@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rests, outputs, and waits for inputs: each method is a function of programs."""
+"""Rests, outputs, and waits for inputs: each method is a function that programs call."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _INPUT_KINDS = {
 
 
 class OutputFunctions:
-    """Sleeps, waits and outputs of a program, which also reads its own outputs back."""
+    """Sleeps, waits and outputs of a program, which can read its own outputs back."""
 
     def __init__(self, events: CollectedEvents, controller: Controller) -> None:
         """Collect into these events."""
@@ -41,7 +41,7 @@ class OutputFunctions:
         yield
 
     def wait_for_input(self, function: Value, n: Value, level: Value) -> Steps:
-        """Wait for a digital input, in the place of a loop that does."""
+        """Wait for a digital input, in place of a loop that waits for it."""
         while not self._events.acts:
             yield
         if function == 'get_digital_in':  # the old numbering: 8 and 9 are on the tool
@@ -105,7 +105,7 @@ class OutputFunctions:
     set_analog_out = set_standard_analog_out  # the old name
 
     def set_analog_outputdomain(self, port: Value, domain: Value) -> None:
-        """Choose what an output carries: 0 = current, 1 = voltage."""
+        """Choose the domain of an analog output: 0 = current, 1 = voltage."""
         pin, voltage = index(port, 'port', 2), index(domain, 'domain', 2)
         self._domains[pin] = AnalogDomain.VOLTAGE if voltage else AnalogDomain.CURRENT
         self._controller.io.analog_out_voltage[pin] = bool(voltage)

@@ -3,8 +3,8 @@
 """
 All functions that a program can call, each treated as the table of terms says.
 
-Honoured functions that neither move nor switch run in the simulated controller, which computes and
-reads. Functions that are left out run there, too, as far as they take no time, so that wrong
+Honoured functions that neither move nor switch run in the simulated controller, which computes
+their values. Functions that are left out also run there unless they take time, so that wrong
 arguments are found.
 """
 
@@ -37,9 +37,9 @@ from ur_cartesian_driver.urscript import (
     Value,
 )
 
-#: Cycles without a point after which nothing more is expected of other threads.
+#: After this many cycles without an event, no more events are expected from other threads.
 QUIET_CYCLES = 500
-#: What has to be known for functions that read the arm: its pose, or its joints as well.
+#: Functions that read the arm need its pose, or its joints as well.
 _POSE, _JOINTS = False, True
 _READERS = {
     'get_actual_tcp_pose': _POSE,
@@ -60,27 +60,27 @@ _READERS = {
 
 
 class NoPeer:
-    """Sockets to a peer that takes everything and hangs up when it is read from."""
+    """Sockets to a peer that accepts all data and hangs up when the program reads from it."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin without sockets."""
         self._open: set[str] = set()
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Connect, as far as the program sees."""
+        """Open a socket that looks connected to the program."""
         self._open.add(name)
 
     def state(self, name: str) -> SocketState:
-        """Return whether nothing has been read since the socket was opened."""
+        """Return OPEN until the socket is read from, else CLOSED."""
         return SocketState.OPEN if name in self._open else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
-        """Return nothing, and let the read end at once."""
+        """Return no data and close the socket, so that the read ends at once."""
         self._open.discard(name)
         return bytearray()
 
     def send(self, name: str, data: bytes) -> bool:
-        """Take everything."""
+        """Accept all data."""
         return True
 
     def close(self, name: str) -> None:
@@ -90,13 +90,13 @@ class NoPeer:
 
 
 class _NoServer(RemoteObject):
-    """The procedures of a server that returns nothing."""
+    """A server whose procedures return nothing."""
 
     def __init__(self, run: RunningScript) -> None:
         self._run = run
 
     def call(self, method: str, arguments: Sequence[Value]) -> Value:
-        """Return nothing."""
+        """Return nothing, and remark that the call is left out."""
         self._run.leave_out(f'{method}()', TERMS['rpc_factory'].reason)
         return None
 
@@ -110,7 +110,7 @@ class ProgramFunctions:
         self._run, self._place = events.run, events.place
 
     def by_name(self) -> Mapping[str, Builtin]:
-        """Return all of them."""
+        """Return all functions by name."""
         own: dict[str, Any] = {
             'get_actual_tcp_pose': self._tcp_pose,
             'get_target_tcp_pose': self._tcp_pose,
@@ -171,7 +171,7 @@ class ProgramFunctions:
     # ---- the arm -------------------------------------------------------------------------------
 
     def _reader(self, name: str, does: Any) -> Any:
-        """Return a function that reports its assumption for a place that is not in the file."""
+        """Wrap a function so that it first reports the place of the arm if that is assumed."""
         place, of_joints, signature = self._place, _READERS[name], inspect.signature(does)
 
         @functools.wraps(does)
@@ -203,7 +203,7 @@ class ProgramFunctions:
         return script_pose(self._place.pose @ self._place.tcp.inverse())
 
     def _set_tcp(self, pose: Value, tcp_name: Value = '') -> None:
-        """Change the TCP; the robot has to have it as well."""
+        """Change the TCP, and keep the line for a remark: the robot has to have this TCP, too."""
         offset = (
             Pose.from_rotation_vector(six(pose, 'pose')) if any(six(pose, 'pose')) else IDENTITY
         )
@@ -232,5 +232,5 @@ class ProgramFunctions:
 
 
 def _nothing(*values: Value, **named: Value) -> Value:
-    """Do nothing, as a function that the simulated controller does not have."""
+    """Do nothing, in place of a function that the simulated controller does not have."""
     return None

@@ -18,9 +18,9 @@ class RunningScript:
     def __init__(self) -> None:
         """Begin before the program is compiled."""
         self.interpreter: ScriptInterpreter | None = None
-        #: The function that was called last of those whose value is another one on a robot.
+        #: A clause on the last call whose value can be different on a robot; empty = none.
         self._assumed = ''
-        #: By reason: the subjects of its remarks, and the lines.
+        #: The subjects and the lines of the remarks, by reason.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property
@@ -35,27 +35,27 @@ class RunningScript:
         return number if isinstance(number, int) else MAIN
 
     def lives(self, thread: int) -> bool:
-        """Tell whether a thread has not ended."""
+        """Return whether a thread is alive."""
         return self.interpreter is not None and self.interpreter.alive(ThreadHandle(thread))
 
     def say(self, what: str, why: str) -> None:
-        """Say something about the line that runs; what has the same reason is said together."""
+        """Add a remark on the running line; remarks with the same reason are merged."""
         names, lines = self._said.setdefault(why, ({}, set()))
         names[what] = None
         lines.add(self.line)
 
     def leave_out(self, what: str, why: str) -> None:
-        """Say that a function has not the effect or the value that it has on a robot."""
+        """Remark that a function lacks the effect or the value that it has on a robot."""
         if why in ASSUMED:
             self._assumed = f'{what} of line {self.line} has no robot or machine to ask here'
         self.say(what, why)
 
     def suspicion(self, before: str) -> str:
-        """Return why a program may fail or not end, behind some text; empty if nobody knows."""
+        """Return a text and a possible reason for a failure or an endless loop; empty = none."""
         return f'{before}{self._assumed}' if self._assumed else ''
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Add all that was said to the remarks of the import."""
+        """Add all remarks to those of the import."""
         for why, (names, lines) in self._said.items():
             for line in lines:
                 remarks.add(line, ', '.join(names), why)

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The program in a file, whatever stands around it, and its loops that nothing here would end.
+The program in a file, whatever surrounds it, with marks at the loops that would not end here.
 
-Files hold one program, as a controller takes it; functions and statements, as PolyScope reads them
-into a program of its own; a program with a call of it behind; or only functions. A loop without an
-end gets a call of :data:`END_OF_ROUND`, a loop that waits for an input becomes a call of
-:data:`WAIT`: functions with names that no program can write.
+A file holds one program, as a controller accepts it; functions and statements, as PolyScope
+inserts them into a program of its own; a program and a call of it; or only functions. An endless
+loop gets a call of :data:`END_OF_ROUND`, and a call of :data:`WAIT` replaces a loop that waits for
+an input: functions with names that no program can write.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from ur_cartesian_driver.urscript.script_values import truth
 
 END_OF_ROUND, WAIT, PAUSE = ' end of round', ' wait', ' pause'
 
-#: The first statement, if it is a secondary program.
+#: A file whose first statement is a secondary program.
 _SECONDARY = re.compile(r'(?:\s|#.*\n)*(sec)\s+\w+\s*\(')
 #: Nodes without statements in them.
 _SIMPLE = (Expression, CallStatement, AssignStatement, LabelStatement)
@@ -60,7 +60,8 @@ def parsed(text: str) -> ScriptProgram:
     """
     Return the program of a file.
 
-    :raises BrokenFile: there is none, or a word that fits no rule.
+    :raises BrokenFile: the text is no URScript, is a secondary program, or has only functions,
+        none of which is clearly the main one.
     """
     if secondary := _SECONDARY.match(text):
         line = text.count('\n', 0, secondary.start(1)) + 1
@@ -87,7 +88,7 @@ def _main(program: ScriptProgram) -> tuple[Statement, ...]:
     if not functions:
         return program.body
     if len(functions) == 1 and not functions[0].parameters:
-        # A controller takes the definition as the program, whose variables are global.
+        # To a controller, the only function is the program, whose variables are global.
         only = functions[0]
         if not statements or (len(statements) == 1 and _calls(statements[0]) == [only.name]):
             others = (node for node in program.body if node not in (only, *statements))
@@ -99,9 +100,9 @@ def _main(program: ScriptProgram) -> tuple[Statement, ...]:
 
 def _only_root(functions: list[FunctionDefinition]) -> FunctionDefinition:
     """
-    Return the only function that no other one calls, if it has no parameters.
+    Return the only function that no function calls; it must have no parameters.
 
-    :raises BrokenFile: it has, or there is none or more than one.
+    :raises BrokenFile: it has parameters, or there is not exactly one such function.
     """
     called = {name for function in functions for node in function.body for name in _calls(node)}
     roots = [function for function in functions if function.name not in called]
@@ -128,7 +129,7 @@ def _calls(node: SyntaxNode) -> list[str]:
 
 
 def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
-    """Return a call in the place of a node, of its own function if no other is named."""
+    """Return a call at the place of a node: of a named function, or else of the node's own."""
     place = {'line': node.line, 'column': node.column}
     given = tuple(CallArgument(name=None, value=value, **place) for value in arguments)
     return CallStatement(
@@ -137,7 +138,7 @@ def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
 
 
 def _without_waiting(node: SyntaxNode) -> Any:
-    """Return a statement whose loops end, and that waits for nobody."""
+    """Return a statement with calls in place of waits, and of END_OF_ROUND in endless loops."""
     if isinstance(node, PauseStatement):
         return _call(node, PAUSE)
     if isinstance(node, WhileStatement):
@@ -158,7 +159,7 @@ def _without_waiting(node: SyntaxNode) -> Any:
 
 
 def _is_endless(loop: WhileStatement) -> bool:
-    """Tell whether a loop has a constant condition, and nothing in it that ends it."""
+    """Return whether a loop's condition is always true, and no statement leaves a round early."""
     condition = loop.condition
     return (
         isinstance(condition, ConstantExpression)
@@ -168,7 +169,7 @@ def _is_endless(loop: WhileStatement) -> bool:
 
 
 def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
-    """Tell whether a statement can leave the loop around it, or begin its next round."""
+    """Return whether a statement can leave the loop around it, or begin its next round."""
     if isinstance(node, FunctionDefinition):
         return False
     if isinstance(node, HaltStatement | ReturnStatement):
@@ -180,7 +181,7 @@ def _may_end(node: SyntaxNode, in_loop: bool = False) -> bool:
 
 
 def _input_wait(loop: WhileStatement) -> CallStatement | None:
-    """Return the call in place of a loop that only waits for a digital input."""
+    """Return the call that replaces a loop if the loop only waits for a digital input."""
     for statement in loop.body:
         call = statement.call if isinstance(statement, CallStatement) else None
         waits = isinstance(call, CallExpression) and call.function in ('sync', 'sleep')
@@ -197,7 +198,7 @@ def _input_wait(loop: WhileStatement) -> CallStatement | None:
 
 
 def _input_level(condition: Expression) -> tuple[CallExpression | None, bool]:
-    """Return the call that a condition asks, and with which of its values the condition holds."""
+    """Return the call in a condition, and the value of the call that makes the condition true."""
     if isinstance(condition, UnaryExpression) and condition.operator == 'not':
         read, level = _input_level(condition.operand)
         return read, not level

@@ -249,7 +249,7 @@ TERMS = term_table(
     ),
 )
 
-#: Reasons of functions whose value is another one than on a robot.
+#: Reasons of functions whose value here differs from that on a robot.
 ASSUMED = frozenset({_IDLE, _UNANSWERED, TERMS['random'].reason})
 #: The functions, by name.
 FUNCTIONS = {

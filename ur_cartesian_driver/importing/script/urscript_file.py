@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-URScript: the program runs in our interpreter, on an arm that is at each target at once.
+URScript: the program runs in our interpreter, on an arm that reaches each target at once.
 
-So variables, loops, functions and poses relative to others are done as the controller does them,
-and what a move leads to is collected. Nothing waits for the arm or for a person: a program reads
-the inputs of an arm without anything connected.
+So variables, loops, functions and relative poses work as on the controller, and the targets of
+moves are collected. Nothing waits for the arm or for a person, and inputs have the values of an
+arm to which nothing is connected.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript import CompileError, ScriptInterpreter
 from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEEDED
 
-#: A program that takes longer does not end: cycles, points, and nodes of the syntax tree.
+#: A program beyond these bounds probably does not end: cycles, points, nodes of the syntax tree.
 MAX_CYCLES, MAX_POINTS, MAX_NODES = 100_000, 100_000, 10_000_000
-#: Bound on the computation of a thread between two moves. A sequence of statements counts as a
-#: whole, and slicers write long ones.
+#: Bound on the nodes that a thread evaluates between two moves. A block of statements is paid for
+#: as a whole, and slicers write long ones.
 MAX_NODES_AT_ONCE = 5_000_000
 
 
@@ -39,7 +39,7 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
     """
     Run a program and collect its moves.
 
-    :raises BrokenFile: it is no program, fails, or does not end.
+    :raises BrokenFile: the file has no program, or the program fails or does not end.
     """
     # Ends of lines other than LF would change the numbers of lines.
     program = parsed('\n'.join(file_lines(file_text(file))))
@@ -64,7 +64,7 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
     line = 0
     for _ in range(MAX_CYCLES):
         interpreter.step()
-        # The clock, for programs that wait; nothing moves.
+        # Advance the clock for programs that wait; nothing moves.
         controller.cycles += 1
         line = interpreter.main_location[0]
         if interpreter.error is not None:

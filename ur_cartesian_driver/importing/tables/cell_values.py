@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers and times of cells, or the row with a cell that is neither."""
+"""The numbers and times in the cells of a table; an error names the row of any other cell."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ur_cartesian_driver.importing.tables.column_names import POSITION, ROLES
 from ur_cartesian_driver.importing.tables.table_columns import Column
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: Python's float() takes more: underscores, digits of other scripts, nan.
+#: A number of a table; Python's float() also accepts underscores, digits of other scripts, nan.
 _NUMBER = re.compile(r'\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*', re.IGNORECASE | re.ASCII)
-#: Nothing is as large: the ns since 1970 have 19 digits.
+#: All numbers are smaller: even the ns since 1970 have only 19 digits.
 _MAX_NUMBER = 1e30
 _NO_CHARACTER_OF_IT = re.compile(r'[^-+.0-9eE \t]')
-#: Of cells, one a line: one with thousands separators, and one with a comma that separates
-#: decimals for sure. In 1,234 nobody knows.
+#: In a text with one cell on each line: a cell with thousands separators, and a cell whose comma
+#: must separate decimals. The comma in 1,234 could be either.
 _WITH_THOUSANDS = re.compile(r'[.,][^\n,.]*,|,[^\n,.]*\.')
 _CERTAIN_COMMA = re.compile(r'^(?!\s*[-+]?[1-9]\d{0,2},\d{3}\s*$).*,.*$', re.MULTILINE | re.ASCII)
-#: A time of day has a second colon; 01:30 could be minutes and seconds.
+#: A time of day has two colons; 01:30 could be minutes and seconds.
 _MOMENT = re.compile(r'\d:\d\d:\d')
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-#: From which number on a time without a unit counts ns, us or ms since 1970: in seconds these
-#: would be thousands of years.
+#: Above these bounds a time without a unit is in ns, us or ms since 1970: in seconds it would be
+#: thousands of years.
 _UNIX_UNITS = ((1e17, 1e-9, 'ns'), (1e14, 1e-6, 'us'), (1e11, 1e-3, 'ms'))
 
 
@@ -38,7 +38,7 @@ def cell_values(
     """
     Return the columns by their roles, in SI units.
 
-    :raises BrokenFile: names the first row with a cell that is no number.
+    :raises BrokenFile: a cell is no number; the error names the first such row.
     """
     values, faults = {}, []
     for column, cells in _with_points(texts, lines).items():
@@ -96,9 +96,9 @@ def _times(
 
 def _seconds(cell: str, line: int) -> float:
     """
-    Return the seconds of a date with a time, or of a time of day.
+    Return the seconds from 1970 to a date and time, or from midnight to a time of day.
 
-    :raises BrokenFile: it is neither.
+    :raises BrokenFile: the cell is neither.
     """
     try:
         moment = datetime.fromisoformat(cell.strip())
@@ -115,12 +115,12 @@ def _seconds(cell: str, line: int) -> float:
 
 def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[Column, list[str]]:
     """
-    Return the cells with decimal points.
+    Return the cells with decimal points in place of decimal commas.
 
-    :raises BrokenFile: a comma in a number can mean two things.
+    :raises BrokenFile: cells have or may have thousands separators, or mix points and commas.
     """
     numeric = [column for column, cells in texts.items() if not _MOMENT.search(cells[0])]
-    # All cells as one text, a line each: that is searched faster than cell by cell.
+    # One text, with a line for each cell, is searched faster than the cells one by one.
     joined = '\n'.join('\n'.join(texts[column]) for column in numeric)
     if ',' not in joined:
         return texts
@@ -141,7 +141,7 @@ def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[C
             'comma; write points everywhere',
         )
     if _CERTAIN_COMMA.search(joined) is None and all(
-        # As thousands the points would be too far away.
+        # The comma can separate thousands only if the points are then still within reach.
         abs(float(cell.replace(',', ''))) * column.factor < MAX_DISTANCE
         for column in numeric
         if column.role in ROLES[POSITION]

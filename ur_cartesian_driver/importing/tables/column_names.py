@@ -3,9 +3,9 @@
 """
 Names of columns, as programs write them, and their meaning.
 
-A term is a group of columns that make one thing together, such as ``qx, qy, qz, qw``. Case,
-blanks, ``_``, ``.``, ``/`` and ``-`` make no difference: ``Pos X`` and ``pos_x`` are one name. Of
-a path of names, as in ROS, the last two count.
+A term is a group of columns that belong together, such as ``qx, qy, qz, qw``. Case, blanks, ``_``,
+``.``, ``/`` and ``-`` make no difference: ``Pos X`` and ``pos_x`` are the same name. A path of
+names, as in ROS, is also recognised by its last two names.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ ROLES: Mapping[str, tuple[str, ...]] = {
     SPEED: ('speed',),
     BLEND: ('blend',),
 }
-#: What one table has once, by the first role of a group.
+#: The kinds of values of which a table has only one, by the first role of their group.
 KINDS = {
     'x': 'position',
     'qx': 'orientation',
@@ -67,7 +67,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     **dict.fromkeys(('t', 'sec', 'nanosec'), Quantity.TIME),
     'speed': Quantity.SPEED,
 }
-#: Units that the program fixes, where the header has none.
+#: Units that follow from the program that writes such columns, if the header has none.
 FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
     POSE: {**dict.fromkeys(_XYZ, 'm'), **dict.fromkeys(_RXYZ, 'rad')},
     ROS_POSE: dict.fromkeys(_XYZ, 'm'),
@@ -77,7 +77,8 @@ FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
 
 
 _WORDS = 'a path has no such quantity'
-#: Braces stand for each of their letters. Of groups that give the same, the first one counts.
+#: Braces mean each of their letters in turn. Of groups that give the same kind of values, the
+#: first one in TERMS is used.
 TERMS = term_table(
     honoured(
         POSITION,
@@ -134,10 +135,10 @@ TERMS = term_table(
     left_out(OTHER, 'joints follow from the pose', 'actual_q_{012345}'),
     left_out(OTHER, _WORDS, '{rgb}', 'intensity', 'index', 'frame', 'seq', 'speed_scaling'),
 )
-#: Why columns are left out that no table has.
+#: The reason why columns with unknown names are left out.
 OTHERS_REASON = _WORDS
 
-#: Words of names that stand for an orientation.
+#: Words in a name that suggest an orientation.
 _ORIENTATION_WORDS = frozenset(
     'quat quaternion orientation orient rot rotation euler rpy roll pitch yaw heading'.split()
 )
@@ -146,7 +147,7 @@ _UNIT_BEHIND = re.compile(r'[\s_/,:]+(?:in\s+)?')
 
 
 def letters(name: str) -> str:
-    """Return what counts of a name."""
+    """Return the letters of a name that make a difference."""
     name = name.strip().lower().lstrip('%#/_ ')
     return re.sub(r'[\s_./]+|(?<=\w)-(?=\w)', '', name)
 
@@ -172,12 +173,12 @@ _ORIENTATIONS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Title:
-    """A title of a column, taken apart."""
+    """A title of a column, split into name and unit."""
 
-    #: The letters of a name of the table; empty = no name of it.
+    #: The letters of a name in the table of terms; empty = the name is not known.
     name: str
     unit: str
-    #: As the file has it.
+    #: The title as the file has it.
     text: str
 
 
@@ -195,13 +196,13 @@ def read_title(text: str) -> Title:
 
 
 def _known(name: str) -> str:
-    """Return the letters of a name of the table, of a path of names its end, or nothing."""
+    """Return the letters of a known name, or of the known end of a path; empty = not known."""
     ends = (name, '.'.join(re.split(r'[./]', name)[-2:]))
     return next((found for end in ends if (found := letters(end)) in _KNOWN), '')
 
 
 def is_orientation(title: Title) -> bool:
-    """Tell whether a title stands for an orientation or a normal, by a known name or its words."""
+    """Return whether a title means an orientation or a normal, by a known name or its words."""
     words = re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])', title.text)
     return title.name in _ORIENTATIONS or not _ORIENTATION_WORDS.isdisjoint(
         word.lower() for word in words

@@ -13,13 +13,13 @@ from ur_cartesian_driver.importing.import_options import LENGTH_UNITS
 
 
 class Quantity(Enum):
-    """A kind of number; its value is an example of a unit."""
+    """A kind of number; the value of each member is an example of its unit."""
 
     LENGTH = 'mm'
     ANGLE = 'deg'
     TIME = 's'
     SPEED = 'mm/s'
-    #: Without a unit.
+    #: A number without a unit.
     PURE = '-'
 
 
@@ -64,5 +64,5 @@ def plain_unit(text: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Tell whether a text is a unit of some quantity."""
+    """Return whether a text is a unit of some quantity."""
     return any(plain_unit(text) in units for units in UNITS.values())

@@ -3,7 +3,7 @@
 """
 A table with named columns: CSV of scanners, spreadsheets, recorders and our own scripts.
 
-The header names the columns, with their units: ``x [mm]``, ``x(mm)`` or ``x_mm``. Where commas do
+The header names the columns, with their units: ``x [mm]``, ``x(mm)`` or ``x_mm``. If commas do
 not separate the columns, numbers can have decimal commas.
 """
 
@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows, normali
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
-#: Larger turns are degrees [rad].
+#: Larger turns [rad] must be in degrees.
 _MAX_TURN = 4.0 * np.pi
 
 
@@ -44,7 +44,7 @@ def collect_csv(file: Path, options: ImportOptions, into: PathCollector) -> None
     """
     Read a table.
 
-    :raises BrokenFile: a line is none of a table.
+    :raises BrokenFile: the file is no table, or a column or a cell cannot be read.
     """
     table = read_table(file_lines(file_text(file)), is_header, options.unit, into.remarks)
     columns = find_columns(table.titles, table.units, table.line, options, into.remarks)
@@ -71,7 +71,7 @@ def collect_csv(file: Path, options: ImportOptions, into: PathCollector) -> None
 
 
 def _check_signs(values: Mapping[str, Floats], lines: Sequence[int]) -> None:
-    """Refuse a speed that is not above 0, and a blend below."""
+    """Refuse a speed that is not above 0, and a blend radius below 0."""
     for name in ('speed', 'blend'):
         numbers = values.get(name, np.ones(1))
         wrong = numbers <= 0.0 if name == 'speed' else numbers < 0.0
@@ -83,7 +83,7 @@ def _check_signs(values: Mapping[str, Floats], lines: Sequence[int]) -> None:
 
 
 def _rows(values: Mapping[str, Floats], roles: Sequence[str]) -> Floats | None:
-    """Return columns side by side, or None where the table has not all of them."""
+    """Return columns side by side, or None if the table lacks one of them."""
     if not values.keys() >= set(roles):
         return None
     return np.column_stack([values[role] for role in roles])
@@ -93,7 +93,7 @@ def _orientations(values: Mapping[str, Floats], lines: Sequence[int]) -> Floats 
     """
     Return the unit quaternions (n, 4) of a table that has orientations.
 
-    :raises BrokenFile: a row has none.
+    :raises BrokenFile: a row has no unit quaternion, or turns by too much.
     """
     if (quaternions := _rows(values, ROLES[QUATERNION])) is not None:
         lengths = np.linalg.norm(quaternions, axis=1)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The columns of a table that a path is made of, with their units; all others are said."""
+"""The columns of a table from which a path is made, with their units; remarks name all others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ur_cartesian_driver.importing.tables.column_names import (
 from ur_cartesian_driver.importing.tables.column_units import plain_unit, Quantity, UNITS
 
 _POSITION, _ORIENTATION, _NORMAL = 'position', 'orientation', 'normal'
-#: Kinds that an option replaces, with the reason.
+#: Kinds of values that an option replaces, with the reason.
 _REPLACED: Mapping[ToolOrientation, Mapping[str, str]] = {
     ToolOrientation.FILE: {},
     ToolOrientation.NORMALS: {_ORIENTATION: 'the tool is to point against the normals'},
@@ -37,7 +37,7 @@ _REMEDY = (
     'name them qx, qy, qz, qw, or rx, ry, rz [rad], or roll, pitch, yaw [deg], or give the option '
     'orientation'
 )
-#: Where a column has no unit and the program fixes none: a length and a speed have to say it.
+#: Units of columns for which the file gives none; a length or a speed has to have one.
 _DEFAULT_UNITS = {Quantity.TIME: 's', Quantity.PURE: '-'}
 
 
@@ -46,17 +46,17 @@ class Column:
     """A column of numbers."""
 
     index: int
-    #: As in :data:`~ur_cartesian_driver.importing.tables.column_names.ROLES`.
+    #: One of the roles in :data:`~ur_cartesian_driver.importing.tables.column_names.ROLES`.
     role: str
-    #: To SI.
+    #: The factor from the unit of the column to SI.
     factor: float
     title: str
-    #: Whether the header, or its program, says the unit.
+    #: Whether the unit is known from the header or from the program that wrote the file.
     has_unit: bool
 
 
 def is_header(titles: Sequence[str]) -> bool:
-    """Tell whether titles name a position."""
+    """Return whether titles name a position."""
     names = {read_title(title).name for title in titles}
     return any(_POSITION in _KINDS[term] and names.issuperset(COLUMNS[term]) for term in _KINDS)
 
@@ -69,12 +69,12 @@ def find_columns(
     remarks: ImportNotes,
 ) -> list[Column]:
     """
-    Return the columns of which the path is made, and say which are left out.
+    Return the columns from which the path is made, and add remarks on the others.
 
-    :param texts: of the header.
-    :param units: of a second header line; empty = there is none.
-    :param line: of the header.
-    :raises BrokenFile: a column is missing, stands twice, or cannot be read for sure.
+    :param texts: the titles in the header.
+    :param units: the units in a second line of the header; empty = there is no such line.
+    :param line: the line of the header.
+    :raises BrokenFile: a column is missing, occurs twice, or cannot be read for sure.
     """
     titles = [read_title(text) for text in texts]
     names = [title.name for title in titles]
@@ -129,7 +129,7 @@ def _listed(titles: Sequence[Title]) -> str:
 
 
 def _names(titles: Sequence[Title]) -> str:
-    """Return titles with commas, runs of numbers shortened: RTDE has more than a hundred."""
+    """Return titles with commas; numbered ones become ranges, as RTDE has over a hundred."""
     runs: list[list[str]] = []
     for title in titles:
         stem = title.text.rstrip('0123456789')
@@ -151,7 +151,7 @@ def _refuse_header(titles: Sequence[Title], line: int) -> NoReturn:
 
 
 def _missing(names: set[str], kind: str) -> str:
-    """Return the first missing column of the group that has most of its columns."""
+    """Return the first missing column of the group with the most columns in the table."""
     groups = [COLUMNS[term] for term, kinds in _KINDS.items() if kinds[0] == kind]
     best = max(groups, key=lambda columns: len(names.intersection(columns)))
     return next(column for column in best if column not in names)
@@ -161,9 +161,9 @@ def _say_others(
     rest: list[Title], reasons: Mapping[str, str], line: int, remarks: ImportNotes
 ) -> None:
     """
-    Say which columns are left out.
+    Add remarks on the columns that are left out.
 
-    :raises BrokenFile: they could be the orientation, and there is no other.
+    :raises BrokenFile: such a column could be the orientation, and there is no other orientation.
     """
     oriented = reasons.get(_ORIENTATION) or reasons.get(_NORMAL)
     for name, columns in COLUMNS.items():
@@ -189,7 +189,7 @@ def _say_others(
 
 
 def _refuse_orientation(titles: Sequence[Title], line: int) -> NoReturn:
-    """Refuse a part of an orientation or a normal, or a name of one that is not known."""
+    """Refuse columns that are a part of an orientation or a normal, or seem so by their names."""
     names = {title.name for title in titles}
     kind = next((k for k in (_ORIENTATION, _NORMAL) if _parts(k) & names), '')
     why = f'the column {_missing(names, kind)!r} is missing' if kind else 'the name is not known'
@@ -197,7 +197,7 @@ def _refuse_orientation(titles: Sequence[Title], line: int) -> NoReturn:
 
 
 def _parts(kind: str) -> set[str]:
-    """Return all columns that groups of a kind have."""
+    """Return all columns in the groups of a kind."""
     return {
         column for term, kinds in _KINDS.items() if kinds == [kind] for column in COLUMNS[term]
     }
@@ -209,7 +209,7 @@ def _column(
     """
     Return a column with its factor.
 
-    :raises BrokenFile: the unit is missing, or is none of its quantity.
+    :raises BrokenFile: the unit is missing, or does not suit the quantity.
     """
     quantity = QUANTITIES[role]
     units, given = UNITS[quantity], plain_unit(unit)

@@ -3,9 +3,10 @@
 """
 Header and rows of a table, in the dialects that programs write.
 
-Columns are separated by semicolons, tabs, commas or blanks; the rows need not be separated as the
-header is, because numpy.savetxt writes the header as it was given. The header is the first line
-that names a position. Where the rows begin without one, it is the comment before them.
+Columns are separated by semicolons, tabs, commas or blanks; rows and header can have different
+separators, because numpy.savetxt writes the header as it was given. The header is the first line
+that names a position and is no comment. If the rows begin before such a line, the header is the
+last comment before them that names a position.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ import string
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
 from ur_cartesian_driver.importing.tables.column_units import is_unit
 
-#: None = blanks, however many.
+#: None = any number of blanks.
 _DELIMITERS = (';', '\t', ',', None)
 _COMMENT = re.compile(r'\s*(?:#|%|//)[#%/\s]*')
 _FIRST_LINE_OF_EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
-#: A title of a header that is separated by blanks: its unit belongs to it.
+#: A title, with its unit in brackets, in a header whose titles are separated by blanks.
 _TITLE = re.compile(r'"[^"]*"|[^\s"]+(?:\s+[\[(][^\])]*[\])])?')
-#: The header comes within so many lines.
+#: The number of lines in which the header is looked for.
 _MAX_PREAMBLE = 200
 _SAMPLES = {
     3: 'x [mm],y [mm],z [mm]',
@@ -40,22 +41,22 @@ _SAMPLES = {
 class Table:
     """A table of text."""
 
-    #: Of the header; 0 = there is none.
+    #: The line of the header; 0 = there is no header.
     line: int
     titles: list[str]
     lines: list[str]
-    #: None = blanks.
+    #: None = columns are separated by blanks.
     delimiter: str | None
-    #: Index of the line where the rows begin.
+    #: Index of the line at which the rows begin.
     first: int
-    #: Of a second header line; empty = there is none.
+    #: The units in a second line of the header; empty = there is no such line.
     units: list[str] = field(default_factory=list)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """
-        Yield the numbers of the lines, and their cells.
+        Yield the line number and the cells of each row.
 
-        :raises BrokenFile: a row has another number of cells than the header.
+        :raises BrokenFile: the number of cells of a row and of the header differ.
         """
         width, delimiter = len(self.titles), self.delimiter
         # A spreadsheet ends with rows of empty cells.
@@ -74,7 +75,7 @@ class Table:
             yield number, cells
 
     def _wrong_width(self, line: str, width: int) -> str:
-        """Return the sentence about a row of another width."""
+        """Return the sentence about a row whose number of columns differs from the header's."""
         why = f'it has {width} column{"s" * (width != 1)}, but the header has {len(self.titles)}'
         if self.delimiter == ',' and width > len(self.titles) and '.' not in line:
             why += '; numbers with decimal commas need semicolons or tabs between them'
@@ -87,8 +88,8 @@ def read_table(
     """
     Find header and dialect.
 
-    :param is_header: whether titles name a position.
-    :param unit: the unit of a table of three columns without a header; empty = it is refused.
+    :param is_header: returns whether titles name a position.
+    :param unit: the unit for three columns without a header; empty = such a table is refused.
     :raises BrokenFile: there is no header.
     """
     delimiters: tuple[str | None, ...] = _DELIMITERS
@@ -115,7 +116,7 @@ def read_table(
 def _with_rows(
     lines: list[str], line: int, titles: list[str], delimiters: tuple[str | None, ...]
 ) -> Table:
-    """Return the table with the delimiter that its first row has."""
+    """Return the table with the delimiter of its first row."""
     header = lines[line - 1]
     order = sorted(delimiters, key=lambda d: d is not None and d not in header)
     table = Table(line, titles if titles[-1] else titles[:-1], lines, order[0], line)
@@ -127,7 +128,7 @@ def _with_rows(
     for number, text in itertools.islice(rows, 2):
         split = {d: [cell.strip() for cell in _cells(text, d)] for d in order}
         fitting = [d for d in order if _fits(split[d], len(table.titles))]
-        # Where none fits, the sentence about its width is for the one that the row has.
+        # If none fits, the error about the width is for a delimiter that is in the row.
         table.delimiter = next(iter(fitting), next((d for d in order if d and d in text), None))
         if table.units or not (fitting and _are_units(split[table.delimiter])):
             break
@@ -136,7 +137,7 @@ def _with_rows(
 
 
 def _fits(cells: list[str], width: int) -> bool:
-    """Tell whether a row has so many cells, or one more that is empty."""
+    """Return whether a row has a number of cells, or one more cell that is empty."""
     return bool(cells) and len(cells) - (not cells[-1]) <= width <= len(cells)
 
 
@@ -144,9 +145,9 @@ def _without_header(
     lines: list[str], delimiters: tuple[str | None, ...], unit: str, remarks: ImportNotes
 ) -> Table:
     """
-    Return a table of x, y and z whose unit is known, or its first line as the header.
+    Return a table of x, y and z if their unit is known, or one whose header is the first line.
 
-    :raises BrokenFile: it is empty, or a table of numbers that could be anything.
+    :raises BrokenFile: the file is empty, or has only numbers whose meaning is not known.
     """
     number, line = next(
         (
@@ -172,10 +173,10 @@ def _without_header(
 
 
 def _titles(text: str, delimiters: tuple[str | None, ...]) -> Iterator[list[str]]:
-    """Yield the titles that a line can have."""
+    """Yield the lists of titles into which a line can be split."""
     for delimiter in delimiters:
         if delimiter is None:
-            # Names with blanks inside stand farther apart.
+            # Names that contain blanks are separated by wider gaps.
             yield re.split(r'\s{2,}|\t', text.strip())
             yield [title.strip('"') for title in _TITLE.findall(text)]
         elif delimiter in text:
@@ -183,11 +184,11 @@ def _titles(text: str, delimiters: tuple[str | None, ...]) -> Iterator[list[str]
 
 
 def _cells(line: str, delimiter: str | None) -> list[str]:
-    """Return the cells of a line; none where its quotation marks do not enclose cells."""
+    """Return the cells of a line; empty = its quotation marks do not enclose whole cells."""
     if '"' not in line:
         return line.split(delimiter)
     if delimiter is None:
-        # With this delimiter the reader takes many blanks for one.
+        # With this delimiter the reader treats several blanks as one.
         line, delimiter = line.expandtabs(1).strip(), ' '
     try:
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
@@ -196,7 +197,7 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 
 
 def _is_numeric(line: str) -> bool:
-    """Tell whether more cells of a line are numbers than not."""
+    """Return whether more than half of the cells of a line are numbers."""
     cells = re.findall(r'[^;,\s"]+', line)
     return 2 * sum(map(_is_number, cells)) > len(cells)
 
@@ -210,7 +211,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Tell whether a row is a second line of the header, with the units."""
+    """Return whether a row is a second line of the header, with the units."""
     units = [cell.strip(' []()') for cell in cells]
     return any(is_unit(unit) and unit != '1' for unit in units) and all(
         not unit or is_unit(unit) for unit in units

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Types of numpy arrays by the kind of their numbers; docstrings add shapes and units."""
+"""Types of numpy arrays by the type of their numbers; docstrings add shapes and units."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 Int32s: TypeAlias = NDArray[np.int32]
 Int64s: TypeAlias = NDArray[np.int64]
-#: Indices of rows, as numpy counts them.
+#: Indices of rows, in numpy's own index type.
 Indices: TypeAlias = NDArray[np.intp]

@@ -1,9 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Polynomials between two states, in rows: of the tool, of its turn, and of the joints.
+Polynomials between two states, in rows: for positions of the tool, its turns, and the joints.
 
-Coefficients are (n, 6 powers, k quantities), of the time since the piece began.
+Coefficients have the shape (n, 6 powers, k quantities); the variable is the time since the piece
+began [s].
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 
 class MotionRows(NamedTuple):
-    """A quantity and its first and second derivative by time, each (n, k)."""
+    """A quantity x with its first and second time derivatives v and a, each (n, k)."""
 
     x: Floats
     v: Floats
@@ -46,7 +47,7 @@ def cubic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats:
 
 
 def quintic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats:
-    """Return the quintics (n, 6, k) that have all three at both ends."""
+    """Return the quintics (n, 6, k) that have x, v and a of both states at their ends."""
     T = duration[:, None]
     d, v, w, a, b = end.x - start.x, start.v, end.v, start.a, end.a
     return np.stack(
@@ -81,7 +82,7 @@ def values(coefficients: Floats, t: Floats) -> Floats:
 
 def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     """
-    Return the values of polynomials, one for each row.
+    Return the values and both derivatives of polynomials, at one time for each row.
 
     :param coefficients: (m, 6, k).
     :param t: (m,) the time since the piece began [s].

@@ -3,13 +3,12 @@
 """
 Rigid-body poses in plain floats.
 
-A pose is small and there is one per control cycle, so the single pose is a value of Python floats
-(immutable, comparable, about a microsecond a composition) and not an array. Batches of poses are
-arrays of rows ``x y z qx qy qz qw``, see :func:`pose_rows`.
+A control cycle handles only a few poses, so a single pose consists of Python floats (immutable,
+comparable, about a microsecond per composition) and is no array. Batches of poses are arrays of
+rows ``x y z qx qy qz qw``, see :func:`pose_rows`.
 
-Rotations are unit quaternions ``(x, y, z, w)``, the order of ROS. Rotation vectors (axis times
-angle, the robot's ``rx ry rz``) exist only at the robot's border; the conversions here
-are the only ones.
+Rotations are unit quaternions ``(x, y, z, w)``, in the order of ROS. The robot's own notation,
+rotation vectors ``rx ry rz`` (axis times angle), is converted here.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Pose:
         return cls((x, y, z), quaternion_from_rotation_vector((rx, ry, rz)))
 
     def rotation_vector(self) -> Vector6:
-        """Return ``x y z rx ry rz`` [m, rad], the angle within [0, pi]."""
+        """Return ``x y z rx ry rz`` [m, rad], with the angle within [0, pi]."""
         return (*self.position, *rotation_vector_from_quaternion(self.quaternion))
 
     def matrix(self) -> Floats:
@@ -68,7 +67,7 @@ class Pose:
         return Pose(self.apply(other.position), multiply(self.quaternion, other.quaternion))
 
     def apply(self, point: Vector3) -> Vector3:
-        """Return the coordinates of a point [m] of this frame in the parent frame."""
+        """Return a point that is given in this frame [m] in coordinates of the parent frame."""
         x, y, z = rotate(self.quaternion, point)
         px, py, pz = self.position
         return (x + px, y + py, z + pz)
@@ -80,7 +79,7 @@ class Pose:
         return Pose((-x, -y, -z), inverse)
 
     def distance_to(self, other: Pose) -> float:
-        """Return the distance of the two origins [m]."""
+        """Return the distance between the two origins [m]."""
         return distance(self.position, other.position)
 
     def angle_to(self, other: Pose) -> float:
@@ -88,7 +87,7 @@ class Pose:
         return angle_between(self.quaternion, other.quaternion)
 
     def interpolate(self, other: Pose, fraction: float) -> Pose:
-        """Return the pose at a fraction between both: straight line, shortest rotation."""
+        """Return the pose at a fraction of the way to the other: straight, shortest rotation."""
         (ax, ay, az), (bx, by, bz) = self.position, other.position
         return Pose(
             (ax + fraction * (bx - ax), ay + fraction * (by - ay), az + fraction * (bz - az)),
@@ -161,7 +160,7 @@ def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
     if a == b:
         return a
     dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one orientation: take the short way
+    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are the same orientation: take the short way
     angle = acos(min(1.0, abs(dot)))
     if angle < _SMALL_ANGLE:
         wa, wb = 1.0 - fraction, sign * fraction
@@ -184,7 +183,7 @@ def pose_error(desired: Pose, actual: Pose) -> Pose:
 
     The position is a difference along the axes of the common frame. The orientation is the
     rotation from the actual to the desired orientation in the axes of the actual one,
-    q_actual^-1 q_desired, of the two quaternions that mean it the one with w >= 0.
+    q_actual^-1 q_desired. Of its two quaternions it is the one with w >= 0.
     """
     (ax, ay, az), (dx, dy, dz) = actual.position, desired.position
     x, y, z, w = multiply(conjugate(actual.quaternion), desired.quaternion)
@@ -212,7 +211,7 @@ def rotation_vector_from_quaternion(q: Quaternion) -> Vector3:
 
 
 def rotation_from_quaternion(q: tuple[N, N, N, N]) -> tuple[N, ...]:
-    """Return the rotation matrix of a unit quaternion (or of a batch), nine numbers by rows."""
+    """Return the rotation matrix of a unit quaternion (or a batch): nine numbers, row by row."""
     x, y, z, w = q
     return (
         1.0 - 2.0 * (y * y + z * z),

@@ -33,7 +33,7 @@ def multiply_rows(a: Floats, b: Floats) -> Floats:
 
 
 def cross_rows(a: Floats, b: Floats) -> Floats:
-    """Return the cross products of vectors (n, 3); numpy's own is many times slower for few."""
+    """Return the cross products of vectors (n, 3); for few rows np.cross is many times slower."""
     ax, ay, az = a.T
     bx, by, bz = b.T
     return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=1)
@@ -46,7 +46,7 @@ def conjugate_rows(a: Floats) -> Floats:
 
 
 def distance_rows(a: Floats, b: Floats) -> Floats:
-    """Return the distances of positions (n, 3 or more) [m], also of absurd ones."""
+    """Return the distances between positions (n, 3 or more) [m]; huge ones do not overflow."""
     x, y, z = (b[:, :3] - a[:, :3]).T
     distances: Floats = np.hypot(np.hypot(x, y), z)
     return distances
@@ -60,7 +60,7 @@ def angle_rows(a: Floats, b: Floats) -> Floats:
 
 
 def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
-    """Return ``T_a_c`` (n, 7) of rows ``T_a_b`` (n, 7) and one pose behind all of them."""
+    """Return ``T_a_c`` (n, 7): each row ``T_a_b`` (n, 7) composed with the one pose ``T_b_c``."""
     ax, ay, az, aw = T_a_b[:, 3:].T
     x, y, z = T_b_c.position
     # v + 2 u x (u x v + w v), as in motion.geometry.pose.
@@ -74,7 +74,7 @@ def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
 
 
 def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
-    """Return ``T_a_c`` (n, 7) of one pose before rows ``T_b_c`` (n, 7), normalised."""
+    """Return ``T_a_c`` (n, 7), normalised: one pose ``T_a_b`` composed with rows ``T_b_c``."""
     ux, uy, uz, w = T_a_b.quaternion
     x, y, z = T_b_c[:, :3].T
     # v + 2 u x (u x v + w v), as in motion.geometry.pose.
@@ -85,7 +85,7 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
     rows[:, 1] = y + w * ty + uz * tx - ux * tz + py
     rows[:, 2] = z + w * tz + ux * ty - uy * tx + pz
     turned = multiply_rows(np.array([T_a_b.quaternion]), T_b_c[:, 3:])
-    # In the order of motion.geometry.pose, so that both give the same bits.
+    # Summed in the order of motion.geometry.pose, so that both give the same bits.
     x, y, z, w = turned.T
     rows[:, 3:] = turned * (1.0 / np.sqrt(x * x + y * y + z * z + w * w))[:, None]
     return rows
@@ -107,7 +107,7 @@ def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     sine = np.sin(angle)
     turns = angle >= _SMALL_ANGLE
     safe = np.where(turns, sine, 1.0)
-    # q and -q are one orientation: take the short way.
+    # q and -q are the same orientation: take the short way.
     sign = np.where(dot < 0.0, -1.0, 1.0)
     wa = np.where(turns, np.sin((1.0 - fraction) * angle) / safe, 1.0 - fraction)
     wb = np.where(turns, np.sin(fraction * angle) / safe, fraction) * sign
@@ -122,7 +122,7 @@ def normalized_rows(quaternions: Floats) -> Floats:
 
 
 def keep_hemisphere(poses: Floats) -> None:
-    """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
+    """Flip signs of quaternions (-q is the same orientation as q) so that rows do not jump."""
     dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     poses[1:, 3:] *= signs[:, np.newaxis]

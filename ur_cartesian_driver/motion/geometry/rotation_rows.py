@@ -3,14 +3,14 @@
 """
 Rotation vectors with their exact angular rates, in rows.
 
-An orientation near to R0 is exp(r) R0 with the rotation vector r (n, 3) [rad] in base axes. While
-r changes the body turns with w = J r', where J is the left Jacobian of the rotation group,
+An orientation near R0 is exp(r) R0 with the rotation vector r (n, 3) [rad] in base axes. While
+r changes, the angular velocity is w = J r', where J is the left Jacobian of the rotation group,
 
     J = I + b [r]x + c [r]x^2,    b = (1 - cos |r|) / |r|^2,    c = (|r| - sin |r|) / |r|^3
 
-(J. Sola, J. Deray, D. Atchuthan, A micro Lie theory for state estimation in robotics, 2018). So a
-twist that is requested at a point is met exactly. b and c are power series of |r|^2, which are
-regular everywhere and need no cases.
+(J. Sola, J. Deray, D. Atchuthan, A micro Lie theory for state estimation in robotics, 2018). With
+J, a twist that is requested at a point is met exactly. b and c are computed as power series in
+|r|^2, which need no special case at r = 0.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose_rows import cross_rows
 
-# Terms of the series: exact to rounding for turns up to two full turns.
+# Number of terms of the series: exact up to rounding for rotations of up to two full turns.
 _TERMS = 26
 _B_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in range(_TERMS)])
 _C_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in range(_TERMS)])
@@ -37,7 +37,7 @@ def exp_rows(r: Floats) -> Floats:
 
 
 def log_rows(quaternions: Floats) -> Floats:
-    """Return the rotation vectors (n, 3) of unit quaternions (n, 4), their angles in [0, pi]."""
+    """Return the rotation vectors (n, 3) of unit quaternions (n, 4), with angles in [0, pi]."""
     upper = np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0) * quaternions
     length = np.linalg.norm(upper[:, :3], axis=1)
     scale = np.where(
@@ -48,7 +48,7 @@ def log_rows(quaternions: Floats) -> Floats:
 
 
 def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
-    """Return angular velocity [rad/s] and acceleration [rad/s^2] (n, 3) of a turn, base axes."""
+    """Return angular velocity [rad/s], acceleration [rad/s^2] (n, 3) of a turn, in base axes."""
     r, v, a = turn
     b, b_s, c, c_s = _series(r)
     s = 2.0 * np.einsum('ij,ij->i', r, v)[:, None]  # the derivative of |r|^2
@@ -60,7 +60,7 @@ def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
 
 
 def rotation_rates(r: Floats, w: Floats, e: Floats) -> MotionRows:
-    """Return r, |r| < 2 pi, and its derivatives with these :func:`angular_rates`."""
+    """Return r (|r| < 2 pi) with the derivatives for which :func:`angular_rates` gives w, e."""
     b, _, c, _ = _series(r)
     K = _cross_matrices(r)
     J = np.eye(3) + b[:, :, None] * K + c[:, :, None] * (K @ K)
@@ -74,7 +74,7 @@ def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return b, its derivative by |r|^2, c and its derivative, each (n, 1)."""
     s = np.einsum('ij,ij->i', r, r)[:, None]
     b, b_s, c, c_s = np.zeros((4, *s.shape))
-    # No more terms than the largest turn needs.
+    # Only as many terms as the largest turn needs.
     terms = _TERMS if s.max(initial=0.0) > 4.0 else 14
     for k in range(terms - 1, -1, -1):
         b_s, b = b_s * s + b, b * s + _B_SERIES[k]

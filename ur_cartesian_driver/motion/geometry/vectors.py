@@ -27,7 +27,7 @@ def vector3(values: Iterable[float]) -> Vector3:
     """
     Return three values as a vector.
 
-    :raises ValueError: there are more or fewer.
+    :raises ValueError: there are not exactly three values.
     """
     x, y, z = values
     return (x, y, z)
@@ -35,9 +35,9 @@ def vector3(values: Iterable[float]) -> Vector3:
 
 def vector6(values: Iterable[float]) -> Vector6:
     """
-    Return six values as a vector; of an array pass ``row.tolist()``, so that they are floats.
+    Return six values as a vector; for an array pass ``row.tolist()``, to get Python floats.
 
-    :raises ValueError: there are more or fewer.
+    :raises ValueError: there are not exactly six values.
     """
     a, b, c, d, e, f = values
     return (a, b, c, d, e, f)
@@ -54,7 +54,7 @@ def subtract(a: Vector3, b: Vector3) -> Vector3:
 
 
 def scale(a: Vector3, factor: float) -> Vector3:
-    """Return a, times a factor."""
+    """Return a times a factor."""
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
@@ -75,7 +75,7 @@ def norm(a: Vector3) -> float:
 
 def unit(a: Vector3) -> Vector3:
     """
-    Return the direction, of length 1.
+    Return the vector of length 1 in the same direction.
 
     :raises ZeroDivisionError: the vector is zero.
     """
@@ -93,7 +93,7 @@ def subtract6(a: Vector6, b: Vector6) -> Vector6:
 
 
 def scale6(a: Vector6, factor: float) -> Vector6:
-    """Return a, times a factor."""
+    """Return a times a factor."""
     return vector6(factor * value for value in a)
 
 

@@ -13,11 +13,11 @@ class Plane:
     """A plane with the arm on one side of it: a table, a wall, the border of a cell."""
 
     name: str
-    #: A point on it, in ``base`` (the frame of the controller, not ``base_link``) [m].
+    #: A point on the plane, in ``base`` (the frame of the controller, not ``base_link``) [m].
     point: tuple[float, float, float]
-    #: Unit vector in ``base`` into the allowed side.
+    #: Unit normal in ``base``, pointing into the allowed side.
     normal: tuple[float, float, float]
-    #: Distance that the arm keeps from it [m].
+    #: Distance that the arm keeps from the plane [m].
     margin: float = 0.0
 
     @classmethod
@@ -25,7 +25,7 @@ class Plane:
         """
         Read ``name x y z nx ny nz [margin]`` in ``base`` [m]; the normal may have any length.
 
-        :raises ValueError: the text has another form.
+        :raises ValueError: the text does not have this form.
         """
         words = text.split()
         if len(words) not in (7, 8):
@@ -60,7 +60,7 @@ def parse_planes(texts: tuple[str, ...]) -> tuple[Plane, ...]:
     """
     Read all planes.
 
-    :raises ValueError: one cannot be read, or two have the same name.
+    :raises ValueError: a plane cannot be read, or two have the same name.
     """
     planes = tuple(Plane.parse(text) for text in texts)
     names = [plane.name for plane in planes]

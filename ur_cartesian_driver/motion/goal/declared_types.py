@@ -3,9 +3,9 @@
 """
 Values of exactly the types that a dataclass declares.
 
-Users of the Python API pass numpy's numbers for floats, and lists or arrays for tuples. Inside,
-``float`` is a float and a tuple a tuple: they are packed into messages, compared and sent to
-another process. So what users pass is converted once, where it comes in.
+Users of the Python API pass numpy's numbers for floats, and lists or arrays for tuples. The driver
+needs exactly the declared types, because it packs values into messages, compares them and sends
+them to another process. So it converts users' values once, where they come in.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ import numpy as np
 T = TypeVar('T')
 Convert = Callable[[Any], Any]
 
-#: Longest part of a wrong value that an error text quotes.
+#: Longest part of a wrong value that an error text quotes [characters].
 _MAX_QUOTED = 60
 
 
 class WrongType(ValueError):
-    """A value has no meaning as its declared type; the text names field and value."""
+    """A value cannot be converted to its declared type; the text names field and value."""
 
     def __init__(self, problem: str, field: str = '') -> None:
         """
         Build the sentence.
 
         :param problem: the fault of the value, a clause.
-        :param field: where, for example ``waypoints[2].time``.
+        :param field: the wrong field, for example ``waypoints[2].time``.
         """
         super().__init__(f'{field} {problem}.')
         self.problem, self.field = problem, field
 
     def inside(self, outer: str) -> WrongType:
-        """Return the same error, of a part of an outer value."""
+        """Return the same error with a field that begins with the name of an outer value."""
         separator = '.' if self.field and not self.field.startswith('[') else ''
         return WrongType(self.problem, f'{outer}{separator}{self.field}')
 
 
 def with_declared_types(value: T, kind: type[T], name: str) -> T:
     """
-    Return a value of exactly a type; of a dataclass the fields, and theirs, have their types.
+    Return a value converted to exactly the type ``kind``; so are fields of dataclasses in it.
 
     :param name: the first part of the field in the error.
     :returns: the same object if nothing had to be converted.
-    :raises WrongType: a value is of another type. Numbers of an ``IntEnum`` may be unknown.
+    :raises WrongType: a value cannot be converted. Unknown numbers of an ``IntEnum`` are kept.
     """
     converted: T = _convert_part(_converter(kind), value, name)  # type: ignore[arg-type]  # mypy has no TypeForm
     return converted
@@ -60,9 +60,9 @@ def with_declared_types(value: T, kind: type[T], name: str) -> T:
 
 def declare_types(instance: object) -> None:
     """
-    Give the fields of a new dataclass their declared types; for ``__post_init__``.
+    Convert the fields of a new dataclass to their declared types; for ``__post_init__``.
 
-    :raises WrongType: a value is of another type.
+    :raises WrongType: a value cannot be converted.
     """
     for name, convert in _field_converters(type(instance)):  # type: ignore[arg-type]  # a dataclass
         value = getattr(instance, name)
@@ -86,7 +86,7 @@ def _wrong(value: Any, needed: str) -> WrongType:
 
 @cache
 def _converter(kind: Hashable) -> Convert:
-    """Return what converts values to a type."""
+    """Return the function that converts values to a type."""
     origin, arguments = get_origin(kind), get_args(kind)
     if kind in _PLAIN:
         return _PLAIN[kind]
@@ -109,7 +109,7 @@ def _converter(kind: Hashable) -> Convert:
 
 @cache
 def declared_hints(kind: type) -> dict[str, Any]:
-    """Return the annotations of a dataclass; to evaluate them is slow, so it is done once."""
+    """Return the annotations of a dataclass, cached because evaluating them is slow."""
     return get_type_hints(kind, include_extras=True)
 
 
@@ -130,12 +130,12 @@ def _dataclass(kind: type) -> Convert:
         changed = {}
         for (name, convert_field), default in zip(converters, defaults, strict=True):
             old = getattr(value, name)
-            if old is default:  # most fields of a point are
+            if old is default:  # true for most fields of a point
                 continue
             new = _convert_part(convert_field, old, name)
             if new is not old:
                 changed[name] = new
-        if type(value) is not kind:  # a class that another process may not have
+        if type(value) is not kind:  # a subclass, which another process may not have
             return kind(**{name: getattr(value, name) for name in names} | changed)
         return replace(value, **changed) if changed else value  # type: ignore[type-var]  # a dataclass
 
@@ -143,7 +143,7 @@ def _dataclass(kind: type) -> Convert:
 
 
 def _tuple_of_any(convert: Convert) -> Convert:
-    """Return what converts tuples of any length."""
+    """Return the function that converts tuples of any length."""
 
     def convert_all(values: Any) -> Any:
         plain = _sequence(values)
@@ -154,12 +154,12 @@ def _tuple_of_any(convert: Convert) -> Convert:
 
 
 def _tuple_of(converters: Sequence[Convert]) -> Convert:
-    """Return what converts tuples with one type for each element."""
+    """Return the function that converts tuples with a type for each element."""
     count = len(converters)
     types = (float,) * count if all(convert is _float for convert in converters) else None
 
     def convert_all(values: Any) -> Any:
-        if type(values) is tuple and tuple(map(type, values)) == types:  # most are
+        if type(values) is tuple and tuple(map(type, values)) == types:  # true for most
             return values
         plain = _sequence(values)
         if len(plain) != count:
@@ -193,7 +193,7 @@ def _member_of(kind: type[IntEnum]) -> Convert:
         try:
             return kind(number)
         except ValueError:
-            return number  # a rule refuses it, and names the members
+            return number  # refused later, by a rule that names the members
 
     return convert
 

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The registry of execution modes: their numbers, and the traits by which all other code tells them.
+The registry of execution modes: their numbers, and the traits that other code asks for.
 
-A new mode is a member of :class:`ExecutionMode` (its number is a constant ``EXECUTION_...`` of the
-action), a row of traits in :data:`EXECUTION_MODES`, a row in ``PLANNERS`` of
-``planning/planner.py``, a row in ``FEEDERS`` of ``driver/loop/goal_machine_factory.py``, and one
-module with whichever planner or feeder does not exist yet. Planners and feeders live in higher
-layers, so their tables stand where they are used; a test compares the keys of all three.
+A new mode needs a member of :class:`ExecutionMode` (its number is a constant ``EXECUTION_...`` of
+the action), a row of traits in :data:`EXECUTION_MODES`, a row in ``PLANNERS`` of
+``planning/planner.py``, a row in ``FEEDERS`` of ``driver/loop/goal_machine_factory.py``, and a
+module for its planner or feeder if that is new. Planners and feeders belong to higher layers, and
+so do their tables; a test compares the keys of all three tables.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class ExecutionMode(IntEnum):
 class ModeTraits:
     """The capabilities of an execution mode."""
 
-    #: Whether a spline of joint positions joins the points; if not, motions of the robot do.
+    #: Whether a joint spline connects the points; if not, the robot's own motion commands do.
     is_spline: bool
-    #: Whether the driver streams set-points; if not, the robot program gets points.
+    #: Whether the driver streams set-points; if not, it sends points to the robot program.
     streams_setpoints: bool
     #: Whether the robot program carries out ``io_commands``.
     switches_outputs: bool

@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The annotations with which the dataclasses of a goal become a table, and the rows of that table.
+The annotations that turn the goal dataclasses into a table of fields, and the rows of that table.
 
-:mod:`~ur_cartesian_driver.motion.goal.goal` declares the fields. Whoever handles all of them alike
-(schema, reading, writing, packing, columns, plain checks) goes through :func:`goal_fields` and
-decides by :class:`Form`, and so need not know any field.
+The goal dataclasses are ``Goal`` and the classes of its parts, all declared in
+:mod:`~ur_cartesian_driver.motion.goal.goal`. Code that treats all fields alike (schema, reading,
+writing, packing, columns, plain checks) iterates over :func:`goal_fields` and distinguishes them
+by :class:`Form`, so it names no single field.
 """
 
 from __future__ import annotations
@@ -27,77 +28,78 @@ R = TypeVar('R', 'GoalField', 'GoalColumn')
 
 
 class Form(Enum):
-    """The kinds of values that a goal has, each with one form in messages and files."""
+    """The kinds of values in a goal; each kind has one representation in messages and files."""
 
-    #: A number, a truth value or a text, as it is.
+    #: A number, a truth value or a text, unchanged.
     PLAIN = auto()
     #: The number of a pin, uint8.
     PIN = auto()
-    #: The number of a point, uint32.
+    #: The index of a point, uint32.
     INDEX = auto()
-    #: The number of a member of an enumeration, uint8.
+    #: A member of an enumeration, sent as its number, uint8.
     CHOICE = auto()
-    #: Seconds, as sec and nanosec.
+    #: A time [s], sent as sec and nanosec.
     DURATION = auto()
-    #: x, y, z.
+    #: A vector with x, y, z.
     VECTOR = auto()
-    #: Linear and angular x, y, z.
+    #: A linear and an angular vector, each with x, y, z.
     RATES = auto()
     POSE = auto()
     #: A tuple of numbers or texts.
     VALUES = auto()
-    #: A dataclass of the table.
+    #: An object of another goal dataclass, sent as a nested message.
     RECORD = auto()
-    #: A sequence of dataclasses of the table.
+    #: A sequence of objects of another goal dataclass.
     RECORDS = auto()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sent:
-    """The form of a field in messages and files."""
+    """The representation of a field in messages and files, if it is not the usual one."""
 
-    #: Its name there, with dots where it is inside of other messages; '' = as in the dataclass.
+    #: Name of the field in the message, with dots for nested messages; '' = as in the dataclass.
     name: str = ''
     form: Form | None = None
-    #: Whether a file has it even where it has its default; None = if there is no default.
+    #: Whether files list the field even at its default value; None = yes if it has no default,
+    #: otherwise no.
     always: bool | None = None
-    #: The field behind which files have it, where that is another one than in the dataclass.
+    #: The field that this one follows in files; '' = the same order as in the dataclass.
     after: str = ''
 
 
 class Mark(Enum):
     """Further properties of a field."""
 
-    #: The driver fills it in; neither messages nor parameters have it.
+    #: The driver fills the field in; it is neither part of a message nor a parameter.
     NOT_SENT = auto()
-    #: It says something of the point where a segment ends, and not of the motion to there.
+    #: The field describes the point at the end of a segment, not the motion to that point.
     OF_POINT = auto()
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The numbers that a field takes, whatever the other fields say; all are finite."""
+    """The range of a field's numbers, regardless of other fields; all numbers must be finite."""
 
     low: float = -inf
     high: float = inf
-    #: As the refusal has it.
+    #: Unit of the numbers and advice to the user, for the text of a refusal.
     unit: str = ''
     remedy: str = ''
-    #: Whether the least number is excluded.
+    #: Whether ``low`` itself is excluded.
     above: bool = False
-    #: What 0 means where it is beside the range, or needs to be said.
+    #: The special meaning of 0, which is then allowed even outside the range; '' = it has none.
     zero: str = ''
-    #: Whether the driver chooses the number where a spline has NaN.
+    #: Whether splines may contain NaN, for which the driver chooses a number.
     nan_in_splines: bool = False
 
     def holds(self, values: Any) -> Any:
-        """Tell whether a number is in the range; of an array, tell it of each number."""
+        """Return whether a number is in the range; for an array, return a flag per number."""
         least = values > self.low if self.above else values >= self.low
         in_range = least & (values <= self.high) & (abs(values) < inf)
         return in_range | (values == 0.0) if self.zero else in_range
 
     def refusal(self, value: float) -> tuple[str, str]:
-        """Return the fault of a number that is out of the range, and the remedy."""
+        """Return the fault of a number outside the range, and the remedy."""
         if not isfinite(value) and (self.zero or self.high == inf):
             return f'contains {value}; every number must be finite', ''
         return self._problem(value), self.remedy
@@ -121,23 +123,23 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class ColumnOf:
-    """The field of an object that an array of rows holds, a row for each point."""
+    """The annotation of a column: the field whose values it holds, a row for each point."""
 
     field: str
-    #: The array of ``PackedPoints``; '' = with the name of the column, None = it has none.
+    #: Name of the array in ``PackedPoints``; '' = the name of the column, None = no such array.
     packed: str | None = ''
-    #: Whether that is there even where all rows have the default.
+    #: Whether that array is filled even if all rows have the default; if not, it is empty then.
     always: bool = False
-    #: The column behind which files have it, where that is another one than here.
+    #: The column that this one follows in files; '' = the order of the declarations.
     after: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalField:
-    """A row of the table: a field of one of the dataclasses of a goal."""
+    """A row of the table: a field of a goal dataclass."""
 
     name: str
-    #: Without ``None`` and annotations; of a sequence, of its elements.
+    #: Type of the value, without ``None`` and annotations; for a sequence, type of its elements.
     type: Any
     form: Form
     default: Any
@@ -147,28 +149,28 @@ class GoalField:
 
     @property
     def after(self) -> str:
-        """The field behind which files have it, '' where that is the one before."""
+        """The field that this one follows in files; '' = the same order as in the dataclass."""
         return self.sent.after
 
     @property
     def message_name(self) -> str:
-        """Its name in the message."""
+        """The name of the field in the message, with dots for nested messages."""
         return self.sent.name or self.name
 
     @property
     def is_always_sent(self) -> bool:
-        """Whether files have it even where it has its default."""
+        """Whether files list the field whatever its value, even if that is the default."""
         return not self.has_default if self.sent.always is None else self.sent.always
 
     @property
     def has_default(self) -> bool:
-        """Whether the dataclass has a default for it."""
+        """Whether the dataclass declares a default for the field."""
         return self.default is not MISSING
 
 
 @cache
 def goal_fields(kind: type) -> tuple[GoalField, ...]:
-    """Return the fields of a dataclass that messages have, in its order."""
+    """Return the fields of a goal dataclass that messages contain, in the order of the class."""
     hints = declared_hints(kind)
     rows = []
     for each in fields(kind):
@@ -193,31 +195,31 @@ def goal_fields(kind: type) -> tuple[GoalField, ...]:
 
 @cache
 def index_fields(kind: type) -> tuple[GoalField, ...]:
-    """Return the fields of a dataclass that number points."""
+    """Return the fields of a goal dataclass that hold the index of a point."""
     return tuple(each for each in goal_fields(kind) if each.form is Form.INDEX)
 
 
 def points_of(event: object) -> dict[str, int]:
-    """Return the points that a dataclass of the table names, by field of the message."""
+    """Return the point indices in an event at points (like ``IOCommand``), by message field."""
     kind: type = type(event)
     return {each.message_name: getattr(event, each.name) for each in index_fields(kind)}
 
 
 def renumbered(event: E, number: Callable[[int], int]) -> E:
-    """Return a dataclass of the table with other numbers of the points that it names."""
+    """Return an event at points, with each of its point indices replaced by a function of it."""
     kind: type = type(event)
     numbers: Any = {each.name: number(getattr(event, each.name)) for each in index_fields(kind)}
     return replace(event, **numbers)  # type: ignore[type-var]  # a dataclass
 
 
 def shifted(event: E, points: int) -> E:
-    """Return a dataclass of the table that names points so many numbers later."""
+    """Return an event at points, with ``points`` added to each of its point indices."""
     return renumbered(event, lambda point: point + points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalColumn:
-    """A row of the table of columns: an array, and the field that it holds."""
+    """A row of the table of columns: a column, and the field whose values it holds."""
 
     name: str
     column: ColumnOf
@@ -225,23 +227,23 @@ class GoalColumn:
 
     @property
     def after(self) -> str:
-        """The column behind which files have it, '' where that is the one before."""
+        """The column that this one follows in files; '' = the order of the declarations."""
         return self.column.after
 
     @property
     def mask(self) -> str:
-        """The array that tells which rows have a value, '' if all have."""
+        """The name of the array of flags for rows that have a value; '' = all rows have one."""
         return f'has_{self.field.name}' if self.field.default is None else ''
 
     @property
     def packed(self) -> str | None:
-        """The name of its array in ``PackedPoints``, None if it has none."""
+        """The name of the column's array in ``PackedPoints``; None = no such array."""
         return self.name if self.column.packed == '' else self.column.packed
 
 
 @cache
 def goal_columns(arrays: type, kind: type) -> tuple[GoalColumn, ...]:
-    """Return the columns of a dataclass of arrays that hold the fields of a kind of objects."""
+    """Return the columns of a class of arrays, each with the field of ``kind`` that it holds."""
     hints = declared_hints(arrays)
     table = {each.name: each for each in goal_fields(kind)}
     return tuple(
@@ -254,7 +256,7 @@ def goal_columns(arrays: type, kind: type) -> tuple[GoalColumn, ...]:
 
 @cache
 def in_order_of_files(rows: tuple[R, ...]) -> tuple[R, ...]:
-    """Return rows of the table in the order in which files have them."""
+    """Return rows of the table in the order in which files list them."""
     order = [each for each in rows if not each.after]
     for each in rows:
         if each.after:
@@ -268,7 +270,7 @@ def _parts(hint: Any) -> list[Any]:
 
 
 def _form(hint: Any) -> tuple[Any, Form]:
-    """Return the type of a field without ``None`` or sequence, and the form that it has."""
+    """Return a field's type, without ``None`` and the sequence around it, and its form."""
     if get_origin(hint) in (Union, UnionType):
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if hint in _FORMS:

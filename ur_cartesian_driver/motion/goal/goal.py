@@ -3,28 +3,28 @@
 """
 A goal as the client sent it, in its own frame: the one table of its fields.
 
-A field of a goal concerns many: the messages, files in YAML, flat arrays, columns, checks, the
-builder of paths, the goal that is left after a stop. As long as each of them listed the fields, a
-new one meant two dozen edits, and a forgotten one was no error: the field was just lost in a file
-or after a stop. So the dataclasses below say all that anybody wants to know of a field, and
-everybody else walks through them (:func:`~.field_table.goal_fields`).
+Many parts of the driver handle the fields of a goal: messages, YAML files, flat arrays, columns,
+checks, the builder of paths, the goal that is left after a stop. When each of them listed the
+fields itself, a new field took two dozen edits, and a forgotten edit raised no error: the field
+was lost in a file or after a stop. So the dataclasses below declare everything about a field, and
+all other code iterates over them (:func:`~.field_table.goal_fields`).
 
 A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_table.Sent`
-where messages name or hold it otherwise, :class:`~.field_table.Range` where not every number will
-do, :class:`~.field_table.Mark` for what else it is. Schema, reading, writing, conversion of users'
-values to the declared types, and checks of ranges and enumerations follow from that. Points and
-segments come by the thousand, so inside they are columns (:mod:`~.goal_table`):
-``WaypointColumns`` and ``SegmentColumns`` name the column, and the flat array, of each field.
-Rules that concern more than one field are in ``planning.request``.
+if messages name or represent it differently, :class:`~.field_table.Range` if not every number is
+allowed, :class:`~.field_table.Mark` for other properties. Schema, reading, writing, conversion of
+users' values to the declared types, and checks of ranges and enumerations follow from that. Goals
+have thousands of points and segments, so the driver stores these in columns (:mod:`~.goal_table`):
+``WaypointColumns`` and ``SegmentColumns`` name the column and the flat array of each field. Rules
+that concern more than one field are in ``planning.request``.
 
-A new number of a segment: declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment`` and
-``SegmentColumns``, and honour it where the motion is planned. Paths take it by its name, as
-``Path.at(name=...)``. A new number of the whole goal needs the action in place of both messages,
-and no column. ``test/ros/test_goal_files.py`` compares table and messages.
+To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
+and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
+``Path.at(name=...)``. A number of the whole goal is declared in the action, instead of in both
+messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
 
-Not nice: the column repeats the field, because no type checker would know it otherwise. And files
-list a few fields in another order than messages (``after``), or although they are zero
-(``always``), so that files that exist are written as they were.
+There are two drawbacks. The column repeats the field, because type checkers would not know it
+otherwise. And files list a few fields in another order than messages (``after``), or even if they
+are zero (``always``), so that goals are still written in the form of existing files.
 
 A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
 (:mod:`~ur_cartesian_driver.motion.plan.plan`) is known to be feasible.
@@ -83,15 +83,15 @@ class OutputKind(IntEnum):
 
 
 class OnPathTolerance(IntEnum):
-    """The answer to an arm that leaves the path tolerance."""
+    """The reaction to an arm that leaves the path tolerance."""
 
     ABORT = 0
     STALL = 1
 
 
-#: How many pieces of a spline there are in the horizon behind which it can be replaced, at least.
+#: Smallest number of spline pieces within the replace horizon.
 PIECES_PER_HORIZON = 3
-#: How long the motion waits for an arm that is off its path where the goal does not say it [s].
+#: How long the motion waits for an arm that is off its path, unless the goal specifies it [s].
 DEFAULT_STALL_TIMEOUT = 10.0
 
 
@@ -106,14 +106,14 @@ class InputKind(IntEnum):
 
     @property
     def is_analog(self) -> bool:
-        """Whether it has a level [A] or [V]."""
+        """Whether the input has a level [A] or [V]."""
         return self >= InputKind.STANDARD_ANALOG
 
 
 class PressFrame(IntEnum):
-    """The frame along whose axes a :class:`Press` gives way."""
+    """The frame along whose axes the tool gives way in a :class:`Press`."""
 
-    #: The TCP, as the path turns it.
+    #: The frame of the TCP, which turns with the tool along the path.
     TOOL = 0
     #: The frame of the goal.
     GOAL = 1
@@ -122,46 +122,46 @@ class PressFrame(IntEnum):
 
 
 class ContactEnd(IntEnum):
-    """The meaning of the first contact of the tool to a :class:`Press`."""
+    """The effect of the tool's first contact during a :class:`Press`."""
 
     NONE = 0
-    #: The goal ends there, and has succeeded.
+    #: A contact ends the goal with success.
     ENDS = 1
-    #: The same; if it does not come, the goal fails.
+    #: A contact ends the goal with success; without one, the goal fails.
     REQUIRED = 2
 
 
 #: The axes of a frame, and the turns about them.
 PRESS_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 
-#: How far the tool may give way where a press does not say it [m], [rad].
+#: How far the tool may give way in a press, unless the press specifies it [m], [rad].
 DEFAULT_YIELDS = (0.02, 0.2)
 
 
 class StaleOffset(IntEnum):
-    """The fate of a path offset that no newer one replaces in time."""
+    """What happens to a path offset that no newer one replaces in time."""
 
-    #: It stays.
+    #: The offset stays.
     HOLD = 0
     #: The tool goes back to its path.
     FADE = 1
 
 
-#: Speed [m/s], acceleration [m/s^2] and timeout [s] of a path offset where the goal gives none.
+#: Speed [m/s], acceleration [m/s^2] and timeout [s] of path offsets, unless the goal gives them.
 DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 
-#: How much later than planned the end may come where the goal does not say it [s], also how long
-#: the arm may take from the program's SUCCESS to rest inside the goal tolerance.
+#: Largest delay of the end of a goal against its plan, unless the goal specifies it [s]; also the
+#: longest time from the program's SUCCESS until the arm rests inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
-#: The longest rest and time-out at a point; longer ones are mistakes [s].
+#: The longest rest and timeout at a point [s]; longer ones must be mistakes.
 MAX_STOP_TIME = 600.0
 #: The longest time between a point and an output that it switches [s].
 MAX_OUTPUT_OFFSET = 60.0
 
 FINITE, NOT_NEGATIVE = Range(), Range(0.0)
 FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
-#: NaN in a spline: the driver chooses.
+#: In a spline, NaN lets the driver choose the number.
 RATE = Range(nan_in_splines=True)
 TIMEOUT = Range(0.0, MAX_STOP_TIME, 's', above=True)
 
@@ -174,13 +174,13 @@ POINT, FIRST_POINT, LAST_POINT = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posture:
-    """The joint positions [rad] to be near to, by joint name; empty = no preference."""
+    """The preferred joint positions [rad] by joint name; empty = no preference."""
 
     names: Annotated[tuple[str, ...], Sent(name='posture_joint_names', always=True)] = ()
     values: Annotated[tuple[float, ...], Sent(name='posture_joint_values', always=True)] = ()
 
     def __bool__(self) -> bool:
-        """Tell whether there is any preference (also a malformed one)."""
+        """Return whether there is any preference, even a malformed one."""
         return bool(self.names or self.values)
 
 
@@ -188,7 +188,7 @@ class Posture:
 class Waypoint:
     """One point of a goal, in the frame of the goal."""
 
-    #: When to be there, from the start of the motion [s].
+    #: When to reach the point, from the start of the motion [s].
     time: Annotated[float, Sent(name='time_from_start', form=Form.DURATION), FINITE] = 0.0
     pose: Pose
     #: Linear [m/s] and angular [rad/s] velocity at the point.
@@ -201,7 +201,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class WaypointColumns:
-    """The points of a goal in columns, in the units of a waypoint."""
+    """The points of a goal in columns, in the units of :class:`Waypoint`."""
 
     #: (n, 7) x y z, quaternion x y z w
     poses: Annotated[Floats, ColumnOf('pose', always=True)]
@@ -211,7 +211,7 @@ class WaypointColumns:
     twists: Annotated[Floats, ColumnOf('twist')]
     accelerations: Annotated[Floats, ColumnOf('acceleration')]
     jerks: Annotated[Floats, ColumnOf('jerk', packed=None)]
-    #: Those that are not empty, by row.
+    #: The postures that are not empty, by row.
     postures: Annotated[Mapping[int, Posture], ColumnOf('posture')] = field(default_factory=dict)
 
 
@@ -229,14 +229,14 @@ class Segment:
     blend_radius: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: How long the arm rests at the waypoint [s].
     dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
-    #: 0 = from the times, else the default.
+    #: 0 = derived from the times of the goal; without times, the default.
     velocity: Annotated[float, NOT_NEGATIVE] = 0.0
     acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
     #: A pose on the arc, CIRCULAR only.
     via: Pose | None = None
     via_posture: Posture = Posture()
     arc_mode: ArcMode = ArcMode.UNCONSTRAINED
-    #: About which axis the driver may turn the waypoint's pose, from ``free_min`` to ``free_max``
+    #: Axis about which the driver may turn the waypoint's pose, by ``free_min`` to ``free_max``
     #: [rad]; both 0 = by any angle.
     free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
     free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
@@ -245,19 +245,19 @@ class Segment:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class SegmentColumns:
-    """The segments of a goal in columns: none, or a row for each point."""
+    """The segments of a goal in columns: no rows, or a row for each point."""
 
-    #: (n,) each, enumerations as their numbers
+    #: (n,) each; enumerations as their numbers
     types: Annotated[Int64s, ColumnOf('type', always=True)]
     arc_modes: Annotated[Int64s, ColumnOf('arc_mode', always=True)]
     blend_radii: Annotated[Floats, ColumnOf('blend_radius')]
     dwells: Annotated[Floats, ColumnOf('dwell')]
     velocities: Annotated[Floats, ColumnOf('velocity')]
     accelerations: Annotated[Floats, ColumnOf('acceleration', packed='segment_accelerations')]
-    #: (n, 7) poses on the arcs, and whether there is one (n,)
+    #: (n, 7) poses on the arcs, and (n,) whether a row has such a pose
     vias: Annotated[Floats, ColumnOf('via', after='free_maxima')]
     has_via: Flags
-    #: Those that are not empty, by row.
+    #: The postures on the arcs that are not empty, by row.
     via_postures: Annotated[Mapping[int, Posture], ColumnOf('via_posture')] = field(
         default_factory=dict
     )
@@ -281,7 +281,7 @@ class IOCommand:
     pin: int
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
-    #: What an analog output carries.
+    #: Whether an analog output carries a current or a voltage.
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
 
 
@@ -292,12 +292,12 @@ class InputWait:
     waypoint: Annotated[int, POINT]
     input: InputKind
     pin: int
-    #: Digital 0 or 1; analog the level to be reached [A] or [V], or the one to fall below.
+    #: Digital 0 or 1; analog the level [A] or [V] to reach, or with ``below`` to fall below.
     value: float
     below: Annotated[bool, Sent(after='timeout')] = False
     #: Longest wait [s].
     timeout: Annotated[float, TIMEOUT]
-    #: Whether the motion goes on then; if not, the goal ends.
+    #: Whether the motion goes on after the timeout; if not, the goal ends.
     go_on: bool = False
 
 
@@ -307,9 +307,9 @@ class ScriptCall:
 
     waypoint: Annotated[int, POINT]
     function: str
-    #: The wire carries no larger ones.
+    #: The wire format carries no larger numbers.
     arguments: Annotated[tuple[float, ...], Range(-2147.0, 2147.0)] = ()
-    #: Longest time until it returns [s].
+    #: Longest time until the function returns [s].
     timeout: Annotated[float, ALWAYS, TIMEOUT] = 10.0
 
 
@@ -320,7 +320,7 @@ class PayloadChange:
     waypoint: Annotated[int, POINT]
     #: [kg]
     mass: Annotated[float, Range(0.0, 100.0, 'kg')]
-    #: In the flange [m].
+    #: In the flange frame [m].
     center_of_gravity: Annotated[Vector3, ALWAYS] = ZERO3
 
 
@@ -330,22 +330,22 @@ class ProportionalOutput:
 
     first_waypoint: Annotated[int, FIRST_POINT]
     last_waypoint: Annotated[int, LAST_POINT]
-    #: How much earlier on the path it begins, and ends [s].
+    #: Lead times: how long before the first and last waypoint the output begins and ends [s].
     begin_lead: Annotated[float, SMALL_LEAD] = 0.0
     end_lead: Annotated[float, SMALL_LEAD] = 0.0
     pin: Annotated[int, Sent(always=False), Range(0, 1)]
     domain: Annotated[AnalogDomain, Sent(name='analog_domain', after='last_waypoint')] = (
         AnalogDomain.CURRENT
     )
-    #: Fraction of the range per speed [1/(m/s)], and at speed 0.
+    #: Fraction of the range per speed of the tool [1/(m/s)], and the fraction at speed 0.
     gain: Annotated[float, Sent(always=False), Range(-1000.0, 1000.0)]
     offset: Annotated[float, Range(-100.0, 100.0)] = 0.0
-    #: Bounds, fractions of the range.
+    #: Bounds of the output, fractions of the range.
     minimum: Annotated[float, FRACTION] = 0.0
     maximum: Annotated[float, ALWAYS, FRACTION] = 1.0
     #: Time constant of a low-pass filter of first order for the speed [s].
     filter_time: Annotated[float, SMALL_LEAD] = 0.0
-    #: Value when it does not follow the speed.
+    #: Value while the output does not follow the speed, a fraction of the range.
     idle: Annotated[float, FRACTION] = 0.0
 
 
@@ -356,21 +356,21 @@ class Press:
     first_waypoint: Annotated[int, FIRST_POINT]
     last_waypoint: Annotated[int, LAST_POINT]
     frame: PressFrame = PressFrame.TOOL
-    #: The compliant axes of the frame, of :data:`PRESS_AXES`.
+    #: The names of the compliant axes of the frame, from :data:`PRESS_AXES`.
     axes: tuple[str, ...] = ()
-    #: Force or torque of the tool along each of them [N, Nm].
+    #: Force or torque of the tool along each compliant axis [N, Nm].
     forces: tuple[float, ...] = ()
-    #: How fast it gives way along each of them [m/s, rad/s]; empty = the default.
+    #: Largest speed of the tool along each compliant axis [m/s, rad/s]; empty = the default.
     speed_limits: tuple[float, ...] = ()
-    #: How far it may be off the path along the others [m], [rad]; 0 = the default.
+    #: How far the tool may be off the path along the other axes [m], [rad]; 0 = the default.
     max_deviation: Annotated[float, ALWAYS, Range(0.0, 0.1)] = 0.0
     max_deviation_angle: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
-    #: How far it may give way along compliant ones [m], [rad]; 0 = the default.
+    #: How far the tool may give way along compliant axes [m], [rad]; 0 = the default.
     max_yield: Annotated[float, ALWAYS, Range(0.0, 0.5)] = 0.0
     max_yield_angle: Annotated[float, ALWAYS, Range(0.0, 1.5)] = 0.0
     damping: Annotated[float, ALWAYS, FRACTION] = 0.005
     gain_scaling: Annotated[float, ALWAYS, Range(0.0, 2.0)] = 1.0
-    #: Whether the force sensor is zeroed before.
+    #: Whether the force sensor is zeroed before the press begins.
     zero_sensor: Annotated[bool, ALWAYS] = False
     contact: Annotated[ContactEnd, Sent(after='speed_limits')] = ContactEnd.NONE
 
@@ -384,7 +384,7 @@ class SafeOutput:
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
     domain: Annotated[AnalogDomain, DOMAIN] = AnalogDomain.CURRENT
-    #: Whether it gets its value back after a pause; if not, a pause that changed it ends the goal.
+    #: Whether the output is restored after a pause; if not, a pause that changed it ends the goal.
     restore: bool = False
 
 
@@ -405,20 +405,20 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathOffset:
-    """The bounds of offsets to the path that come while the arm moves."""
+    """The bounds of path offsets, which arrive while the arm moves."""
 
-    #: Along the path, across it and normal to both [m]; 0 = not at all. The controller's own
-    #: offsets have the same bound by default.
+    #: Largest offset along the path, across it and normal to both [m]; 0 = none. The upper bound
+    #: is the default of the controller's own path offsets.
     limits: Annotated[Vector3, Range(0.0, 0.1, 'm')] = ZERO3
-    #: Largest speed [m/s] and acceleration [m/s^2] along each of them; 0 = the default.
+    #: Largest speed [m/s] and acceleration [m/s^2] along each axis; 0 = the default.
     speed: Annotated[float, Range(0.0, 0.1, 'm/s')] = 0.0
     acceleration: Annotated[float, Range(0.0, 2.0, 'm/s^2')] = 0.0
-    #: An offset is stale when it is so old [s]; 0 = the default.
+    #: The age at which an offset is stale [s]; 0 = the default.
     timeout: Annotated[float, Range(0.0, 60.0, 's')] = 0.0
     on_stale: StaleOffset = StaleOffset.HOLD
 
     def __bool__(self) -> bool:
-        """Tell whether the path may give way."""
+        """Return whether path offsets are allowed."""
         return any(self.limits)
 
 
@@ -428,17 +428,17 @@ class Goal:
 
     frame_id: Annotated[str, Sent(name='trajectory.header.frame_id')] = ''
     waypoints: Annotated[Sequence[Waypoint], Sent(name='trajectory.points', always=False)]
-    #: The frame that is moved, as the goal calls it, and where it is behind the flange; None = it
-    #: is the robot's active TCP.
+    #: The controlled frame: its name in the goal, and its pose in the flange; None = the robot's
+    #: active TCP.
     controlled_frame: Annotated[str, Sent(name='trajectory.controlled_frame')] = ''
     T_flange_controlled: Annotated[Pose | None, Mark.NOT_SENT] = None
     #: The frame of the goal in the robot's base.
     T_base_frame: Annotated[Pose, Mark.NOT_SENT] = IDENTITY
-    #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
+    #: Age of the goal's stamp on receipt [s]; None = no stamp.
     age: Annotated[float | None, Mark.NOT_SENT] = None
     path_tolerance: Tolerance = Tolerance()
     goal_tolerance: Tolerance = Tolerance()
-    #: How much later than planned the end may come [s]: 0 = the default, negative = without end.
+    #: Largest delay of the end against the plan [s]: 0 = the default, negative = unlimited.
     goal_time_tolerance: Annotated[float, DURATION, FINITE] = 0.0
     #: Empty, or one for each waypoint.
     segments: Sequence[Segment] = ()
@@ -450,17 +450,17 @@ class Goal:
     presses: tuple[Press, ...] = ()
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
-    #: How far ahead of the arm points are final, so that later ones can be replaced [s].
+    #: Time ahead of the arm within which points are final [s]; later ones can be replaced.
     replace_horizon: Annotated[
         float, Range(0.05, 1.0, 's', 'set it to 0.15', zero='nothing is replaced')
     ] = 0.0
     safe_outputs: tuple[SafeOutput, ...] = ()
-    #: The part of the speed asked for below which the goal is refused.
+    #: The goal is refused if its plan falls below this fraction of the speed asked for.
     min_speed_fraction: Annotated[
         float, Range(0.0, 1.0, remedy='give a fraction', zero='not demanded')
     ] = 0.0
     on_path_tolerance: OnPathTolerance = OnPathTolerance.ABORT
-    #: How long the arm may stay off its path with STALL [s]; 0 = the default.
+    #: With STALL, how long the arm may stay off its path [s]; 0 = the default.
     stall_timeout: Annotated[
         float, DURATION, Range(0.0, unit='s', remedy=f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s')
     ] = 0.0

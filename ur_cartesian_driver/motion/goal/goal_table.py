@@ -3,10 +3,10 @@
 """
 The points and segments of a goal in columns: a row for each point, an array for each field.
 
-Sliced and scanned paths have up to 100,000 points. An object for each takes longer to make than
-all checks of the arrays take. So inside they are rows; each is still a sequence of
+Sliced and scanned paths have up to 100,000 points. Creating an object for each of them would take
+longer than all checks of the arrays. So the driver stores rows, which are still sequences of
 :class:`~ur_cartesian_driver.motion.goal.goal.Waypoint` or
-:class:`~ur_cartesian_driver.motion.goal.goal.Segment`, which are made when somebody looks at them.
+:class:`~ur_cartesian_driver.motion.goal.goal.Segment`: these objects are created on access.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ T = TypeVar('T')
 R = TypeVar('R', bound='Rows[Any]')
 G = TypeVar('G', bound='GoalRows[Any]')
 
-#: How many rows are made plain numbers at a time.
+#: Number of rows that are converted to plain numbers at a time.
 _BLOCK = 4096
 
 
@@ -61,7 +61,7 @@ class Rows(Sequence[T]):
     """
     Columns of the same length that are also a sequence of objects.
 
-    Arrays are made read-only. Mappings hold what few rows have, by row.
+    Arrays are made read-only. Mappings hold, by row, values that only few rows have.
     """
 
     __slots__: ClassVar[tuple[str, ...]] = ()
@@ -78,7 +78,7 @@ class Rows(Sequence[T]):
         return [(each.name, getattr(self, each.name)) for each in fields(self)]
 
     def _numbers(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of some columns as plain numbers, which take much more memory."""
+        """Yield the rows of some columns as plain numbers, in blocks to save memory."""
         for first in range(0, len(self), _BLOCK):
             rows = slice(first, first + _BLOCK)
             yield from zip(*(getattr(self, name)[rows].tolist() for name in names), strict=True)
@@ -97,7 +97,7 @@ class Rows(Sequence[T]):
         )
 
     def with_first(self: R, first: R) -> R:
-        """Return the rows with another first one."""
+        """Return the rows with the first one replaced."""
         columns = zip(first._columns(), self.take(slice(1, len(self)))._columns(), strict=True)
         return replace(
             self,
@@ -146,24 +146,24 @@ def _are_equal(a: Any, b: Any) -> bool:
 
 
 class GoalRows(Rows[T]):
-    """Rows whose columns hold the fields of a class of the goal's table."""
+    """Rows whose columns hold the fields of a goal dataclass."""
 
     __slots__: ClassVar[tuple[str, ...]] = ()
-    #: That class.
+    #: The goal dataclass of which each row is an object.
     kind: ClassVar[type]
 
     @classmethod
     def columns(cls) -> tuple[GoalColumn, ...]:
-        """Return which column holds which field."""
+        """Return the columns, each with the field that it holds."""
         return goal_columns(cls, cls.kind)
 
     @classmethod
     def of(cls: type[G], objects: Iterable[T], name: str = '') -> G:
         """
-        Return objects as rows; rows themselves as they are.
+        Return objects as rows; rows are returned unchanged.
 
         :param name: the first part of the field in the error; '' = as in a goal.
-        :raises WrongType: a value is not of its declared type; the text names the field.
+        :raises WrongType: a value cannot be converted to its type; the text names the field.
         """
         if isinstance(objects, cls):
             return objects
@@ -188,7 +188,7 @@ class GoalRows(Rows[T]):
         return cls(**whole | {name: rows for name, rows in columns.items() if rows is not None})
 
     def is_default(self, column: GoalColumn) -> bool:
-        """Tell whether all rows of a column have the default, 0 where there is none."""
+        """Return whether all rows of a column have the default, or 0 if it has no default."""
         if column.mask:
             return not getattr(self, column.mask).any()
         rows, default = getattr(self, column.name), column.field.default
@@ -198,7 +198,7 @@ class GoalRows(Rows[T]):
         return not differs.any()
 
     def values(self, column: GoalColumn) -> Iterable[Any]:
-        """Return the values of a field, as objects have them."""
+        """Return the values of a column in the types that objects of ``kind`` have."""
         rows, form = getattr(self, column.name), column.field.form
         if isinstance(rows, Mapping):
             return (rows.get(i, column.field.default) for i in range(len(self)))
@@ -234,7 +234,7 @@ class GoalRows(Rows[T]):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class WaypointRows(GoalRows[Waypoint], WaypointColumns):
-    """The points of a goal in its frame."""
+    """The points of a goal, in the frame of the goal."""
 
     kind: ClassVar[type[Waypoint]] = Waypoint
 
@@ -251,20 +251,20 @@ class SegmentRows(GoalRows[Segment], SegmentColumns):
 
     @classmethod
     def plain(cls, n: int) -> SegmentRows:
-        """Return the segments of a goal that has none."""
+        """Return n default segments, for a goal that gives none."""
         return cls.of_columns(n, {})
 
     def via(self, row: int) -> Pose | None:
-        """Return the pose on one arc, None where there is none."""
+        """Return the pose on the arc of one segment; None if it has none."""
         return pose_from_row(self.vias[row].tolist()) if self.has_via[row] else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalTable(Goal):
     """
-    A goal whose points and segments are rows; others are converted.
+    A goal whose points and segments are rows; sequences of objects are converted to rows.
 
-    :raises WrongType: a value is not of its declared type; the text names the field.
+    :raises WrongType: a value cannot be converted to its type; the text names the field.
     """
 
     waypoints: WaypointRows
@@ -278,15 +278,15 @@ class GoalTable(Goal):
 
     @property
     def motions(self) -> SegmentRows:
-        """One segment for each point, plain ones where the goal has none."""
+        """One segment for each point; default ones if the goal gives none."""
         return self.segments or SegmentRows.plain(len(self.waypoints))
 
 
 def goal_table(goal: Goal) -> GoalTable:
     """
-    Return a goal as a table; a table as it is.
+    Return a goal as a table; a table is returned unchanged.
 
-    :raises WrongType: a value is not of its declared type; the text names the field.
+    :raises WrongType: a value cannot be converted to its type; the text names the field.
     """
     if isinstance(goal, GoalTable):
         return goal
@@ -295,7 +295,7 @@ def goal_table(goal: Goal) -> GoalTable:
 
 
 def default_column(each: GoalField, n: int) -> Any:
-    """Return the column of a field in which all rows have the default, 0 where there is none."""
+    """Return a column in which all n rows have the field's default, or 0 if it has none."""
     if each.form is Form.RECORD:
         return {}
     if each.form is Form.RATES:
@@ -311,7 +311,7 @@ def _number_type(each: GoalField) -> type:
 
 
 def _array(each: GoalField, values: Sequence[Any]) -> Any:
-    """Return the column of a field from its values; None where all surely are the default."""
+    """Return the column of a field from its values; None if they are surely all the default."""
     if each.form is Form.RECORD:
         return {i: value for i, value in enumerate(values) if value}
     zero = {Form.RATES: ZERO6, Form.POSE: IDENTITY}.get(each.form)
@@ -323,7 +323,7 @@ def _array(each: GoalField, values: Sequence[Any]) -> Any:
 
 
 def _plain_objects(objects: Iterable[T], kind: type[T], name: str) -> Sequence[T]:
-    """Return objects whose fields have exactly their types, which nearly all have already."""
+    """Return objects whose fields have exactly the declared types; few need conversion."""
     if isinstance(objects, tuple | list):
         try:
             if _only({kind}, objects) and all(
@@ -337,13 +337,13 @@ def _plain_objects(objects: Iterable[T], kind: type[T], name: str) -> Sequence[T
 
 
 def _are_plain(each: GoalField, values: Sequence[Any]) -> bool:
-    """Tell whether the values of a field need no conversion."""
+    """Return whether the values of a field need no conversion."""
     values = [value for value in values if value is not each.default]
     if each.form is Form.RATES:
         return _are_floats(values, 6)
     if not _only({each.type}, values):
         return False
-    if each.form is Form.RECORD:  # an empty posture of its own; an array has no truth value
+    if each.form is Form.RECORD:  # empty postures only; any() would fail on an array
         parts = [part for one in values for part in (one.names, one.values)]
         return _only({tuple}, parts) and not any(parts)
     return each.form is not Form.POSE or (
@@ -365,7 +365,7 @@ def _are_floats(vectors: Sequence[tuple[float, ...]], count: int) -> bool:
 
 
 def _vectors(rows: Floats) -> Iterable[Any]:
-    """Return rows (n, 6) as tuples; rows of zeros share one."""
+    """Return rows (n, 6) as tuples; all rows of zeros share one tuple."""
     if not rows.any():
         return (ZERO6,) * len(rows)
     return (vector6(row) if any(row) else ZERO6 for row in rows.tolist())

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A goal in joint space as the client sent it: what control_msgs/FollowJointTrajectory carries.
+A goal in joint space as the client sent it: the content of control_msgs/FollowJointTrajectory.
 
 A joint goal may be wrong: ``planning.request.joint_goal_rules`` checks it.
 """
@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 class JointPoint:
     """The joints of a goal at one time, in the order of its ``joint_names``."""
 
-    #: When to be there, from the start of the motion [s].
+    #: When to reach the point, from the start of the motion [s].
     time: float
     #: [rad]
     positions: tuple[float, ...]
@@ -38,22 +38,22 @@ class JointTolerance:
     position: float = 0.0
     #: [rad/s]
     velocity: float = 0.0
-    #: [rad/s^2]; has to be 0 or negative: robots do not report it.
+    #: [rad/s^2]; has to be 0 or negative, because robots do not report joint accelerations.
     acceleration: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointGoal:
-    """A joint trajectory and how exactly to follow it."""
+    """A joint trajectory with its tolerances."""
 
-    #: All six, in any order, with the ``tf_prefix`` of the driver.
+    #: All six joints, in any order, with the ``tf_prefix`` of the driver.
     joint_names: tuple[str, ...]
     points: tuple[JointPoint, ...]
-    #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
+    #: Age of the goal's stamp on receipt [s]; None = no stamp.
     age: float | None = None
     path_tolerance: tuple[JointTolerance, ...] = ()
     goal_tolerance: tuple[JointTolerance, ...] = ()
-    #: How much later than planned the end may come [s]: 0 = the default, negative = without end.
+    #: Largest delay of the end against the plan [s]: 0 = the default, negative = unlimited.
     goal_time_tolerance: float = 0.0
 
 
@@ -66,7 +66,7 @@ class JointErrorBounds:
     velocity: Vector6 = ZERO6
 
     def __bool__(self) -> bool:
-        """Tell whether there is any limit."""
+        """Return whether there is any limit."""
         return max(*self.position, *self.velocity) > 0.0
 
 

@@ -8,11 +8,11 @@ description has the same origin, rotated by pi about z.
 
 ``tool0`` is the controller's flange. ``flange`` of the robot description has the same origin and
 the axes of REP-103 (x forward), that is tool0 rotated back by rpy (pi/2, 0, pi/2).
-``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is a relative
-motion, from where the robot stands when the goal is planned.
+``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is relative to
+the pose of the arm at the time of planning.
 
 The parameter ``static_frames`` adds frames fixed to any of these. All other frames are looked up
-in tf2, where it is installed.
+in tf2, if it is installed.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class StaticFrame:
         """
         Read ``name parent x y z qx qy qz qw`` [m, unit quaternion].
 
-        :raises ValueError: the text has another form; the sentence explains the fault.
+        :raises ValueError: the text does not have this form; the sentence explains the fault.
         """
         words = text.split()
         if len(words) != 9:
@@ -88,12 +88,12 @@ class ArmSnapshot:
 
     @classmethod
     def of(cls, state: RobotState) -> ArmSnapshot:
-        """Return it from the robot's own report, which includes the calibration of the arm."""
+        """Return the snapshot of a robot's report, which includes the calibration of the arm."""
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
 
 class FrameLookup(Protocol):
-    """Looks up the frames of others; ``ros.tf.tf_lookup`` does so in tf2."""
+    """Looks up the frames of other nodes; ``ros.tf.tf_lookup`` does so in tf2."""
 
     def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
         """Return the pose of the source frame in the target frame at a time [ns], 0 = now."""
@@ -103,7 +103,7 @@ class FrameLookup(Protocol):
 
 
 class Frames:
-    """The frames of this driver, with ``tf_prefix`` in the names of the robot's own."""
+    """The frames that this driver knows; those of the robot itself have ``tf_prefix``."""
 
     def __init__(self, tf_prefix: str = '', static_frames: Iterable[StaticFrame] = ()) -> None:
         """
@@ -132,7 +132,7 @@ class Frames:
         )
 
     def with_transforms(self, transforms: FrameLookup | None) -> Frames:
-        """Return these frames, with others looked up in tf2."""
+        """Return these frames, with all unknown ones looked up in tf2."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames
@@ -148,7 +148,7 @@ class Frames:
         """
         Return a goal with the present poses of its frame and of its controlled frame.
 
-        :param snapshot: for frames that move with the arm; None if the arm's pose is not known.
+        :param snapshot: the arm, for frames that move with it; None if its pose is not known.
         :param at: time of tf2 transforms [ns]; 0 = the newest.
         :raises InvalidGoal: a frame is unknown.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
@@ -166,7 +166,7 @@ class Frames:
         """
         Return the pose of a frame in the robot's base; the empty name is the base itself.
 
-        :param snapshot: for frames that move with the arm; None if the arm's pose is not known.
+        :param snapshot: the arm, for frames that move with it; None if its pose is not known.
         :param at: time of a tf2 transform [ns]; 0 = the newest.
         :raises InvalidGoal: the frame is unknown, or tf2 has no transform, or only an old one.
         :raises RobotNotReady: the frame moves with the arm, whose pose is not known.
@@ -194,7 +194,7 @@ class Frames:
         """
         Return the pose of a controlled frame in the flange; None for the robot's active TCP.
 
-        :param snapshot: for frames fixed to the active TCP; None if the TCP is not known.
+        :param snapshot: the arm, for frames fixed to its active TCP; None if that is not known.
         :raises InvalidGoal: the frame is unknown, or not fixed to the flange.
         :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
         """
@@ -233,7 +233,7 @@ def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> Ar
 def _resolve_static_frames(
     known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
 ) -> dict[str, tuple[str, Pose]]:
-    """Return the root of each frame and its pose there; static frames may have any order."""
+    """Return each frame's root and its pose in that root; static frames can have any order."""
     frames = dict(known)
     waiting: dict[str, StaticFrame] = {}
     for frame in static_frames:

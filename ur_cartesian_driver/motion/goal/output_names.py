@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
-#: By kind: the name in a sentence, and how many there are.
+#: For each kind: its name in a sentence, and the number of pins.
 OUTPUTS = {
     OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
     OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
@@ -19,7 +19,7 @@ OUTPUTS = {
 
 
 def output_name(kind: OutputKind, pin: int) -> str:
-    """Return the name of an output in a sentence."""
+    """Return the name of an output for a sentence."""
     return f'{OUTPUTS[kind][0]} {pin}'
 
 
@@ -29,7 +29,7 @@ def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, st
     if not 0 <= pin < pins:
         return 'pin', f'is {pin}, but there are {name}s 0 to {pins - 1}', 'name one of these'
     is_analog = kind is OutputKind.STANDARD_ANALOG
-    if not 0.0 <= value <= 1.0 or (not is_analog and value not in (0.0, 1.0)):  # NaN neither
+    if not 0.0 <= value <= 1.0 or (not is_analog and value not in (0.0, 1.0)):  # or NaN
         takes = '0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'
         return 'value', f'is {value:g}; a {name} takes {takes}', ''
     return None
@@ -43,9 +43,9 @@ def repeated_output(outputs: Sequence[SafeOutput]) -> int | None:
 
 def parse_safe_outputs(texts: tuple[str, ...]) -> tuple[SafeOutput, ...]:
     """
-    Read the parameter; empty texts are skipped.
+    Read the parameter ``safe_outputs``; empty texts are skipped.
 
-    :raises ValueError: one cannot be read, or two name the same output.
+    :raises ValueError: a text cannot be read, or two name the same output.
     """
     outputs = tuple(_parse(text) for text in texts if text.strip())
     twice = repeated_output(outputs)

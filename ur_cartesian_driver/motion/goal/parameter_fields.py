@@ -31,13 +31,13 @@ from ur_cartesian_driver.motion.goal.field_table import Mark, Range
 
 T = TypeVar('T')
 
-#: A field that the driver fills in, and so no parameter.
+#: A field that the driver fills in, so that it is no parameter.
 Detected: TypeAlias = Annotated[T, Mark.NOT_SENT]
 
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """The texts that a parameter takes, from a table; ``Literal`` serves where there is none."""
+    """The allowed texts of a parameter, taken from a table; without a table use ``Literal``."""
 
     choices: tuple[str, ...]
 
@@ -48,9 +48,9 @@ class ParameterField:
 
     name: str
     default: Any
-    #: Of a number.
+    #: The range of a number; None = not limited.
     range: Range | None
-    #: Of a text; empty = any text.
+    #: The allowed texts; empty = any text.
     choices: tuple[str, ...]
 
     def problem(self, value: Any) -> str:

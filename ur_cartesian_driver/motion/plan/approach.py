@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The speed at which a motion in cycles approaches its target, to arrive there at rest."""
+"""The speed of a motion that is computed cycle by cycle and arrives at its target at rest."""
 
 from __future__ import annotations
 
 from math import sqrt
 
-#: Part of the acceleration that braking is planned with; the rest is for corrections.
+#: Fraction of the acceleration that planned braking uses; the rest is for corrections.
 BRAKING_FRACTION = 0.8
 #: A target within this distance is reached [m, rad].
 ARRIVAL_TOLERANCE = 1e-9
@@ -16,9 +16,9 @@ def approach_speed(distance: float, limit: float, acceleration: float, dt: float
     """
     Return the speed of the next cycle for a motion that ends at rest.
 
-    The speed v at which one cycle of length dt, followed by braking by b dt in each cycle, covers
-    the distance d is v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2: after each such cycle the formula
-    gives exactly b dt less. The last step is d / dt.
+    One cycle of length dt at the speed v, followed by braking by b dt in each cycle, covers the
+    distance d if v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2. After each such cycle the formula
+    gives exactly b dt less. The speed of the last cycle is d / dt.
 
     :param distance: to the target, not negative [m, rad].
     :param limit: the largest speed.

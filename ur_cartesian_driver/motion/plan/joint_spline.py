@@ -4,8 +4,8 @@
 Joint positions over time, as the polynomials that the robot evaluates too.
 
 Each piece is fixed by positions, velocities and accelerations at its two ends (quintic), or by
-positions and velocities (cubic). So the planned, sent, streamed as set-points and drawn is one
-curve.
+positions and velocities (cubic). So one and the same curve is planned, sent, streamed as
+set-points and drawn.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from ur_cartesian_driver.motion.geometry.polynomials import (
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector6, ZERO6
 from ur_cartesian_driver.motion.plan.primitive import Spline
 
-#: Times that differ by less are the same [s]; the wire counts in microseconds.
+#: Times that differ by less are the same [s]; times on the wire are whole microseconds.
 SAME_TIME = 5e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointSpline:
-    """Pieces that follow each other in time; before the first and after the last it rests."""
+    """Consecutive pieces; before the first and after the last of them the joints rest."""
 
     #: (n + 1,) [s], increasing.
     times: Floats
-    #: (n, 6 powers, 6 joints): the polynomial of the time since the piece began, [rad / s^power].
+    #: (n, 6 powers, 6 joints): polynomials in the time since the piece began, [rad / s^power].
     coefficients: Floats
 
     @classmethod
@@ -50,9 +50,9 @@ class JointSpline:
         start_time: float = 0.0,
     ) -> JointSpline:
         """
-        Return the curve through pieces, from joint positions [rad].
+        Return the spline of pieces that starts at joint positions [rad].
 
-        :param velocities: those at the start [rad/s]; None = at rest. So ``accelerations``.
+        :param velocities: at the start [rad/s], like ``accelerations`` [rad/s^2]; None = zero.
         :param start_time: when the first piece begins [s].
         """
         pieces = tuple(pieces)
@@ -74,7 +74,7 @@ class JointSpline:
 
     @classmethod
     def through(cls, times: Floats, rows: MotionRows, *, quintic: bool) -> JointSpline:
-        """Return the curve through rows (n + 1, 6) at times (n + 1,) [s]."""
+        """Return the spline through rows (n + 1, 6) at times (n + 1,) [s]."""
         before, after = (
             MotionRows(*(column[k] for column in rows)) for k in (slice(None, -1), slice(1, None))
         )
@@ -83,14 +83,14 @@ class JointSpline:
 
     @property
     def duration(self) -> float:
-        """The time of its end [s]."""
+        """The time at which the last piece ends [s]."""
         return float(self.times[-1])
 
     def followed_by(self, other: JointSpline, since: float) -> JointSpline:
         """
-        Return this curve up to the start of another, and that one.
+        Return this spline up to the start of another one, continued by the other one.
 
-        :param since: what ends before this time is left out [s].
+        :param since: pieces that end before this time are left out [s].
         """
         end = int(np.searchsorted(self.times, other.times[0] - SAME_TIME))
         first = min(self.piece(since), end)
@@ -105,7 +105,7 @@ class JointSpline:
         return q[0], qd[0], qdd[0]
 
     def rows(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the same (m, 6) for many times (m,); times outside count as the ends, at rest."""
+        """Return the same for times (m,), each (m, 6); outside, the joints rest at an end."""
         inside = np.clip(times, self.times[0], self.times[-1])
         k = np.clip(
             np.searchsorted(self.times, inside, side='right') - 1, 0, len(self.coefficients) - 1

@@ -4,8 +4,8 @@
 The primitives of a plan in columns: a row for each motion.
 
 Nearly all motions of a long goal go to a pose, or are pieces of a spline. The others (arcs, joint
-targets, waiting) stand beside the columns as objects, by their row. All are a sequence of
-primitives, made when somebody looks at them.
+targets, waits) are kept as objects, by row, in addition to the columns. Together they are a
+sequence of primitives, which are created on access.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Stop,
 )
 
-#: The classes that have rows; a kind is an index into it.
+#: The classes that are stored in columns; a kind is an index into this tuple.
 MOVES = (MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL)
 
 
@@ -42,16 +42,16 @@ class MoveRows(Rows[Primitive]):
     kinds: Int64s
     #: (n, 7) x y z [m], unit quaternion x y z w
     targets: Floats
-    #: (n, 6) [rad], and whether there is one (n,)
+    #: (n, 6) [rad], and (n,) whether a row has a ``q_near``
     q_near: Floats
     has_q_near: Flags
     #: (n,) each; durations of MoveJ and MoveL only
     velocities: Floats
     accelerations: Floats
     durations: Floats
-    #: (n,) also of the others
+    #: (n,) also for the rows of ``others``
     blend_radii: Floats
-    #: By row, in place of its columns.
+    #: Primitives of other classes, by row; they replace the columns of that row.
     others: Mapping[int, Primitive]
 
     def __len__(self) -> int:
@@ -94,7 +94,7 @@ class SplineRows(Rows[Primitive]):
     accelerations: Floats
     #: (n,)
     durations: Floats
-    #: (n,) whether the accelerations count
+    #: (n,) whether the piece is quintic; if not, its accelerations are not used
     quintic: Flags
 
     def __len__(self) -> int:
@@ -122,7 +122,7 @@ def blend_radii(primitives: Sequence[Primitive]) -> Floats:
 
 
 def has_optimized(primitives: Sequence[Primitive]) -> bool:
-    """Tell whether the robot chooses the time of some primitive."""
+    """Return whether there is a primitive whose time the robot chooses."""
     classes = (OptimoveJ, OptimoveL)
     if isinstance(primitives, SplineRows):
         return False
@@ -133,7 +133,7 @@ def has_optimized(primitives: Sequence[Primitive]) -> bool:
 
 
 def stops(primitives: Sequence[Primitive]) -> dict[int, Stop]:
-    """Return the actions where the arm stands, by row."""
+    """Return the stops (actions while the arm is at rest), by row."""
     if isinstance(primitives, SplineRows | MoveRows):
         return {}
     return {row: each for row, each in enumerate(primitives) if isinstance(each, Stop)}

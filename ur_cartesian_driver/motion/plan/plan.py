@@ -3,7 +3,7 @@
 """
 A plan: primitives, the reference path of the tool, and a report of the choices.
 
-``planning`` makes it after all checks have passed; it is immutable.
+``planning`` makes a plan after all checks have passed. Plans are immutable.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ class ReferencePath:
 
     #: (m, 7) x y z [m], unit quaternion x y z w.
     poses: Floats
-    #: (m,) the index of the goal's point to which the sample belongs (the one it leads to).
+    #: (m,) the index of the goal's point to which the segment of the sample leads.
     point: Int32s
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
     time: Floats
-    #: (m, 2) [m], [rad] how far the robot's own blend may lie beside the sample: 0 outside blends,
-    #: of which UR publishes the size and not the shape. Empty = 0 everywhere.
+    #: (m, 2) [m], [rad] largest distance of the robot's own blend from the sample, 0 outside
+    #: blends: UR publishes the size of blends, but not their shape. Empty = 0 everywhere.
     blend_tolerance: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    #: (m,) how much of its segment lies before the sample, as in :class:`~.events.PathPlace`.
+    #: (m,) the fraction of the segment before the sample, as in :class:`~.events.PathPlace`.
     #: Empty = 0 everywhere.
     fraction: Floats = field(default_factory=lambda: np.empty(0))
 
@@ -74,19 +74,19 @@ class ReferencePath:
 
 class BlendEntry(NamedTuple):
     """
-    The state of the controller where the blend after a segment begins.
+    The state of the controller at the beginning of the blend after a segment.
 
-    In units of the blend's parameter, which runs from 0 to 1.
+    The unit of length is that of the blend's parameter, which runs from 0 to 1.
     """
 
     #: The rate of the parameter [1/s].
     rate: float
-    #: Time until the segment would rest at its point [s].
+    #: Time until the segment would come to rest at its point [s].
     remaining: float
-    #: Its acceleration [1/s^2] and, if it is sent with a time, its length.
+    #: Acceleration of the segment [1/s^2] and, if it is sent with a time, its length.
     acceleration: float
     length: float
-    #: Time from there until the point is passed, in the middle of the blend [s].
+    #: Time from the beginning of the blend to its middle, where the point is passed [s].
     half: float
 
 
@@ -98,37 +98,37 @@ class PlannedSegment:
     """One primitive and its expected path and time."""
 
     primitive: Primitive
-    #: Index of the waypoint at its end.
+    #: Index of the waypoint at the end of the primitive.
     waypoint: int
     #: Path length of the tool [m] and its turn [rad], from waypoint to waypoint.
     length: float
     angle: float
     #: Expected time at full speed [s].
     duration: float
-    #: Joint positions predicted at its end [rad].
+    #: Joint positions predicted at the end of the primitive [rad].
     joints: Joints
-    #: Its line in the report; empty where another piece of the same segment has it (a SPLINE takes
-    #: several pieces from point to point).
+    #: The line in the report; empty if another piece of the same segment has it (a SPLINE can have
+    #: several pieces between two points).
     report_line: str
-    #: Where the blend after it begins; None = there is none, or it is not known.
+    #: The entry of the blend that follows; None = there is no blend, or it is not known.
     blend_entry: BlendEntry | None = None
-    #: The outputs that follow it on the wire, in this order.
+    #: The records of outputs that follow the primitive on the wire, in this order.
     outputs: tuple[OutputRecord, ...] = ()
 
 
 class LateLines(Sequence[str]):
-    """Lines that are made when somebody reads one of them: long goals have many."""
+    """Lines that are made when the first of them is read, because long goals have many."""
 
     def __init__(self, count: int, make: Callable[[], Sequence[str]]) -> None:
         """
-        Keep what makes all of them.
+        Keep the function that makes all lines.
 
-        :param count: how many that will be.
+        :param count: the number of lines that it makes.
         """
         self._rows, self._lines = range(count), cache(make)
 
     def __len__(self) -> int:
-        """Return how many lines there are."""
+        """Return the number of lines."""
         return len(self._rows)
 
     @overload
@@ -138,7 +138,7 @@ class LateLines(Sequence[str]):
     def __getitem__(self, index: slice) -> LateLines: ...
 
     def __getitem__(self, index: int | slice) -> str | LateLines:
-        """Return a line, or some of them; these are not made yet."""
+        """Return a line, or a slice of the lines, which does not make them yet."""
         if isinstance(index, int):
             return self._lines()[self._rows[index]]
         part = LateLines(0, self._lines)
@@ -160,15 +160,15 @@ class PlannedRows(Rows[PlannedSegment]):
     #: (n, 6)
     joints: Floats
     primitives: Sequence[Primitive]
-    #: Lines of the report, and the outputs' additions to some of them.
+    #: Lines of the report, and by row what outputs add to some of them.
     report_lines: Sequence[str]
     notes: Mapping[int, str] = field(default_factory=dict)
-    #: By row, those that follow it.
+    #: By row, the records of outputs that follow the primitive of the row on the wire.
     outputs: Mapping[int, tuple[OutputRecord, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, segments: Iterable[PlannedSegment]) -> PlannedRows:
-        """Return segments as rows; rows themselves as they are."""
+        """Return segments as rows; rows are returned unchanged."""
         if isinstance(segments, cls):
             return segments
         every = tuple(segments)
@@ -188,7 +188,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def records(self) -> Indices:
-        """The number of records of each on the wire (n,): its primitive and its outputs."""
+        """The number of records of each row on the wire (n,): its primitive and its outputs."""
         counts = np.ones(len(self), dtype=np.intp)
         for row, outputs in self.outputs.items():
             counts[row] += len(outputs)
@@ -196,7 +196,7 @@ class PlannedRows(Rows[PlannedSegment]):
 
     @property
     def kinds(self) -> dict[int, str]:
-        """The class of the motion to each point, by the index of the point."""
+        """The name of the class of the motion to each point, by the index of the point."""
         return {
             waypoint: type(primitive).__name__
             for waypoint, primitive in zip(self.waypoints.tolist(), self.primitives, strict=True)
@@ -233,26 +233,26 @@ class Plan:
     goal: Goal
     segments: Sequence[PlannedSegment]
     reference: ReferencePath
-    #: Joint positions of the start [rad].
+    #: Joint positions at the start [rad].
     start: Joints
-    #: The TCP that the robot had when it was planned.
+    #: The active TCP of the robot at the time of planning.
     T_flange_active: Pose = IDENTITY
-    #: The TCP that the robot has to have during the motion, and loses at its end; None = the one
-    #: it has.
+    #: The TCP that the robot gets for the motion, and loses at its end; None = the active TCP
+    #: stays.
     T_flange_tcp: Pose | None = None
-    #: Where the controlled frame is behind that TCP: elsewhere only if the TCP must not change.
+    #: The controlled frame in the TCP of the motion; they differ only if the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
-    #: The version of the robot program for which it was made; '' = the driver's own.
+    #: The version of the older robot program that the plan is for; '' = the driver's own program.
     older_program: str = ''
-    #: PRIMITIVES, SPLINE or SERVO: how it is carried out.
+    #: The execution mode: PRIMITIVES, SPLINE or SERVO.
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
-    #: Where the path may give way; None = nowhere.
+    #: The band of path offsets; None = offsets are not allowed.
     offset_band: OffsetBand | None = None
-    #: The joints of a joint goal; None where the goal is Cartesian.
+    #: The tolerances of a joint goal; None if the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
     #: Ignored, slowed or changed requests, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
-    #: Finds where the tool is slower than asked: long goals have many such stretches.
+    #: Finds, on demand, where the tool is slower than asked: long goals have many such stretches.
     find_slow_stretches: Callable[[], tuple[SlowStretch, ...]] = field(default=tuple)
 
     @property
@@ -275,7 +275,7 @@ class Plan:
 
     @property
     def joint_spline(self) -> JointSpline:
-        """The joints over time, where all primitives are splines."""
+        """The joints over time, for a plan whose motions are all splines."""
         pieces = (piece for piece in self.rows.primitives if isinstance(piece, Spline))
         return JointSpline.of(self.start, pieces)
 

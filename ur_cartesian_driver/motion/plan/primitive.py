@@ -3,9 +3,9 @@
 """
 The motion primitives of the trajectory point interface.
 
-One class for each URScript motion. A target is either a :class:`Pose` (of the TCP, in the robot's
-base) or six joint positions [rad]; target and via of an arc may differ in kind. The wire's motion
-type follows from the class and the kinds.
+There is one class for each URScript motion. A target is either a :class:`Pose` (of the TCP, in the
+robot's base) or six joint positions [rad]; an arc may have one of each as target and via. The
+motion type on the wire follows from the class and the kinds of its targets.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 Target: TypeAlias = Pose | Joints
 
-#: Defaults of the trajectory point interface, for the leading axis [rad/s, rad/s^2] or the tool.
+#: Defaults of the trajectory point interface, for the leading axis [rad/s], [rad/s^2] or the tool
+#: [m/s], [m/s^2].
 DEFAULT_VELOCITY = 1.04
 DEFAULT_ACCELERATION = 1.4
 
@@ -48,8 +49,8 @@ class MoveJ(_MoveNear):
     """
     Straight line in joint space.
 
-    ``q_near`` (with a pose target only) chooses the joint solution. ``duration`` [s] > 0 counts
-    instead of velocity [rad/s] and acceleration [rad/s^2] of the leading axis.
+    ``q_near`` (with a pose target only) chooses the joint solution. A ``duration`` [s] > 0
+    replaces velocity [rad/s] and acceleration [rad/s^2] of the leading axis.
     """
 
     duration: float = 0.0
@@ -60,7 +61,7 @@ class MoveL(_MoveNear):
     """
     Straight line of the tool; velocity [m/s] and acceleration [m/s^2] of the tool.
 
-    A joint target means the pose it leads to. ``q_near`` travels along, the robot ignores it.
+    A joint target stands for its TCP pose. ``q_near`` is sent too, but the robot ignores it.
     """
 
     duration: float = 0.0
@@ -68,12 +69,12 @@ class MoveL(_MoveNear):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveP(_MoveNear):
-    """Straight line at constant tool speed, blended by circular fillets; takes no duration."""
+    """Straight line at constant tool speed, blended by circular fillets; has no duration."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveC(_Move):
-    """Circular arc through ``via`` to ``target``; takes no duration."""
+    """Circular arc through ``via`` to ``target``; has no duration."""
 
     via: Target
     mode: ArcMode = ArcMode.UNCONSTRAINED
@@ -89,7 +90,7 @@ class OptimoveJ(_MoveNear):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OptimoveL(_MoveNear):
-    """Straight tool motion with limited jerk; velocity and acceleration in (0, 1]."""
+    """Straight line with limited jerk; velocity and acceleration are fractions in (0, 1]."""
 
     velocity: float = 0.3
     acceleration: float = 0.3
@@ -98,7 +99,7 @@ class OptimoveL(_MoveNear):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spline:
     """
-    A joint spline segment: cubic without, quintic with accelerations.
+    A piece of a joint spline: quintic if it has accelerations, else cubic.
 
     :param target: joint positions [rad] at the end.
     :param velocities: joint velocities [rad/s] at the end.
@@ -117,7 +118,7 @@ class SwitchOutput:
     """
     Not a motion: the robot program switches an output as the tool passes the trigger pose.
 
-    It follows the motion during or after which that happens, and takes no time of its own.
+    The record follows the motion during or after which the output switches, and takes no time.
     """
 
     output: OutputKind
@@ -130,18 +131,18 @@ class SwitchOutput:
     #: Unit direction of the motion there, linear or angular, in the axes of the trigger pose. The
     #: output switches when the tool crosses the plane through the pose in this direction.
     trigger_direction: Vector6 = ZERO6
-    #: Whether the tool is beyond that plane when the record is read, and comes round again.
+    #: Whether the tool is beyond that plane when the record is read, and will cross it later.
     starts_beyond: bool = False
     #: Delay after the end of the last motion [s].
     delay: float = 0.0
-    #: An analog output begins to follow the speed, by the law before it, until its next switch.
+    #: Whether an analog output follows the speed until its next switch, by the preceding law.
     follows_speed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLaw:
     """
-    Not a motion: by which law the next analog output that follows the speed does so.
+    Not a motion: the law of the next analog output that follows the speed.
 
     The fraction of the range is offset + gain * speed of the tool [m/s], within the bounds; the
     speed is filtered with a time constant [s].
@@ -154,16 +155,16 @@ class SpeedLaw:
     filter_time: float = 0.0
 
 
-#: A record beside the motions.
+#: A record that is neither a motion nor a stop.
 OutputRecord: TypeAlias = SwitchOutput | SpeedLaw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wait:
     """
-    The arm rests where it stands; the robot program counts it as a motion.
+    The arm rests for some time; the robot program counts the rest as a motion.
 
-    :param duration: from the end of the motion before [s], of real time in which the program runs.
+    :param duration: time since the end of the motion before [s], without pauses of the program.
     """
 
     duration: float
@@ -172,11 +173,12 @@ class Wait:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AwaitInput:
     """
-    The arm rests until the level of an input is at a threshold or above, or below it.
+    The arm rests until the level of an input is at or above a threshold, or below it.
 
     :param threshold: [A] or [V]; a digital input has the level 0 or 1.
-    :param timeout: longest wait [s], of real time in which the program runs.
-    :param go_on: whether the program goes on after that; if not, it ends the trajectory.
+    :param below: whether the level has to fall below the threshold.
+    :param timeout: longest wait [s], without pauses of the program.
+    :param go_on: whether the program goes on after the timeout; if not, it ends the trajectory.
     """
 
     input: InputKind
@@ -208,11 +210,11 @@ class CallFunction:
     """
     The robot program calls a function of its prelude.
 
-    :param number: of the function, as ``program.prelude`` counts.
-    :param arguments: six, the rest of them zeros.
-    :param text: the call as it is written; this and the next are not on the wire, because the
-        driver watches the time.
-    :param timeout: longest time until it returns [s].
+    :param number: the number that ``program.prelude`` gives the function.
+    :param arguments: six numbers; those that the function does not use are zeros.
+    :param text: the call as it is written; ``text`` and ``timeout`` are not on the wire, because
+        the driver watches the time.
+    :param timeout: longest time until the function returns [s].
     """
 
     number: int
@@ -224,10 +226,10 @@ class CallFunction:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressLaw:
     """
-    The law of the controller's force mode when it begins next.
+    The settings with which the controller's force mode begins next.
 
-    :param wrench: that the tool applies along compliant axes [N, Nm].
-    :param limits: speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
+    :param wrench: force and torque of the tool along compliant axes [N, Nm].
+    :param limits: largest speed of compliant axes [m/s, rad/s], and deviation of others [m, rad].
     :param zero_sensor: whether the force sensor is zeroed now.
     """
 
@@ -242,10 +244,10 @@ class PressLaw:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeginPress:
     """
-    Force mode begins, or only the watch for contact where no axis is compliant.
+    Force mode begins; if no axis is compliant, only the watch for contact.
 
     :param T_base_task: the frame of the axes.
-    :param follows_tool: the frame is the TCP's, in each cycle.
+    :param follows_tool: whether the frame is that of the TCP, updated in each cycle.
     """
 
     T_base_task: Pose
@@ -255,10 +257,10 @@ class BeginPress:
 
 @dataclass(frozen=True, slots=True)
 class EndPress:
-    """Force mode ends; the trajectory too where a contact was required and did not come."""
+    """Force mode ends; the trajectory too if a required contact did not come."""
 
 
-#: An action of the robot program while the arm stands; it counts each as a motion.
+#: An action of the robot program while the arm is at rest; the program counts it as a motion.
 Stop: TypeAlias = (
     Wait | AwaitInput | ChangePayload | CallFunction | PressLaw | BeginPress | EndPress
 )

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Stretches of a plan on which the tool is slower than the goal asks, and what would cure it.
+Stretches of a plan on which the tool is slower than the goal asks, and the remedies.
 
-The speed that a goal asks for is given by its points (``velocity``, a twist, or the driver's
-parameter), and with times the mean that they leave: length over time of each segment.
+A goal asks for a speed by its points (``velocity`` or a twist), or else by the driver's parameter.
+A goal with times asks for the mean speed of each segment: its length over its time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-#: A tool that is slower by less than this fraction keeps its speed.
+#: A tool that is slower by less than this fraction is not slow.
 SLOWER_BY = 0.02
 _MAX_LISTED = 5
 
@@ -21,7 +21,7 @@ _MAX_LISTED = 5
 class SlowCause(Enum):
     """Why the tool is slower than asked; the value is the advice."""
 
-    #: Begin and end of the motion, and of its parts between joint motions.
+    #: Beginning and end of the motion, and of its parts between joint motions.
     RAMP = 'begin the path before the seam and end it behind, so that the tool has its speed there'
     STOP = 'let the tool pass: blend_radius (with PROCESS at steady speed), or a SPLINE'
     REVERSAL = 'turn round beside the seam: leave it and come back, on an arc for example'
@@ -40,8 +40,8 @@ class SlowCause(Enum):
 class SlowStretch:
     """A stretch of the path on which the tool is slower than asked."""
 
-    #: Where it begins and ends: the index of a point, and the fraction of the segment to it (of
-    #: its length; of a SPLINE of its time).
+    #: Beginning and end: the index of a point, and the fraction of the segment to that point (of
+    #: its length; for a SPLINE, of its time).
     first: int
     first_fraction: float
     last: int
@@ -50,19 +50,19 @@ class SlowStretch:
     asked: float
     lowest: float
     cause: SlowCause
-    #: A clause.
+    #: The explanation, as a clause.
     reason: str
     #: The point to which the advice belongs.
     point: int
 
     @property
     def counts(self) -> bool:
-        """Whether ``min_speed_fraction`` counts it: no ramp, and no blend (not published)."""
+        """Whether ``min_speed_fraction`` applies: not to ramps, nor blends of unknown speed."""
         return self.cause not in (SlowCause.RAMP, SlowCause.IN_BLEND)
 
     @property
     def place(self) -> str:
-        """Say where it is."""
+        """The place of the stretch on the path, as part of a sentence."""
         begin, end = (f'{100.0 * u:.1f} %' for u in (self.first_fraction, self.last_fraction))
         if self.first == self.last:
             return f'point {self.first}, {begin} to {end} of its segment'
@@ -70,7 +70,7 @@ class SlowStretch:
 
     @property
     def line(self) -> str:
-        """Its line in the report."""
+        """The line of the stretch in the report."""
         return (
             f'{self.place}: slower than asked, down to {self.lowest:.3g} of {self.asked:.3g} m/s, '
             f'because {self.reason}'
@@ -78,7 +78,7 @@ class SlowStretch:
 
 
 def speed_advice(stretches: Sequence[SlowStretch]) -> list[str]:
-    """Return what would cure slow stretches, a line for each cause."""
+    """Return the advice against slow stretches, a line for each cause."""
     lines = []
     for cause in SlowCause:
         points = list(dict.fromkeys(each.point for each in stretches if each.cause is cause))
@@ -88,7 +88,7 @@ def speed_advice(stretches: Sequence[SlowStretch]) -> list[str]:
 
 
 def name_points(points: Sequence[int]) -> str:
-    """Return the words for some points, of which the first ones are listed."""
+    """Return a text that lists the first of some points, and the number of the others."""
     more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
     listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
     return f'{"point" if len(points) == 1 else "points"} {listed}{more}'

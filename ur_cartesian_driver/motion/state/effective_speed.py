@@ -3,10 +3,10 @@
 """
 The speed scaling of the robot program's motion, from the controller's reports.
 
-The controller reports two factors. ``target_speed_fraction`` is the speed slider;
-``speed_scaling`` is what slows the arm beside it, 1 in an undisturbed motion at any slider and 0
-at rest. The manufacturer's ROS 2 driver and ``ur_rtde`` use their product too, with 0 while the
-program is RESUMING, and let it rise slowly after a pause: the arm speeds up from rest, and the
+The controller reports two factors. ``target_speed_fraction`` is the speed slider.
+``speed_scaling`` is the slowdown in addition to it: 1 in an undisturbed motion at any slider, and
+0 at rest. The manufacturer's ROS 2 driver and ``ur_rtde`` use their product too, with 0 while the
+program is RESUMING, and let it rise slowly after a pause: the arm speeds up from rest, but the
 controller reports a scaling of 1 before it has done so.
 """
 
@@ -16,9 +16,9 @@ from ur_cartesian_driver.motion.state.robot_state import RuntimeState
 
 #: How fast the effective speed rises after a pause, as in the manufacturer's ROS 2 driver [1/s].
 RISE_AFTER_PAUSE = 5.0
-#: In these the program moves the arm, or still brakes it.
+#: States in which the program moves the arm, or still brakes it.
 _MOVING = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.STOPPING})
-#: After these the arm speeds up again.
+#: States after which the arm speeds up again.
 _HELD = frozenset({RuntimeState.PAUSED, RuntimeState.RESUMING})
 
 
@@ -42,7 +42,7 @@ class EffectiveSpeed:
         Return the effective speed in a packet, 0 to 1.
 
         :param timestamp: the controller's clock [s].
-        :param speed_scaling: what slows the arm beside the slider, 0 to 1.
+        :param speed_scaling: the slowdown in addition to the slider, 0 to 1.
         :param target_speed_fraction: the speed slider, 0 to 1.
         :param runtime_state: a :class:`RuntimeState`, or its number.
         """

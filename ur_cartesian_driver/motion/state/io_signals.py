@@ -28,7 +28,7 @@ class AnalogChannel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DigitalChannels:
-    """The digital inputs, or the outputs, by their number; True = high."""
+    """The digital inputs, or the digital outputs, by their number; True = high."""
 
     standard: tuple[bool, ...]
     configurable: tuple[bool, ...]
@@ -50,13 +50,13 @@ class Signals:
     analog_inputs: tuple[AnalogChannel, AnalogChannel]
     analog_outputs: tuple[AnalogChannel, AnalogChannel]
     tool_analog_inputs: tuple[AnalogChannel, AnalogChannel]
-    #: Supply of the tool: set [V] and measured [A].
+    #: Supply of the tool: the voltage that is set [V] and the measured current [A].
     tool_voltage: int = 0
     tool_current: float = 0.0
     #: [degrees Celsius].
     tool_temperature: float = 0.0
-    #: Number of the controller.
+    #: Mode of the tool, in the numbers of the controller.
     tool_mode: int = 0
-    #: Mass [kg] and centre of gravity in the flange [m]; NaN = not reported.
+    #: Mass of the payload [kg], and its centre of gravity in the flange [m]; NaN = not reported.
     payload: float = nan
     payload_cog: Vector3 = (nan, nan, nan)

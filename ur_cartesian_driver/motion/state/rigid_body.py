@@ -4,8 +4,8 @@
 The motion of a rigid body at another reference point.
 
 Flange, TCP and every controlled frame are fixed to each other. Their angular motion is the same;
-the linear one differs by the offset between their origins. The robot reports the TCP, a goal may
-control another frame.
+their linear motion differs because of the offset between their origins. The robot reports the
+motion of the TCP, but a goal may control another frame.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> V
 
 def shift_reference_point(state: RobotState, T_tcp_frame: Pose) -> RobotState:
     """
-    Return the state as if a frame behind the TCP were the active TCP.
+    Return the state as if another frame, fixed to the TCP, were the active TCP.
 
     The wrench stays at the TCP.
     """

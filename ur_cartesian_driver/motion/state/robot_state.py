@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of what the robot reports by RTDE, and the names of its modes."""
+"""The table of the values that the robot reports by RTDE, and the names of its modes."""
 
 from __future__ import annotations
 
@@ -97,14 +97,14 @@ class Rtde:
     """The RTDE output that a field of :class:`RobotState` holds."""
 
     name: str
-    #: Older software does not have it: the field has its default then.
+    #: Whether older software lacks the output; the field then has its default.
     optional: bool = False
-    #: Goals are monitored with it: a packet in which it is not finite is refused.
+    #: Whether goals are monitored with the output; a packet in which it is not finite is refused.
     monitored: bool = True
 
 
-# Never changed, but not frozen: that takes four times as long to make, and one is made for each
-# packet, before the reaction to it.
+# A state is never changed, but not frozen: a frozen one takes four times as long to create, and
+# one is created for each packet, before the driver reacts to the packet.
 @dataclass(slots=True)
 class RobotState:
     """
@@ -115,7 +115,8 @@ class RobotState:
     This is the only table of these fields: the RTDE recipe, the shared memory and the ``~/status``
     message follow from names, types and :class:`Rtde`. Optional outputs come after the others,
     and the driver's computed fields come last. A field of the same name in DriverStatus.msg
-    shows it; the simulator computes its outputs.
+    reports the value, but its ``speed_scaling`` carries ``effective_speed``. Values of new RTDE
+    outputs in the simulator are computed in ``sim/interfaces/rtde_output_values.py``.
     """
 
     #: The controller's clock [s].
@@ -130,7 +131,7 @@ class RobotState:
     target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
-    #: What slows the arm beside the slider, and the slider, both 0 to 1; see ``effective_speed``.
+    #: The slowdown in addition to the slider, and the slider, both 0 to 1 (``effective_speed``).
     speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
     target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
     robot_mode: Annotated[RobotMode, Rtde('robot_mode')] = RobotMode.RUNNING
@@ -147,22 +148,22 @@ class RobotState:
     target_tcp_acceleration: Annotated[
         Vector6 | None, Rtde('target_TCP_acceleration', optional=True, monitored=False)
     ] = None
-    #: Torque of each joint [Nm], measured by its current; None = the robot does not report it.
+    #: Torque of each joint [Nm], derived from its current; None = the robot does not report it.
     joint_torque: Annotated[
         Vector6 | None, Rtde('actual_current_as_torque', optional=True, monitored=False)
     ] = None
-    #: How many points of the running trajectory the robot program has begun; 0 = none, or unknown.
+    #: Points of the running trajectory that the robot program has begun; 0 = none, or unknown.
     points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
-    #: What our robot program shows of itself: version, number, and a count of its connections.
+    #: Identity of our robot program: its version, its number, and a count of its connections.
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
     #: The token of the last order for safe outputs that our robot program has carried out.
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
-    #: this packet and those before.
+    #: this packet and the earlier ones.
     effective_speed: Annotated[float, None] = 1.0
-    #: How old the state was when it was read [s]: the time that it took from the controller to us.
+    #: Age of the state when it was read [s]: the time that it took from controller to driver.
     state_age: Annotated[float, None] = 0.0
 
 
@@ -173,7 +174,7 @@ class StateField:
     name: str
     #: float, int, an enumeration of numbers, Vector6 or Pose; without ``None``.
     type: Any
-    #: Only vectors may.
+    #: Whether the field can hold None (vectors only).
     may_be_none: bool
     default: Any
     #: None = the driver computes it.
@@ -193,5 +194,5 @@ def _state_table() -> Iterator[StateField]:
         )
 
 
-#: The table, in the order in which a :class:`RobotState` takes its values.
+#: The table, in the order of the arguments of :class:`RobotState`.
 STATE_TABLE = tuple(_state_table())

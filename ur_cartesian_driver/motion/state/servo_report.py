@@ -26,10 +26,10 @@ class ServoActivity(IntEnum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoFeedback:
     """
-    One RTDE packet of the registers of the buffered servo.
+    The registers of the buffered servo in one RTDE packet.
 
-    Only our own robot program writes the counts; a program after the manufacturer's guide leaves
-    them at 0.
+    Only our own robot program writes the counts; a program written after the manufacturer's guide
+    leaves them at 0.
     """
 
     #: The controller's clock [s].
@@ -51,7 +51,7 @@ class ServoFeedback:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoReport:
-    """The progress of the streamed set-points, as ``ServoState`` tells it."""
+    """The progress of the streamed set-points, as ``ServoState`` reports it."""
 
     #: The controller's clock [s].
     timestamp: float
@@ -60,9 +60,9 @@ class ServoReport:
     setpoints_done: int
     buffer_size: int
     buffer_capacity: int
-    #: Nominal duration of what waits in the robot's buffer [s].
+    #: Nominal duration of the set-points in the robot's buffer [s].
     buffered: float
-    #: How far the arm is behind the newest set-point, as nominal time [s].
+    #: Nominal time by which the arm is behind the newest set-point [s].
     lag: float
     #: The effective speed, 0 to 1.
     speed_scaling: float
@@ -71,5 +71,5 @@ class ServoReport:
     underruns: int = 0
     overruns: int = 0
     repeats: int = 0
-    #: Sequence numbers that the robot never saw: what was written was written over.
+    #: Sequence numbers that the robot never saw, because newer ones overwrote them.
     skipped: int = 0

@@ -3,12 +3,12 @@
 """
 The action servers: they accept every goal at once and give it a :class:`GoalRun` with a thread.
 
-The executor of the node sees a goal when it is accepted and when its outcome is there. In between
+The node's executor handles a goal when it is accepted and when its outcome is known. In between
 it serves cancel requests, parameters and the heartbeat, even with a single thread.
 
 A coroutine that awaits a future would be the usual form. But executors of Jazzy poll a waiting
 coroutine whenever they wake, and the multi-threaded one keeps an entry for each poll until the
-coroutine ends. A motion of ten minutes beside a busy topic would slow down the whole process.
+coroutine ends. With a busy topic, a motion of ten minutes would slow down the whole process.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from ur_cartesian_driver.ros.tf.tf_lookup import listen_to_tf
 
 #: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.
 RESULT_TIMEOUT = 60
-#: Requests that come in a burst wait; beyond the depth they would be lost.
+#: A burst of requests is queued; requests beyond the depth would be lost.
 REQUEST_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
-#: How many goals may be under way, each with a thread and its points in memory.
+#: Largest number of goals under way, each with a thread and its points in memory.
 MAX_GOALS = 100
 #: How long the node waits for the end of a goal when it is destroyed [s].
 JOIN_TIMEOUT = 10.0
@@ -60,7 +60,7 @@ class GoalServer:
             settings=settings,
             show=PlanMarkerPublisher(node, settings.frames.base).publish,
         )
-        # Guards the runs of the goals that have not ended, and the flag.
+        # Guards ``_runs``, which holds the goals that have not ended, and ``_closing``.
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
@@ -74,7 +74,7 @@ class GoalServer:
             action.action_type,
             action.name,
             partial(self._begin, action),
-            # Of its own: goals and cancel requests are served while other callbacks run.
+            # A group of its own, to serve goals and cancel requests while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),
             cancel_callback=self._cancel,
             result_timeout=RESULT_TIMEOUT,
@@ -85,7 +85,7 @@ class GoalServer:
 
     @property
     def arbiter(self) -> ArmArbiter:
-        """Decides which goal or session may move the arm."""
+        """The arbiter, which decides which goal or session may move the arm."""
         return self._context.arbiter
 
     @property
@@ -95,7 +95,7 @@ class GoalServer:
 
     @property
     def idle(self) -> bool:
-        """Tell whether every accepted goal has its result."""
+        """Whether every accepted goal has its result."""
         with self._lock:
             return not self._runs
 
@@ -113,7 +113,7 @@ class GoalServer:
             return self._runs.get(key)
 
     def stop(self) -> None:
-        """Stop the arm, abort all goals and take no new ones; returns at once."""
+        """Stop the arm and abort all goals, new ones too; return at once."""
         with self._lock:
             self._closing = True
             runs = list(self._runs.values())
@@ -136,7 +136,7 @@ class GoalServer:
         """Give an accepted goal its run; called by the executor."""
         run = GoalRun(handle, action, self._context, self._finish)
         if not (run.is_scheduled or action.is_validation(handle.request)):
-            self.arbiter.enqueue(run.arm_request)  # here, where goals come one after the other
+            self.arbiter.enqueue(run.arm_request)  # here, as goals arrive in order
         with self._lock:
             is_over_limit = len(self._runs) >= MAX_GOALS
             if not is_over_limit:

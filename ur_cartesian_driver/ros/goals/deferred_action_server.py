@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The action server of rclpy, with goals that finish from any thread."""
+"""The action server of rclpy, with goals that any thread can finish."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GoalHandle: TypeAlias = Any
 
 class DeferredActionServer(ActionServer):
     """
-    An action server that gives the executor a task only when the outcome of a goal is there.
+    An action server that gives the executor a task only when the outcome of a goal is known.
 
     rclpy passes every accepted goal to :meth:`notify_execute`, which creates a task that runs the
     callback to its end. Here the callback only starts the goal, and :meth:`finish` creates the
@@ -32,8 +32,8 @@ class DeferredActionServer(ActionServer):
         Take a request without garbage collection.
 
         A large goal creates hundreds of thousands of objects, none of which is garbage. The
-        collector would visit them again and again: 40 % of the time, in which no other thread
-        runs.
+        collector would visit them again and again, for 40 % of the time, while no other thread
+        can run.
         """
         with uncollected():
             return super().take_data()  # type: ignore[no-untyped-call]  # rclpy's
@@ -43,13 +43,13 @@ class DeferredActionServer(ActionServer):
         (execute_callback or self._execute_callback)(goal_handle)
 
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
-        """Have the executor call back for the result and send it; from any thread."""
+        """Have the executor get the result from a callback and send it; for any thread."""
         executor = self._node.executor
         if executor is None:  # the node is being destroyed
             return
         # An executor that has been shut down has no guard condition any more, or an invalid one.
         with contextlib.suppress(AttributeError, InvalidHandle):
-            # A plain function, because a coroutine that no executor runs any more would warn.
+            # Not a coroutine, because Python would warn if no executor runs it any more.
             executor.create_task(self._hand_over, goal_handle, callback)
 
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The actions of the node: what a goal's run asks about the messages of its action.
+The actions of the node: each converts the messages of one action for the runs of its goals.
 
-:class:`JointAction` is there where control_msgs is installed; it is not on PyPI.
+:class:`JointAction` is served if control_msgs is installed, which is not on PyPI.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ class GoalAction(Protocol):
     name: str
 
     def is_validation(self, request: Message) -> bool:
-        """Tell whether a goal is only to be checked."""
+        """Return whether a goal is only to be checked."""
 
     def goal(self, request: Message, context: GoalContext, received: int) -> AnyGoal:
         """
         Return the goal of a message.
 
-        :param received: time of the node's clock [ns].
+        :param received: time of receipt on the node's clock [ns].
         :raises GoalRefused: the message makes no sense.
         """
 
     def resolved(self, goal: Any, request: Message, context: GoalContext) -> AnyGoal:
-        """Return a goal with its frames where they are now."""
+        """Return a goal with the present poses of its frames."""
 
     def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
-        """Return what makes the feedback messages of a plan."""
+        """Return the function that makes the feedback messages of a plan."""
 
     def result(self, outcome: Outcome) -> Message:
         """Return the result message of an outcome."""
@@ -70,7 +70,7 @@ class CartesianAction:
     name = '~/follow_cartesian_trajectory'
 
     def is_validation(self, request: Message) -> bool:
-        """Tell whether a goal is only to be checked."""
+        """Return whether a goal is only to be checked."""
         return bool(request.validate_only)
 
     def goal(self, request: Message, context: GoalContext, received: int) -> Goal:
@@ -84,7 +84,7 @@ class CartesianAction:
         )
 
     def resolved(self, goal: Goal, request: Message, context: GoalContext) -> Goal:
-        """Return a goal with its frames where they are now."""
+        """Return a goal with the present poses of its frames."""
         return resolve_frames(
             goal,
             request.trajectory,
@@ -94,7 +94,7 @@ class CartesianAction:
         )
 
     def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
-        """Return what makes the feedback messages of a plan."""
+        """Return the function that makes the feedback messages of a plan."""
         trajectory = request.trajectory
         frame = FeedbackFrame(
             frame_id=trajectory.header.frame_id or context.frames.base,
@@ -119,7 +119,7 @@ class JointAction:
         self.action_type = action_type
 
     def is_validation(self, request: Message) -> bool:
-        """Tell that all goals are executed."""
+        """Return False, because all goals are executed."""
         return False
 
     def goal(self, request: Message, context: GoalContext, received: int) -> JointGoal:
@@ -129,11 +129,11 @@ class JointAction:
         )
 
     def resolved(self, goal: JointGoal, request: Message, context: GoalContext) -> JointGoal:
-        """Return the goal: joints have no frames."""
+        """Return the goal unchanged, because joints have no frames."""
         return goal
 
     def feedback_of(self, request: Message, plan: Plan, context: GoalContext) -> MakeFeedback:
-        """Return what makes the feedback messages of a plan."""
+        """Return the function that makes the feedback messages of a plan."""
         make, names = self.action_type.Feedback, context.settings.joint_names
         return lambda progress: joint_feedback(make, progress, names, context.clock.now().to_msg())
 

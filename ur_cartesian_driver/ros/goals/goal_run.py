@@ -4,7 +4,7 @@
 One accepted goal, from its acceptance to its outcome, in a thread of its own.
 
 A run converts the goal, plans it, waits for its start time and for the arm, and follows the
-motion. Its executor sees it twice: when the goal is accepted, and when the outcome is there.
+motion. The executor handles it twice: when the goal is accepted, and when the outcome is known.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from ur_cartesian_driver.ros.message_fields import nanoseconds
 
 GoalHandle: TypeAlias = Any
 
-#: How often a waiting goal reads the node's clock, which may be a simulated one [s].
+#: Period in which a waiting goal reads the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05
 #: How long rclpy may take from its cancel callback to the state CANCELING [s].
 CANCELING_TIMEOUT = 1.0
@@ -58,7 +58,7 @@ class GoalRun:
         on_end: Callable[[GoalRun, Outcome], None],
     ) -> None:
         """
-        Make a run; its thread is still to be started.
+        Make a run, whose thread the caller has to start.
 
         :param on_end: takes the outcome, in the thread of the run.
         """
@@ -84,7 +84,7 @@ class GoalRun:
 
     @property
     def is_scheduled(self) -> bool:
-        """Tell whether the start time was in the future when the goal was received."""
+        """Whether the start time was in the future when the goal was received."""
         return self._start_time > self._received
 
     @property
@@ -94,7 +94,7 @@ class GoalRun:
         return motion.appender.points if motion is not None and motion.appender else 0
 
     def motion(self, timeout: float) -> MotionHandle | None:
-        """Return the motion, waiting until it has begun [s]; None if there is none."""
+        """Wait up to ``timeout`` [s] for the motion to begin; return it, None if it has not."""
         self._begun.wait(timeout)
         return self._motion
 
@@ -165,7 +165,7 @@ class GoalRun:
         """
         Acquire the arm and plan the goal.
 
-        :raises GoalRefused: the arm is not free; a malformed goal is refused for that instead.
+        :raises GoalRefused: the arm is not free, or the goal is malformed (refused first).
         """
         arbiter = self._context.arbiter
         if not arbiter.acquire(self.arm_request):
@@ -187,12 +187,12 @@ class GoalRun:
 
     def _plan_and_preempt(self, goal: AnyGoal) -> Plan:
         """
-        Plan the goal, have older goals give up the arm, and return the plan.
+        Plan the goal, preempt older goals, and return the plan.
 
-        The goal is first planned from where the arm would come to rest: a refusal then disturbs
+        The goal is first planned from where the arm would come to rest, so that a refusal disturbs
         no other goal. It is planned again if another goal has moved the arm meanwhile.
 
-        :raises GoalRefused: the goal, or the robot cannot take a goal after the running one.
+        :raises GoalRefused: the goal is refused, or the running motion cannot be preempted.
         """
         arbiter = self._context.arbiter
         release_count = arbiter.release_count
@@ -203,11 +203,11 @@ class GoalRun:
         self._check_wanted()
         if arbiter.release_count == release_count:
             return plan
-        del plan  # a long one has 100 MB and more, as has the next
+        del plan  # a long plan takes 100 MB or more, and so will the next one
         return self._plan_from_here(goal)
 
     def _plan_from_here(self, goal: AnyGoal) -> Plan:
-        """Plan a goal whose frames are where they are now: the arm may have moved since."""
+        """Plan a goal with the present poses of its frames: the arm may have moved since."""
         return self._plan(self.action.resolved(goal, self.handle.request, self._context))
 
     def _plan(self, goal: AnyGoal) -> Plan:
@@ -234,8 +234,8 @@ class GoalRun:
             self._motion = motion
             abort_requested = self._abort_requested.is_set()
         self._begun.set()
-        self._context.show(plan)  # while it moves: a long plan takes a while
-        del plan  # and much memory
+        self._context.show(plan)  # while the arm moves, because a long plan takes a while
+        del plan  # a long plan takes much memory
         if abort_requested:
             motion.cancel()
         elif self.arm_request.preempted_by:
@@ -250,12 +250,12 @@ class GoalRun:
         return outcome
 
     def _feedback_publisher(self, plan: Plan) -> Callable[[Progress], None]:
-        """Return what publishes feedback; publishing is safe from any thread."""
+        """Return the function that publishes feedback, from any thread."""
         make = self.action.feedback_of(self.handle.request, plan, self._context)
 
         def publish(progress: Progress) -> None:
-            # Who answers the first feedback finds the motion. The driver calls back without a
-            # lock, and has sent the whole request to start by then: this cannot block it.
+            # A client that reacts to the first feedback must find the motion. The driver holds no
+            # lock here, and has sent the whole request to start: this wait cannot block it.
             self._begun.wait()
             message = make(progress)
             # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
@@ -265,7 +265,7 @@ class GoalRun:
         return publish
 
     def _refusal_text(self, error: DriverError) -> str:
-        """Return the text of a refusal; it mentions a goal that was preempted in vain."""
+        """Return the text of a refusal, with any goal that was preempted in vain."""
         preempted = self.arm_request.preempted
         if not (isinstance(error, GoalRefused) and preempted):
             return str(error)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``~/path_offset``: offsets for the goal that runs, if its path may give way (``path_offset``).
+``~/path_offset``: offsets for the goal that runs, if it allows them (``path_offset``).
 
-One that cannot be followed is ignored with a warning that says why; the one before it counts until
-it is stale.
+An offset that cannot be followed is ignored with a warning that says why; the offset before it
+stays in effect until it is stale.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNot
 from ur_cartesian_driver.ros.goals.action_server import GoalServer
 from ur_cartesian_driver.ros.message_fields import nanoseconds
 
-#: Only the newest offset counts, and a lost one is not sent again.
+#: Only the newest offset is used, and a lost one is not sent again.
 OFFSET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-#: The names of the frame of the path.
+#: The values of ``frame_id`` that mean the frame of the path.
 FRAMES = ('', 'path')
-#: How far a stamp may lie in the future: clocks differ [s].
+#: How far a stamp may lie in the future, because clocks differ [s].
 MAX_STAMP_AHEAD = 0.1
-#: How often the same warning is logged at most [s].
+#: Shortest time between two logs of the same warning [s].
 WARNING_PERIOD = 2.0
 
 
 class PathOffsetSubscriber:
-    """Gives offsets to the motion that runs; the subscription goes with the node."""
+    """Passes offsets to the motion that runs; the node destroys the subscription."""
 
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Subscribe."""
@@ -53,9 +53,9 @@ class PathOffsetSubscriber:
 
     def give(self, message: Vector3Stamped) -> None:
         """
-        Give an offset to the motion that runs.
+        Pass an offset to the motion that runs.
 
-        :raises DriverError: it cannot be followed, or no goal runs.
+        :raises DriverError: the offset cannot be followed, or no goal runs.
         """
         header, vector = message.header, message.vector
         if header.frame_id not in FRAMES:

@@ -24,7 +24,7 @@ JOIN_TIMEOUT = 10.0
 
 
 class FreedriveService:
-    """Holds the arm's arbiter while freedrive is on: goals are refused, and preempt nothing."""
+    """Holds the arm while freedrive is on: goals are refused and cannot preempt it."""
 
     def __init__(self, node: Node, driver: Driver, arbiter: ArmArbiter) -> None:
         """Start to serve."""
@@ -34,7 +34,7 @@ class FreedriveService:
         self._service = DeferredService(node, SetBool, '~/freedrive_mode', self._handle)
 
     def close(self) -> None:
-        """End freedrive and wait for it; the service goes with the node."""
+        """End freedrive and wait for its end; the node destroys the service."""
         motion = self._motion
         if motion is not None:
             motion.cancel()
@@ -42,7 +42,7 @@ class FreedriveService:
                 motion.result(JOIN_TIMEOUT)
 
     def _handle(self, request: Any) -> Future[ServiceAnswer]:
-        """Start or end freedrive; the answer comes when the robot has done it, or cannot."""
+        """Start or end freedrive; the answer comes when the robot has done so, or cannot."""
         with self._lock:
             motion = self._motion
             if request.data:
@@ -91,7 +91,7 @@ class FreedriveService:
 
 
 class _FirstAnswer:
-    """The answer of a service call; only the first one counts."""
+    """The answer to a service call; later answers are ignored."""
 
     def __init__(self) -> None:
         self.future: Future[ServiceAnswer] = Future()

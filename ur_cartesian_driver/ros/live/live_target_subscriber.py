@@ -3,15 +3,17 @@
 """
 ``~/live_target``: sessions in which the arm follows poses that arrive while it moves.
 
-The executor only stores the newest message. A thread of its own processes it, because a tf2 frame
-may have to be waited for, and a client that sends faster than that must not hold up the node. A
-target that cannot be followed is ignored with a warning that says why; the one before it counts
-until it is too old.
+The executor only stores the newest message, and a separate thread processes it. So neither the
+wait for a tf2 frame nor a client that sends quickly holds up the node. A target that cannot be
+followed is ignored with a warning that says why; the target before it stays in effect until it is
+too old.
 
-A session acquires the arm like a goal, but counts as older than all goals: any goal preempts it.
+A session acquires the arm like a goal, but is treated as older than all goals, so that any goal
+preempts it.
 
 An operator who unlocks a robot and plays its program does not expect it to follow targets that
-still arrive. So after a stop targets are ignored until they have paused once.
+still arrive. So after a stop, targets are ignored until the client has once sent none for
+``live_target_timeout``.
 """
 
 from __future__ import annotations
@@ -36,9 +38,9 @@ from ur_cartesian_driver.motion.state.robot_state import SafetyStatus
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds, pose_from_message
 
-#: Only the newest target counts, and a lost one is not sent again.
+#: Only the newest target is used, and a lost one is not sent again.
 TARGET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-#: After these an operator has to check the robot.
+#: Stops after which an operator has to check the robot.
 SAFETY_STOPS = (
     SafetyStatus.PROTECTIVE_STOPPED
     | SafetyStatus.SAFEGUARD_STOPPED
@@ -48,7 +50,7 @@ SAFETY_STOPS = (
     | SafetyStatus.VIOLATION
     | SafetyStatus.FAULT
 )
-#: How often the same warning is logged at most [s].
+#: Shortest time between two logs of the same warning [s].
 WARNING_PERIOD = 2.0
 #: How long the node waits for the end of a session when it is destroyed [s].
 JOIN_TIMEOUT = 10.0
@@ -62,7 +64,7 @@ def target_from_message(
     Return the target pose of the TCP in the robot's base, and its age [s].
 
     :param now: time of the node's clock [ns].
-    :param max_age: how far a stamp may lie in the past or in the future [s].
+    :param max_age: largest distance of a stamp from now, in the past or in the future [s].
     :raises InvalidGoal: the pose is malformed, its frame unknown, or its stamp too far from now.
     :raises RobotNotReady: the frame moves with the arm, whose pose is not known yet.
     """
@@ -83,13 +85,13 @@ def target_from_message(
 
 class TargetInhibitor:
     """
-    Blocks targets after a stop, until they have paused.
+    Blocks targets after a stop, until there is a pause between two targets.
 
-    :param pause: the length of that pause [s].
+    :param pause: the shortest such pause [s].
     """
 
     def __init__(self, pause: float) -> None:
-        """Start inactive."""
+        """Start without blocking."""
         self._pause = pause
         self._is_active = False
         self._last = -inf
@@ -100,7 +102,7 @@ class TargetInhibitor:
 
     def blocks(self, now: float) -> bool:
         """
-        Note a target, and tell whether it must be ignored.
+        Note a target, and return whether it must be ignored.
 
         :param now: time of a steady clock [s].
         """
@@ -120,7 +122,7 @@ class LiveTargetSubscriber:
         self._session: LiveSession | None = None
         self._inhibitor = TargetInhibitor(driver.options.live_target_timeout)
         self._had_session = False
-        # Guards what follows: the newest message that is not processed yet.
+        # Guards the next fields, which hold the newest message that is not processed yet.
         self._condition = threading.Condition()
         self._pending: Message = None
         self._received = 0
@@ -137,13 +139,13 @@ class LiveTargetSubscriber:
         )
 
     def close(self) -> None:
-        """Stop the arm, and wait until it stands; the subscription goes with the node."""
+        """Stop the arm, and wait until it is at rest; the node destroys the subscription."""
         with self._condition:
             self._closing = True
             self._condition.notify_all()
         self._cancel_session()
         self._thread.join()
-        session = self._cancel_session()  # the thread may just have started it
+        session = self._cancel_session()  # the thread may just have started one
         if session is not None:
             with contextlib.suppress(TimeoutError):
                 session.motion.result(JOIN_TIMEOUT)
@@ -161,7 +163,8 @@ class LiveTargetSubscriber:
         stamp, now = nanoseconds(message.header.stamp), self._clock.now().nanoseconds
         with self._condition:
             if self._newest_stamp > now + self._max_age * 1e9:
-                # That target is never followed; or a simulated clock was set back.
+                # The target with this stamp is too far in the future to be followed, or a
+                # simulated clock was set back.
                 self._newest_stamp = 0
             if 0 < stamp < self._newest_stamp:
                 return
@@ -182,12 +185,12 @@ class LiveTargetSubscriber:
             try:
                 self._process(message, received)
             except DriverError as error:
-                reason = str(error).removeprefix('trajectory.')  # a field of goals
+                reason = str(error).removeprefix('trajectory.')  # not part of a target
                 self._logger.warning(
                     f'A message on ~/live_target is ignored: {reason}',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
-            except Exception as error:  # the next message may be better
+            except Exception as error:  # the next message may be processed without error
                 self._logger.error(
                     'A message on ~/live_target is ignored, because of a defect of the driver, '
                     f'{type(error).__name__}: {error}.',

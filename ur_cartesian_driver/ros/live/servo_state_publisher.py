@@ -18,12 +18,12 @@ from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoRe
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
 
-#: As the other state topics.
+#: The same as for the other state topics.
 SERVO_STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 
 
 class ServoStatePublisher:
-    """Publishes the servo reports of the driver, up to a rate."""
+    """Publishes the servo reports of the driver, at a limited rate."""
 
     def __init__(self, node: Node, driver: Driver, rate: float) -> None:
         """
@@ -36,7 +36,7 @@ class ServoStatePublisher:
         driver.add_servo_listener(self._publish)
 
     def _publish(self, report: ServoReport) -> None:
-        """Publish, in the thread of the driver; the end of a stream in any case."""
+        """Publish, in the thread of the driver; the end of a stream is never left out."""
         now = monotonic()
         if now < self._due and report.activity is not ServoActivity.IDLE:
             return

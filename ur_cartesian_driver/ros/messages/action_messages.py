@@ -4,7 +4,7 @@
 Feedback and result of the action.
 
 Feedback is expressed in the frame of the goal and describes its controlled frame. NaN stands for
-values that are not known: jerk, and acceleration where the robot does not report it.
+values that are not known: the jerk, and the acceleration if the robot does not report it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ur_cartesian_driver.ros.message_fields import duration_message, pose_messag
 
 _NAN6: Vector6 = (nan,) * 6
 
-#: Lines of a report that a result has at most; rclpy and DDS keep results for a minute.
+#: Largest number of report lines in a result, because rclpy and DDS keep results for a minute.
 MAX_REPORT_LINES = 10_000
 
 
@@ -117,13 +117,13 @@ def _accel(values: Vector6) -> Accel:
 
 
 def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
-    """Return a twist (or acceleration) along the axes of the goal's frame, which stands still."""
+    """Return a twist (or acceleration) in the axes of the goal's frame, which does not move."""
     q = T_frame_base.quaternion
     return (*rotate(q, twist[:3]), *rotate(q, twist[3:]))
 
 
 def _report(lines: Sequence[str]) -> list[str]:
-    """Return the first and the last lines of a report: nobody reads 100,000 segments."""
+    """Return a report; of one that is too long, only the first and the last lines."""
     left_out = len(lines) - MAX_REPORT_LINES
     if left_out <= 0:
         return list(lines)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal message to a goal with its frames resolved.
+Conversion of a goal message to a goal with resolved frames.
 
 Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
 planning, which knows no messages, checks the rest.
@@ -85,7 +85,7 @@ def resolve_frames(
     """
     Return a goal with its frames resolved to their present poses.
 
-    A stamp in the future is used when its time has come; until then the newest transforms are.
+    tf2 gives the transforms at the goal's stamp; while that lies in the future, the newest ones.
 
     :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
     :param now: time of the node's clock [ns].

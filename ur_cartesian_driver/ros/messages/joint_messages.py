@@ -3,7 +3,7 @@
 """
 Goal, feedback and result of control_msgs/FollowJointTrajectory.
 
-Nothing here imports control_msgs, which is not on PyPI: messages are made of the action's classes.
+Nothing here imports control_msgs, which is not on PyPI: callers pass the classes of the messages.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from ur_cartesian_driver.ros.message_fields import (
     seconds,
 )
 
-#: Refused before anything moved, or replaced, as ros2_control's joint trajectory controller says.
+#: Codes that become INVALID_GOAL: refused before anything moved, replaced (ros2_control's joint
+#: trajectory controller says the same for these), or cancelled.
 _AS_INVALID_GOAL = (
     ErrorCode.INVALID_POSTURE,
     ErrorCode.UNREACHABLE,
@@ -35,7 +36,7 @@ _AS_INVALID_GOAL = (
     ErrorCode.PREEMPTED,
     ErrorCode.CANCELLED,
 )
-#: Fields of newer versions that are for other robots than arms.
+#: Fields of newer control_msgs, which are for other robots than arms.
 _OTHER_FIELDS = ('component_path_tolerance', 'component_goal_tolerance')
 
 
@@ -45,7 +46,7 @@ def joint_goal_from_message(message: Message, *, now: int, time_tolerance: float
 
     :param now: time of the node's clock when the goal was received [ns].
     :param time_tolerance: the value for a ``goal_time_tolerance`` of zero [s].
-    :raises InvalidGoal: it has parts that are not joints of an arm.
+    :raises InvalidGoal: the message has parts that are not for the joints of an arm.
     """
     _check_other_fields(message)
     trajectory = message.trajectory
@@ -109,7 +110,8 @@ def joint_error_code(code: ErrorCode) -> ErrorCode:
     """
     Return the code of FollowJointTrajectory for one of ours.
 
-    A motion that anything stopped has left its path. No failure is 0, which is SUCCESSFUL.
+    A motion that was stopped for another reason becomes PATH_TOLERANCE_VIOLATED. No failure
+    becomes 0, which is SUCCESSFUL.
     """
     if code >= ErrorCode.GOAL_TOLERANCE_VIOLATED:
         return code

@@ -16,12 +16,12 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.message_fields import pose_message
 
-#: How many samples of a path, and how many points are drawn at most.
+#: Largest number of samples of a path, and of points, that are drawn.
 MAX_SAMPLES = 5000
 MAX_POINTS = 500
 #: Width of the path and diameter of the points [m].
 PATH_WIDTH, POINT_SIZE = 0.004, 0.01
-#: Length of the axes of the start and the end [m].
+#: Length of the axes that are drawn at the start and the end [m].
 AXIS_LENGTH = 0.05
 
 
@@ -29,7 +29,7 @@ def _colour(red: int, green: int, blue: int) -> ColorRGBA:
     return ColorRGBA(r=red / 255.0, g=green / 255.0, b=blue / 255.0, a=1.0)
 
 
-#: Colours of the motions, as on the page with the picture of a plan.
+#: Colours of the motions, the same as on the page that shows a plan.
 COLOURS = {
     'MoveL': _colour(30, 110, 220),
     'MoveP': _colour(20, 150, 90),
@@ -108,7 +108,7 @@ def _axes(row: Floats, number: int, header: Header) -> Marker:
 
 
 def _some(count: int, most: int) -> list[int]:
-    """Return the indices of rows, evenly spaced if there are too many, and of the last one."""
+    """Return indices of rows, spaced evenly if there are too many, including the last row."""
     rows = list(range(0, count, max(1, ceil(count / most))))
     return rows if rows[-1:] == [count - 1] or not count else [*rows, count - 1]
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Points and segments in flat arrays: rows as a ``PackedPoints``, and goals with one.
+Points and segments in flat arrays: conversion of rows and goals to ``PackedPoints``.
 
-rclpy makes ten objects of each point of the plain form, and some 0.1 ms of work. A flat array is
-one object, and one copy.
+In the plain form, rclpy makes ten objects for each point, which takes some 0.1 ms. A flat array
+is one object, and one copy.
 """
 
 from __future__ import annotations
@@ -16,21 +16,22 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
 from ur_cartesian_driver.msg import CartesianTrajectory, PackedPoints
 
-#: From so many points on clients send flat arrays.
+#: Clients send goals with at least this many points in flat arrays.
 MANY_POINTS = 200
 
 
 def packed_points(points: WaypointRows, segments: SegmentRows) -> PackedPoints | None:
-    """Return points and segments as a message; None as by :func:`packed_fields`."""
+    """Return points and segments as a message; None if :func:`packed_fields` returns None."""
     fields = packed_fields(points, segments)
     return None if fields is None else PackedPoints(**fields)
 
 
 def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
     """
-    Return a goal with its points and segments packed, the same goal if it cannot be.
+    Return a goal with its points and segments packed.
 
-    That is one with a jerk, which no motion takes, or one that will be refused anyway.
+    The goal is returned unchanged if it is packed already, has a jerk (which no motion uses), or
+    will be refused anyway.
     """
     trajectory = goal.trajectory
     try:

@@ -3,8 +3,8 @@
 """
 Messages of the state topics.
 
-Fields of ``DriverStatus`` that are named as in
-:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` are filled without a line here.
+Fields of ``DriverStatus`` are filled by their names, so that a field of
+:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` needs no line here.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) 
     """
     Return positions [rad], velocities [rad/s] and efforts [Nm].
 
-    Efforts are left out where the robot does not report them.
+    Efforts are left out if the robot does not report them.
     """
     return JointState(
         header=Header(stamp=stamp),
@@ -94,7 +94,7 @@ def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> Transf
 def link_transforms(
     state: RobotState, frames: LinkFrames, tf_prefix: str, stamp: Time
 ) -> list[TransformStamped]:
-    """Return the frames of the robot description as they are now, all of them in ``base``."""
+    """Return the present poses of the robot description's frames, all of them in ``base``."""
     rows = frames.poses(np.array([state.actual_q]))[0]
     T_base_tool0 = pose_from_row(rows[-1]) @ frames.flange
     found = {
@@ -125,8 +125,9 @@ def status_message(
     """
     Return the state of the connection and the modes of the robot.
 
-    Each field has the value of the same name of the driver's or of the robot's state. The topic is
-    published when the connection or a mode changes, and at least once a second.
+    Each field has the value of the same name in the connection status or in the robot's state;
+    only ``speed_scaling`` has ``effective_speed``. The topic is published when the connection or a
+    mode changes, and at least once a second.
     """
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
@@ -142,7 +143,7 @@ def status_message(
 
 
 def _unknown(name: str, value: Any) -> Any:
-    """Return what a field of the status says while the robot does not report it."""
+    """Return the value of a field of the status while the robot does not report it."""
     if isinstance(value, float | np.ndarray):
         return value + nan
     return getattr(DriverStatus, f'{name.upper()}_UNKNOWN', value)
@@ -195,7 +196,7 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
 
 
 def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
-    """Return the state of the set-point stream; its other fields have the same names."""
+    """Return the state of the set-point stream; fields not named here are copied by name."""
     values = asdict(report)
     del values['timestamp']
     return ServoState(

@@ -36,7 +36,7 @@ _RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service', 'qos_over
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """All parameters, grouped by their user."""
+    """All parameters, grouped by the component that uses them."""
 
     driver: DriverConfig
     planning: PlanningOptions
@@ -72,7 +72,7 @@ def declare_parameters(node: Node) -> Settings:
             parameter = node.declare_parameter(
                 declaration.name, declaration.default, declaration.descriptor()
             )
-        # What check() does not cover.
+        # Faults that check() does not cover.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = plain_value(parameter.value)
@@ -81,7 +81,7 @@ def declare_parameters(node: Node) -> Settings:
 
 def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
     """
-    Return given values and the defaults of all others, without a node.
+    Return settings with given values, and the defaults of all others, without a node.
 
     :raises ParameterError: a name is unknown or a value invalid.
     """
@@ -96,7 +96,7 @@ def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
 
 def settings(values: Mapping[str, ParameterValue]) -> Settings:
     """
-    Return parameter values, grouped by their user.
+    Return parameter values, grouped by the component that uses them.
 
     :raises ParameterError: values contradict each other.
     """
@@ -119,7 +119,7 @@ def as_overrides(
     """Return values by name as rclpy parameters."""
     if isinstance(values, Mapping):
         return [
-            Parameter(name, value=[''] if value == [] else value)  # rclpy takes [] for bytes
+            Parameter(name, value=[''] if value == [] else value)  # rclpy reads [] as bytes
             for name, value in values.items()
         ]
     return list(values or ())

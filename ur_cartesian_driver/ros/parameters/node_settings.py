@@ -15,19 +15,19 @@ from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters
 class NodeSettings:
     """The parameters that the node itself uses."""
 
-    #: A goal arrives while another one runs. preempt: it is checked from where the arm would come
-    #: to rest. If it is refused, the running goal continues undisturbed. If it passes, the arm is
-    #: stopped, the running goal ends PREEMPTED, and the new one runs. reject: the new one ends
-    #: ABORTED.
+    #: What happens to a goal that arrives while another one runs. preempt: it is checked from
+    #: where the arm would come to rest. If it is refused, the running goal continues undisturbed.
+    #: If it passes, the arm is stopped, the running goal ends PREEMPTED, and the new one runs.
+    #: reject: the new one ends ABORTED.
     on_new_goal: Literal['preempt', 'reject'] = 'preempt'
-    #: Largest delay of the end of a goal, where the goal does not specify one [s].
+    #: Largest delay of the end of a goal, unless the goal specifies one [s].
     goal_time_tolerance: Annotated[float, Range(0.001, 3600.0)] = 1.0
     #: Rate of joint_states, ~/tcp_pose, ~/wrench, ~/speed_scaling and /tf [Hz].
     state_publish_rate: Annotated[float, Range(1.0, 500.0)] = 50.0
     #: Rate of /diagnostics [Hz]; 0.0: never.
     diagnostics_rate: Annotated[float, Range(0.0, 50.0)] = 1.0
-    #: Publish the frames of the robot description in /tf, where tf2_msgs is installed; false:
-    #: leave that to robot_state_publisher.
+    #: Publish the frames of the robot description in /tf, if tf2_msgs is installed; false: leave
+    #: that to robot_state_publisher.
     publish_link_frames: bool = False
     #: Each 'name parent x y z qx qy qz qw' [m, unit quaternion]: fixed frames for goals, and tools
     #: as controlled frames. The parent is base, base_link, tool0, flange, tool0_controller (each
@@ -36,8 +36,8 @@ class NodeSettings:
     #: Example: ['table base_link 0.4 0 0.1 0 0 0 1', 'nozzle tool0 0 0 0.15 0 0 0.7071 0.7071']
     static_frames: tuple[str, ...] = ()
     #: Largest age of the newest tf2 transform of a frame when a goal is planned [s]. All frames
-    #: that are not named here are looked up in tf2, where it is installed. Static transforms have
-    #: no age.
+    #: that the driver does not know itself are looked up in tf2, if it is installed. Static
+    #: transforms have no age.
     tf_max_age: Annotated[float, Range(0.001, 3600.0)] = 1.0
     #: true: the arm follows a pose on ~/live_target as soon as it arrives and no goal runs.
     live_target_enabled: bool = False

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Parameters without a node, from the same files and arguments that the node takes.
+Parameters without a node, from the same files and arguments that the node accepts.
 
 ``ur-cartesian validate`` plans with them as the driver does.
 """
@@ -24,7 +24,7 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
     Return all parameters; files override the defaults, and single parameters override both.
 
     :param files: as for ``--params-file`` of ROS 2.
-    :param words: ``NAME:=VALUE`` as for its ``-p``.
+    :param words: each ``NAME:=VALUE``, as for ``-p`` of ROS 2.
     :raises ParameterError: a name is unknown or a value invalid.
     :raises OSError: a file cannot be read.
     """

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Every parameter of the node, as the dataclass that uses its value declares it.
+Every parameter of the node, as it is declared in the dataclass that uses its value.
 
 So a program without ROS has the same defaults and bounds.
 """
@@ -53,12 +53,12 @@ class ParameterDeclaration:
 
     @property
     def default(self) -> ParameterValue:
-        """The default, in a type that parameters have."""
+        """The default, in a type that ROS parameters can have."""
         return plain_value(self.field.default)
 
     @property
     def values(self) -> str:
-        """The values that it takes, in words; '' if any does."""
+        """The allowed values, as text; '' = any value."""
         if self.field.choices:
             return f'one of: {", ".join(self.field.choices)}'
         if (bounds := self.field.range) is None:
@@ -67,7 +67,7 @@ class ParameterDeclaration:
         return f'range: {zero}{plain_number(bounds.low)} to {plain_number(bounds.high)}'
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return what ``ros2 param describe`` shows."""
+        """Return the descriptor, which ``ros2 param describe`` prints."""
         descriptor = ParameterDescriptor(
             name=self.name, description=self.description, read_only=True
         )
@@ -88,7 +88,7 @@ class ParameterDeclaration:
         """
         Refuse a value of another type or out of range.
 
-        :raises ParameterError: with the bound.
+        :raises ParameterError: the text names the type or the bound.
         """
         wanted = type(self.default)
         if type(value) is not wanted:

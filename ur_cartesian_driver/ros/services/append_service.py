@@ -33,7 +33,7 @@ from ur_cartesian_driver.srv import AppendPoints
 #: How long points wait for the motion of a goal to begin [s].
 BEGIN_TIMEOUT = 10.0
 
-#: How many requests may wait, with their points in memory.
+#: Largest number of requests that wait, with their points in memory.
 MAX_WAITING_REQUESTS = 32
 
 SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
@@ -134,7 +134,7 @@ class AppendService:
 
 
 def _digest(new_points: AppendedPoints) -> bytes:
-    """Return a key of the points that equals itself even if they contain NaN."""
+    """Return a key that is the same for the same points, even if they contain NaN."""
     return sha256(pickle.dumps(new_points)).digest()
 
 

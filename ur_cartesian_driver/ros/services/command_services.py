@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Services that are one call of the driver each; the driver's answer is the response.
+Services that each make one call of the driver, whose answer is the response.
 
-Names, types and what they do: ``doc/ros_interface.md``.
+Their names, types and effects are in ``doc/ros_interface.md``.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
 )
 
-#: Services without a request; the response is success and a sentence, or the value.
+#: Services without request fields; the response is success, and a sentence or the value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
@@ -103,7 +103,7 @@ def _output(request: Any) -> ServiceCall:
     return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
 
 
-#: Services with a request of their own, and the call that it becomes.
+#: Services with request fields: the type, and the function from a request to its call.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'recover': (
         Recover,
@@ -145,7 +145,7 @@ class CommandServices:
         """
         Start to serve.
 
-        :param is_idle: tells whether no goal is planned, waits or runs.
+        :param is_idle: returns whether no goal is being planned, waits or runs.
         """
         self._driver, self._is_idle = driver, is_idle
         group = MutuallyExclusiveCallbackGroup()

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A service that responds when its answer is there.
+A service that responds when its answer is ready.
 
 A service callback of rclpy returns the response, so a callback that waits holds up the executor.
 Here the callback returns a future at once, and the thread that completes it sends the response.
-Nothing waits, whatever the executor, and however many calls are pending.
+So no thread waits, with any executor and any number of pending calls.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ LEVELS = {
 
 
 def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> DiagnosticArray:
-    """Return the state of the connection, the next step, and its longest gaps."""
+    """Return the state of the connection, its longest gaps, and the next step for the user."""
     status, state, gaps = driver.status, driver.state, driver.gaps
     values = {
         'connection': status.state.name,

@@ -3,10 +3,10 @@
 """
 The topics with the state of the robot, published by a thread of their own.
 
-A timer of the executor would cost twice as much and wait behind every other callback. The thread
-also detects changes: one place publishes, and nothing needs a lock.
+A timer of the executor would cost twice as much and wait for every other callback. The thread also
+detects changes, so that only one thread publishes and nothing needs a lock.
 
-Names, types, units and rates: ``doc/ros_interface.md``.
+Names, types, units and rates are in ``doc/ros_interface.md``.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-#: As tf2 requires it.
+#: The QoS that tf2 requires.
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: Period in which an unchanged status is published again [s].
 STATUS_PERIOD = 1.0
-#: How often the same defect is logged at most [s].
+#: Shortest time between two logs of the same defect [s].
 WARNING_PERIOD = 10.0
 
 
 def tf_messages() -> ModuleType | None:
-    """Return ``tf2_msgs.msg`` where it is installed; it does not come from PyPI."""
+    """Return ``tf2_msgs.msg``, None if it is not installed; it is not on PyPI."""
     try:
         return importlib.import_module('tf2_msgs.msg')
     except ImportError:
@@ -89,11 +89,11 @@ class StatePublisher:
         self._diagnostics_topic = _DiagnosticsTopic(node, settings.node.diagnostics_rate)
 
     def start(self) -> None:
-        """Start to publish."""
+        """Start publishing."""
         self._thread.start()
 
     def close(self) -> None:
-        """Stop to publish; the node destroys the publishers."""
+        """Stop publishing; the node destroys the publishers."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -126,7 +126,7 @@ class StatePublisher:
 
 
 class _DescriptionTopic:
-    """``~/robot_description``: latched, again when the calibration is known."""
+    """``~/robot_description``: latched, published again when the calibration is known."""
 
     def __init__(self, node: Node, tf_prefix: str) -> None:
         self._tf_prefix = tf_prefix
@@ -201,7 +201,7 @@ class _StatusTopics:
             self._program.publish(Bool(data=connection.program_running))
 
     def _is_new(self, topic: Any, value: object) -> bool:
-        """Tell whether the value of a topic has changed, or is its first."""
+        """Return whether the value of a topic has changed, or is its first value."""
         if topic in self._last and self._last[topic] == value:
             return False
         self._last[topic] = value

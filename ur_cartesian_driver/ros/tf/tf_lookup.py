@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Frames of other nodes from tf2, where it is installed; it is not on PyPI.
+Frames of other nodes from tf2, if it is installed; it is not on PyPI.
 
-A goal is refused if a transform is missing or old: an arm that moves to where a part was some time
-ago is worse than one that does not move.
+A goal is refused if a transform is missing or old: moving to where a part was some time ago is
+worse than not moving.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
-#: Time to wait for a transform [s]: the one for this moment is published in the next.
+#: Longest wait for a transform [s]: the present one is only published a moment later.
 LOOKUP_TIMEOUT = 0.5
 
 
@@ -49,7 +49,7 @@ class TransformLookup:
         """
         Use a buffer.
 
-        :param errors: the exceptions of a buffer that has no transform.
+        :param errors: the exceptions that the buffer raises if it has no transform.
         :param now: the node's clock [ns].
         :param max_age: largest age of the newest transform of a frame [s].
         """
@@ -63,7 +63,7 @@ class TransformLookup:
         """
         Return the pose of the source frame in the target frame.
 
-        :param field: of the goal, for the text of the refusal.
+        :param field: the field of the goal, for the text of the refusal.
         :param at: time [ns]; 0 = the newest transform, unless it is too old. Static transforms
             have the stamp 0 and no age.
         :raises InvalidGoal: there is no such transform, or only an old one.
@@ -118,7 +118,7 @@ class TransformLookup:
 
 def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
     """
-    Return the transforms that a node receives; None where tf2 is not installed.
+    Return the transforms that a node receives; None if tf2 is not installed.
 
     :param max_age: largest age of the newest transform of a frame [s].
     """

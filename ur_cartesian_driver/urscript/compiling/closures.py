@@ -4,9 +4,10 @@
 Compiled code, and the interface of the interpreter that runs it.
 
 The code of an expression or statement is a function of the frame (the list of a function's local
-values). Code that cannot take time is a plain function. Code that can (a generator builtin,
-`join`, a call of a function that contains one) is a generator function; only such code is called
-by `yield from`. The code of a statement returns None to continue, or one of the signals below.
+values). Code that cannot take time is a plain function. Code that can take time (a generator
+builtin, `join`, a call of a function that contains one of them) is a generator function; only such
+code is called by `yield from`. The code of a statement returns None to continue, or one of the
+signals below.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any, NoReturn, Protocol
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ThreadHandle, Value
 
-#: Calls of the program's functions inside one another.
+#: Deepest nesting of calls of the program's functions.
 MAX_CALL_DEPTH = 100
 
 StackFrame = list[Any]
@@ -30,7 +31,7 @@ BREAK = 'break'
 CONTINUE = 'continue'
 RETURN = 'return'
 
-#: What a thread yields to let another one go on in the same frame; None = it takes time.
+#: A thread yields this to let another one run in the same controller cycle, and None to take time.
 SWITCH = object()
 
 
@@ -67,19 +68,19 @@ class Runtime(Protocol):
         """The running thread."""
 
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
-        """Raise: the thread used up its budget without yielding."""
+        """Raise an error: the thread used up its budget without yielding."""
 
     def pay_for(self, items: int, line: int, column: int) -> None:
-        """Pay for the items of a long value, which takes longer than a node."""
+        """Spend fuel on the items of a long value, which takes longer than one node."""
 
     def switches_now(self) -> bool:
-        """Tell whether another thread goes on before the next statement."""
+        """Return whether another thread runs before the next statement."""
 
     def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
         """Start a thread."""
 
     def alive(self, handle: Value) -> bool:
-        """Tell whether a value is the handle of a live thread."""
+        """Return whether a value is the handle of a live thread."""
 
     def kill(self, handle: Value) -> None:
         """End a thread; ignore values that are not handles."""
@@ -144,7 +145,7 @@ def sequence(
 def choose_runner(
     plain: RunFunction, steps: RunFunction, parts: Sequence[CompiledNode]
 ) -> CompiledNode:
-    """Choose the generator if any part is a generator."""
+    """Return a node that runs `steps` if any part can take time, else `plain`."""
     suspends = any(part.suspends for part in parts)
     return CompiledNode(
         steps if suspends else plain, suspends, 1 + sum(part.weight for part in parts)

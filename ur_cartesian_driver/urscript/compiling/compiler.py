@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles syntax trees to Python closures, once per program, so that a frame costs little.
+Compiles syntax trees to Python closures, once per program, so that a cycle costs little.
 
 Work is counted in nodes of the tree, a block at a time: entering a block pays for all its nodes.
 """
@@ -79,7 +79,7 @@ class _Compiler(ExpressionCompiler):
         return self._block(self._scope.body, self._scope.owner)
 
     def _body_of_first_call(self, procedure: CompiledFunction) -> CompiledNode:
-        """Return code that puts the body in its own place, and runs it."""
+        """Return code that compiles the body, puts the result in its own place, and runs it."""
 
         def plain(frame: StackFrame) -> Any:
             procedure.body = self._body()
@@ -92,7 +92,7 @@ class _Compiler(ExpressionCompiler):
         return CompiledNode(steps if procedure.suspends else plain, procedure.suspends)
 
     def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> CompiledNode:
-        """Compile consecutive statements, and pay for them at the beginning."""
+        """Compile consecutive statements, which are paid for at the beginning."""
         first = statements[0] if statements else owner
         call_location = (first.line, first.column)
         codes = [code for statement in statements for code in self._statement(statement)]
@@ -172,7 +172,7 @@ class _Compiler(ExpressionCompiler):
                 return
 
     def _critical(self, node: tree.CriticalStatement) -> CompiledNode:
-        """Compile a mark; a thread that takes time in a critical section lets the others run."""
+        """Compile the entry or exit of a critical section; taking time in it lets others run."""
         runtime, enter = self._runtime, node.enter
 
         def plain(frame: StackFrame) -> None:
@@ -243,7 +243,7 @@ class _Compiler(ExpressionCompiler):
     def _path(
         self, target: tree.Expression
     ) -> tuple[tree.NameExpression, list[str | int], list[CompiledNode]]:
-        """Return the variable, the field names and numbers of indices, and the indices' code."""
+        """Return the variable, keys (field names or numbers of indices), and code of indices."""
         if isinstance(target, tree.FieldExpression):
             base, keys, indices = self._path(target.target)
             return base, [*keys, target.name], indices

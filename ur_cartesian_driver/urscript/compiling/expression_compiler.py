@@ -3,8 +3,8 @@
 """
 Compiles expressions to closures.
 
-A value is copied when it is stored, passed or returned and may also be stored elsewhere, because
-lists are values in this language. An error gets the position of its operator, index or call.
+When a value is stored, passed or returned, it is copied if it may also be stored elsewhere: lists
+are values in this language. An error gets the position of its operator, index or call.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class ExpressionCompiler:
         self._scope = scope
         self._builtins = builtins
         self._runtime = runtime
-        #: By the id of their scope; their bodies may be missing yet.
+        #: Functions by the id of their scope; their bodies may not be compiled yet.
         self._procedures = procedures
 
     def expression(self, node: tree.Expression) -> CompiledNode:
@@ -121,7 +121,7 @@ class ExpressionCompiler:
         return CompiledNode(steps if code.suspends else plain, code.suspends, code.weight)
 
     def _is_temporary(self, node: tree.Expression) -> bool:
-        """Tell whether the value of an expression is stored nowhere else, so needs no copy."""
+        """Return whether an expression's value is stored nowhere else, so it needs no copy."""
         if isinstance(node, tree.CallExpression):
             return self._scope.function(node.function) is not None
         stored = (
@@ -365,7 +365,7 @@ class ExpressionCompiler:
     def _suspending(
         self, node: tree.CallExpression | tree.MethodCallExpression, call: CompiledNode
     ) -> CompiledNode:
-        """If a call returns a generator, run it frame by frame."""
+        """Compile a call that may return a generator, which then runs cycle by cycle."""
         name = node.function if isinstance(node, tree.CallExpression) else node.method
 
         def steps(frame: StackFrame) -> ScriptSteps:
@@ -391,7 +391,7 @@ class ExpressionCompiler:
             try:
                 if isinstance(target, values.RemoteObject):
                     return target.call(node.method, arguments)
-                # Moving the items of a list up is quicker than to copy them.
+                # Moving the items of a list up is quicker than copying them.
                 runtime.pay_for(values.size_of(target) // 16, *call_location)
                 return call_method(target, node.method, arguments)
             except Exception as error:
@@ -433,7 +433,7 @@ def _from_builtin(
 
 
 def _number(node: tree.Expression) -> int | float | None:
-    """Return the value of a number in the text, with its sign; None if it is none."""
+    """Return the value of a literal number, with its sign; None = the node is something else."""
     if isinstance(node, tree.UnaryExpression) and node.operator == '-':
         number = (
             _number(node.operand) if isinstance(node.operand, tree.ConstantExpression) else None

@@ -6,9 +6,9 @@ Resolves the meaning of each name before anything runs.
 The rules: every variable that the body of the program assigns is global, however it is marked. In
 a function or thread `local x = ...` makes x a local of the whole function and `global x = ...`
 makes it a global of the program. A bare assignment writes the global of that name if the program
-has one anywhere, and otherwise makes a local. A function does not see the locals of the enclosing
-function, but all functions around it, wherever the text defines them. If a scope defines a name
-twice, the later definition applies, because exported programs include a file twice.
+has one anywhere, and otherwise makes a local. A function sees all functions of the scopes around
+it, wherever the text defines them, but not the locals of the enclosing function. If a scope
+defines a name twice, the later definition applies, because exported programs include a file twice.
 
 The same walk finds unknown names, calls with wrong arguments, and the functions that can take
 time: only those need a Python generator.
@@ -29,7 +29,7 @@ Builtin = Callable[..., Any]
 #: Slot 0 of a frame holds the return value.
 FIRST_LOCAL = 1
 
-#: What has statements in it.
+#: Nodes that contain statements.
 _COMPOUND = (
     tree.IfStatement,
     tree.SwitchStatement,
@@ -47,7 +47,7 @@ class Scope:
     globals: dict[str, int]
     locals: dict[str, int] = field(default_factory=dict)
     functions: dict[str, Scope] = field(default_factory=dict)
-    #: Functions that this one calls, and whether it takes time itself.
+    #: Functions that this one calls, and whether it can take time.
     calls: list[Scope] = field(default_factory=list)
     suspends: bool = False
 
@@ -71,7 +71,7 @@ class Scope:
         return None
 
     def walk(self) -> Iterator[Scope]:
-        """Yield this scope and all within it."""
+        """Yield this scope and all scopes within it."""
         yield self
         for inner in self.functions.values():
             yield from inner.walk()
@@ -98,7 +98,7 @@ def resolve(
 
 
 def _own_statements(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
-    """Yield all statements and those in them, without entering function definitions."""
+    """Yield statements and the statements inside them, without entering function definitions."""
     for node in nodes:
         yield node
         if isinstance(node, _COMPOUND):
@@ -106,7 +106,7 @@ def _own_statements(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNod
 
 
 def _declare(scope: Scope) -> None:
-    """Collect functions and globals of a scope and of all within it."""
+    """Collect the functions and globals of a scope and of all scopes within it."""
     for node in _own_statements(scope.body):
         if isinstance(node, tree.FunctionDefinition):
             inner = Scope(parent=scope, owner=node, globals=scope.globals)
@@ -138,7 +138,7 @@ def _assign_locals(scope: Scope) -> None:
 
 
 def _propagate_suspension(scopes: list[Scope]) -> None:
-    """Mark every function that calls one that takes time."""
+    """Mark every function that calls a function that can take time."""
     changed = True
     while changed:
         changed = False
@@ -184,9 +184,9 @@ class _NameChecker:
 
     def __init__(self, builtins: Mapping[str, Builtin]) -> None:
         self._builtins = builtins
-        #: Of those that are called, by name.
+        #: Signatures of the builtins that are called, by name.
         self._signatures: dict[str, inspect.Signature | None] = {}
-        #: Calls that fit: function, number of arguments, names of named ones.
+        #: Correct calls of builtins: function, number of arguments, names of named arguments.
         self._fitting: set[tuple[str, int, tuple[str, ...]]] = set()
 
     def block(self, scope: Scope, nodes: Iterable[tree.SyntaxNode]) -> None:
@@ -210,7 +210,7 @@ class _NameChecker:
 
     def _function(self, scope: Scope, definition: tree.FunctionDefinition) -> None:
         inner = scope.functions[definition.name]
-        if inner.definition is not definition:  # replaced by a later one of the same name
+        if inner.definition is not definition:  # replaced by a later definition of its name
             return
         self.block(inner, definition.parameters)
         self.block(inner, definition.body)

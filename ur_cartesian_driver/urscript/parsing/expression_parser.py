@@ -19,13 +19,13 @@ from ur_cartesian_driver.urscript.parsing.token_reader import (
     TokenReader,
 )
 
-#: Of operators between two operands; `not` binds less than a comparison.
+#: Precedence of operators with two operands; `not` binds more loosely than a comparison.
 _PRECEDENCE = {
     'or': 1, 'xor': 1, 'and': 2, '==': 4, '!=': 4, '<': 4, '<=': 4, '>': 4, '>=': 4,
     '+': 5, '-': 5, '*': 6, '/': 6, '%': 6,
 }  # fmt: skip
 _NOT = 3
-#: What may follow a value and belongs to it.
+#: Symbols that, after a value, belong to it.
 _POSTFIXES = frozenset({'.', '(', '['})
 
 CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}
@@ -38,7 +38,7 @@ class ExpressionParser(TokenReader):
         """
         Read operand { operator operand }, left-associative.
 
-        :param lowest: operators of lower precedence end it.
+        :param lowest: operators of lower precedence end the expression.
         """
         at_not = lowest <= _NOT and self._at('not')
         left = self._inversion() if at_not else self._unary()
@@ -89,7 +89,7 @@ class ExpressionParser(TokenReader):
         """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
         value = self._primary()
         for _ in range(MAX_CHAIN):
-            if self._token.text not in _POSTFIXES:  # mostly
+            if self._token.text not in _POSTFIXES:  # the usual case
                 return value
             if self._at('.'):
                 value = self._field(value)
@@ -102,7 +102,7 @@ class ExpressionParser(TokenReader):
         raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
 
     def _field(self, target: tree.Expression) -> tree.FieldExpression:
-        """Read "." NAME, where a keyword is a name too."""
+        """Read "." NAME; a keyword is accepted as a name."""
         self._advance()
         name = self._token
         if name.kind not in (TokenKind.NAME, TokenKind.KEYWORD):
@@ -144,7 +144,7 @@ class ExpressionParser(TokenReader):
         )
 
     def _index(self, target: tree.Expression) -> tree.Expression:
-        """Read "[" expression [ "," expression ] "]"; six after the name p are a pose."""
+        """Read "[" expression [ "," expression ] "]"; six expressions after p are a pose."""
         start = self._advance()
         items = self._list(self._expression, ']')
         if (

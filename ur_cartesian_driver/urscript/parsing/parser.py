@@ -51,7 +51,7 @@ from ur_cartesian_driver.urscript.parsing.expression_parser import CONSTANTS, Ex
 from ur_cartesian_driver.urscript.parsing.scanner import Token, TokenKind
 from ur_cartesian_driver.urscript.parsing.token_reader import source_position
 
-#: Statements of other languages that people try.
+#: Errors for statements that people try because other languages have them.
 _OF_OTHERS = {
     'for': "there is no 'for'; count in a 'while' loop",
     'elseif': "'elseif' is written 'elif'",
@@ -93,7 +93,7 @@ class Parser(ExpressionParser):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._loops = 0
-        #: The first block whose `end` stands in another column, or None.
+        #: The beginning of the first block whose `end` is in another column, or None.
         self._misaligned: Token | None = None
 
     # Programs, functions and blocks
@@ -132,10 +132,10 @@ class Parser(ExpressionParser):
         """
         Read { statement }, up to one of the keywords that close it.
 
-        If the last `end` is missing, the text leaves open which block has none: we name the first
-        one that the indentation shows to be closed by the `end` of another.
+        If an `end` is missing, the text does not show which block lacks it: the error names the
+        first block that, by the indentation, is closed by the `end` of another.
 
-        :param start: the token that began it.
+        :param start: the token that began the block.
         """
         statements: list[tree.Statement] = []
         with self._nested():
@@ -243,10 +243,10 @@ class Parser(ExpressionParser):
 
     def _case_has_end(self, switch: Token) -> bool:
         """
-        Tell from the end of the first case whether cases have their own `end`.
+        Return whether cases have their own `end`, judged at the end of the first case.
 
-        Both styles occur. An `end` before another `end` could be either; then it belongs to the
-        switch if it stands in the column of the switch.
+        Both styles occur. If one `end` follows another, the first belongs to the switch if it is
+        in the column of the switch, else to the case.
         """
         if not self._at('end'):
             return False

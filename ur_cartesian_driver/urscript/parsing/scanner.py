@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Without `sec`, which is also a field of the result of `time()`.
+#: `sec` is not among them, because it is also a field of the result of `time()`.
 KEYWORDS = frozenset({
     'and', 'break', 'case', 'continue', 'def', 'default', 'elif', 'else', 'end', 'enter_critical',
     'exit_critical', 'false', 'False', 'global', 'halt', 'if', 'join', 'kill', 'local', 'None',
     'not', 'or', 'pause', 'return', 'run', 'switch', 'thread', 'true', 'True', 'while', 'xor',
 })  # fmt: skip
 
-#: Longest first, so that `<=` is not read as `<`.
+#: Longer symbols come first, so that `<=` is not read as `<`.
 SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$!')
 
 #: Integers of the controller have 32 bits; a longer literal is read as a float.

@@ -88,7 +88,7 @@ class BinaryExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogicalExpression(Expression):
-    """`and`, `or`, `xor`: the first two evaluate the right side only where it matters."""
+    """`and`, `or`, `xor`; `and` and `or` evaluate the right side only if it matters."""
 
     operator: str
     left: Expression
@@ -113,7 +113,7 @@ class CallExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodCallExpression(Expression):
-    """`target.method(arguments)`, as remote procedure handles have it."""
+    """`target.method(arguments)`: a method of a container or of a remote procedure handle."""
 
     target: Expression
     method: str
@@ -291,7 +291,7 @@ def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
             yield from value
 
 
-#: Where a kind of node has other nodes; asked for by each walk through a tree.
+#: The fields that hold other nodes, by kind of node; kept because all walks through trees ask.
 _FIELDS: dict[type[SyntaxNode], tuple[str, ...]] = {}
 #: Types of fields that hold no nodes.
 _IS_PLAIN = re.compile(r'(?:int|float|str|bool|None|OneOf\[.*\]|[ |])+').fullmatch

@@ -13,10 +13,10 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 
 #: Largest nesting of blocks, brackets and signs.
 MAX_NESTING = 50
-#: Most operators of one precedence in a row; each makes the tree one node deeper.
+#: Largest number of operators of equal precedence in a row; each makes the tree a node deeper.
 MAX_CHAIN = 100
 
-#: Tokens that only stand for themselves.
+#: The kinds of tokens that are fixed words or symbols of the language.
 FIXED = (TokenKind.KEYWORD, TokenKind.SYMBOL)
 
 T = TypeVar('T')
@@ -56,9 +56,9 @@ class TokenReader:
         return token
 
     def _at(self, *texts: str) -> bool:
-        """Tell whether the next token is one of these keywords or symbols."""
+        """Return whether the next token is one of these keywords or symbols."""
         token = self._token
-        return token.text in texts and token.kind in FIXED  # a string may have the same text
+        return token.text in texts and token.kind in FIXED  # a string can have the same text
 
     def _match(self, *texts: str) -> Token | None:
         return self._advance() if self._at(*texts) else None
@@ -78,7 +78,7 @@ class TokenReader:
         return token.kind.value if token.kind is TokenKind.END else repr(token.text)
 
     def _same_line(self) -> bool:
-        """Tell whether the next token is on the line of the previous one."""
+        """Return whether the next token is on the line of the previous one."""
         return self._token.line == self._previous.line
 
     def error(self, reason: str, token: Token | None = None) -> CompileError:
@@ -96,7 +96,7 @@ class TokenReader:
         self._nesting -= 1
 
     def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
-        """Read `item { "," item }` up to the closing bracket; nothing at all is fine too."""
+        """Read `[ item { "," item } ]` up to the closing bracket."""
         items: list[T] = []
         with self._nested():
             if not self._at(close):

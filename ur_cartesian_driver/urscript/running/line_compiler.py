@@ -4,8 +4,8 @@
 Compiles lines for a running program, as in interpreter mode.
 
 A line is any number of statements or function definitions. It sees the global variables and
-functions of the program and of earlier lines. New variables and functions belong to the lines, and
-can be forgotten, all at once.
+functions of the program and of earlier lines. New variables and functions belong to the lines; all
+of them can be forgotten at once.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class CompiledLine:
     """A line that can run once, in a thread of the program."""
 
     steps: ScriptSteps
-    #: Names of the functions that it calls directly, not inside a function that it defines.
+    #: Names of the functions that its outermost statements call.
     calls: frozenset[str]
 
 

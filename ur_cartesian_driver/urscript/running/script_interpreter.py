@@ -3,19 +3,20 @@
 """
 Runs one program, a controller cycle (frame) at a time.
 
-In each frame every live thread runs, in the order in which they were started, until it takes
-time: it calls a builtin that yields, waits in `join`, or ends. A new thread runs in the same
+In each frame all live threads run, in the order in which they were started. Each runs until it
+takes time: it calls a builtin that yields, waits in `join`, or ends. A new thread runs in the same
 frame, after the earlier ones. Nothing else switches threads. A thread that evaluates more nodes
 than its budget in one frame ends the program.
 
-The manual promises less, so two settings take more liberties. With `thread_delay` a new thread
-begins some frames later. With `interleaving` threads take turns at random: in a random order,
-between any two statements, and before an assignment stores its value in a global variable, except
-in a critical section. A thread that takes time in a critical section lets the others run, which
-may have their own. A killed thread holds nothing that must be released.
+The manual guarantees less than this, so two settings make the order of threads less certain. With
+`thread_delay` a new thread begins some frames later. With `interleaving` threads take turns at
+random: in a random order, between any two statements, and before an assignment stores its value in
+a global variable, except in a critical section. If a thread takes time in a critical section, the
+others run, even in critical sections of their own. A killed thread holds nothing that must be
+released.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
-by itself, the threads that it started go on; when it is killed, they are killed, too.
+by itself, the threads that it started continue; when it is killed, they are killed, too.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ BUDGET_EXCEEDED = (
 )
 #: The manual gives no limit; threads that start threads would soon use all time and memory.
 MAX_THREADS = 256
-#: How often threads are switched where they may be.
+#: Probability that threads are switched at a place where they can be.
 SWITCH_PROBABILITY = 0.1
 
 
@@ -65,14 +66,14 @@ class _Thread:
     location: tuple[int, int] = (0, 0)
     alive: bool = True
     in_critical_section: bool = False
-    #: Frames until it begins.
+    #: Frames until the thread begins.
     delay: int = 0
-    #: Nodes that it may still evaluate in this frame, and whether it has taken the time of it.
+    #: Nodes that the thread may still evaluate in this frame, and whether it took time in it.
     fuel: int = 0
     took_time: bool = False
 
     def descends_from(self, other: _Thread) -> bool:
-        """Tell whether the other thread is this one or started it, also indirectly."""
+        """Return whether the other thread is this one, or started it directly or indirectly."""
         thread: _Thread | None = self
         while thread is not None and thread is not other:
             thread = thread.parent
@@ -83,17 +84,18 @@ class ScriptInterpreter:
     """
     Runs one program; the controller calls `step` once per frame.
 
-    :param program: what `parse` returned.
+    :param program: the syntax tree that `parse` returned.
     :param builtins: the functions that the program can call. A plain function takes no time. In a
-        generator function each bare `yield` gives up the rest of the frame, and its return value
+        generator function each bare `yield` gives up the rest of the frame, and the return value
         is the value of the call. Arguments are passed by position and name as in Python.
     :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
     :param total_budget: nodes that all threads together may evaluate in the life of the program.
     :param thread_delay: frames after which a new thread begins.
-    :param interleaving: draws where threads are switched; None = only where one takes time.
-    :param lazily: compile each function when it is called for the first time: much sooner ready,
-        but a cycle with such a call takes longer.
-    :param scope: what an earlier interpreter of the same program and builtins has resolved.
+    :param interleaving: the random numbers that decide when threads are switched; None = threads
+        are switched only when one takes time.
+    :param lazily: compile each function when it is called for the first time: the interpreter is
+        ready much sooner, but a frame with such a call takes longer.
+    :param scope: the `scope` of an earlier interpreter of the same program and builtins.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -126,7 +128,7 @@ class ScriptInterpreter:
         self._current: _Thread | None = None
         self._halted = False
         try:
-            #: The resolved names of the program, which nothing changes.
+            #: The resolved names of the program; they never change.
             self.scope = resolve(program, builtins) if scope is None else scope
             self.globals: list[Any] = [UNSET] * len(self.scope.globals)
             procedures: dict[int, CompiledFunction] = {}
@@ -144,7 +146,7 @@ class ScriptInterpreter:
 
     @property
     def running(self) -> bool:
-        """Whether the program has not ended; true also before its first step."""
+        """Whether the program has not ended; True even before its first step."""
         return bool(self._threads)
 
     @property
@@ -194,7 +196,7 @@ class ScriptInterpreter:
         self._threads = [thread for thread in self._threads if thread.alive]
 
     def _runnable_threads(self) -> Iterator[_Thread]:
-        """Yield each thread that can run until it has taken the time of this frame."""
+        """Yield the next thread to run, until all threads have taken time in this frame."""
         if self._random is None:
             for thread in self._threads:  # grows while threads are started
                 if thread.alive and thread.delay <= 0:
@@ -215,14 +217,14 @@ class ScriptInterpreter:
             yield self._random.choice(waiting)
 
     def resume(self) -> None:
-        """Go on after `pause`."""
+        """Continue after `pause`."""
         self.paused = False
 
     def stop(self) -> None:
         """
         End the program at once; the generators of waiting builtins are closed.
 
-        If a builtin calls it, the program ends as soon as that builtin yields or returns, because
+        If a builtin calls this, the program ends as soon as the builtin yields or returns, because
         a thread cannot be unwound from inside.
         """
         if self._current is not None:
@@ -234,7 +236,7 @@ class ScriptInterpreter:
                 self._end(thread)
 
     def _resume(self, thread: _Thread) -> None:
-        """Let one thread run up to its next yield."""
+        """Run one thread up to its next yield."""
         self.fuel = thread.fuel
         if self.fuel_left is not None:
             self.fuel = min(self.fuel, self.fuel_left)
@@ -263,7 +265,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """Close a thread as the current one, so that builtins know what they clean up."""
+        """Close a thread as the current one, so that builtins clean up for the right thread."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:
@@ -278,17 +280,17 @@ class ScriptInterpreter:
     # Called by compiled code
 
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
-        """Raise: the thread used up its budget without yielding."""
+        """Raise an error: the thread used up its budget without yielding."""
         raise RuntimeException(BUDGET_EXCEEDED, line, column)
 
     def pay_for(self, items: int, line: int, column: int) -> None:
-        """Pay for the items of a long value; raise where the thread cannot."""
+        """Spend fuel on the items of a long value; raise an error if too little is left."""
         self.fuel -= items
         if self.fuel < 0:
             self.raise_budget_exceeded(line, column)
 
     def switches_now(self) -> bool:
-        """Tell whether another thread goes on before the next statement."""
+        """Return whether another thread runs before the next statement."""
         return (
             self._random is not None
             and not self.thread.in_critical_section
@@ -313,7 +315,7 @@ class ScriptInterpreter:
         return ThreadHandle(thread.number)
 
     def alive(self, handle: Value) -> bool:
-        """Tell whether a value is the handle of a live thread."""
+        """Return whether a value is the handle of a live thread."""
         return self._find(handle) is not None
 
     def kill(self, handle: Value) -> None:
@@ -329,7 +331,7 @@ class ScriptInterpreter:
             raise _ThreadKilled
 
     def kill_since(self, number: int) -> None:
-        """End children of the current thread from a number on, and their children."""
+        """End the current thread's children with at least this number, and their children."""
         for thread in tuple(self._threads):
             if thread.parent is self._current and thread.number >= number:
                 self.kill(ThreadHandle(thread.number))
