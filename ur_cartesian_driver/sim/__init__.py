@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A simulated UR controller: it interprets the URScript it is sent and knows nothing of any program.
+A simulated UR controller: it interprets any URScript, with no special cases for our program.
 
-:class:`SimulatedRobot` is the product, a robot on the ports of a real one. :func:`assemble` makes
-its :class:`Controller` without network and clock, for tests that count cycles.
+:class:`SimulatedRobot` is a whole robot, on the ports of a real one. :func:`assemble` makes only
+its :class:`Controller`, without network and clock, for tests that count cycles.
 """
 
 from typing import TYPE_CHECKING
@@ -29,7 +29,7 @@ __all__ = [
     'assemble',
 ]
 
-# Every command imports the options of the simulator, and few need the simulator.
+# Lazy, because every command imports the simulator's options but few need the simulator.
 __getattr__ = lazy_names(
     __name__,
     {

@@ -3,9 +3,9 @@
 """
 Kinematic calibrations: read from a file, or random.
 
-Both are axes in space, whose common normals give the DH table. Where two axes are nearly parallel
-(shoulder lift, elbow, wrist 1) the normal may lie far away. That is why real robots report lengths
-of many metres, which cancel.
+Both describe the joint axes in space; the common normals of the axes give the DH table. If two
+axes are nearly parallel (shoulder lift, elbow, wrist 1), their common normal can lie far away.
+This is why real robots report lengths of many metres, which cancel out.
 """
 
 from __future__ import annotations
@@ -21,38 +21,38 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: Standard deviations of the axes of a random calibration [rad, m]; they put the flange 1 to 2 mm
-#: off, as on real arms.
+#: Standard deviations of the axes of a random calibration [rad, m]; they displace the flange by 1
+#: to 2 mm, as on real arms.
 AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
 
 _LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
 _FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
-# Axes with a smaller angle count as parallel [rad]: files are rounded to ten digits.
+# Axes at a smaller angle are treated as parallel [rad], because files are rounded to ten digits.
 _PARALLEL = 1e-8
-# Tolerance of the first joint from the axis of the base [m, rad].
+# Tolerated deviation of the first joint from the axis of the base [m, rad].
 _OFF_AXIS = 1e-9
 
 
 @dataclass(slots=True)
 class _Axes:
-    """An arm with all joints at 0, in base axes."""
+    """The joint axes and the flange of an arm with all joints at 0, in base axes."""
 
-    #: (6, 3) a point on each axis [m], and its direction.
+    #: A point on each joint axis [m], and the direction of the axis; both (6, 3).
     points: Floats
     directions: Floats
-    #: (4, 4) the flange; z along the last axis, origin on it.
+    #: The flange (4, 4): z along the last axis, origin on that axis.
     flange: Floats
 
 
 def read_calibration(path: Path, model: RobotModel) -> DhTable:
     """
-    Return the table of a calibration file, as ``ur_calibration`` of the UR ROS driver writes it.
+    Return the DH table of a calibration file written by ``ur_calibration`` of the UR ROS driver.
 
-    In the file ``kinematics`` holds for each of shoulder, upper_arm, forearm, wrist_1, wrist_2 and
-    wrist_3 the pose of its joint in the link before: x y z [m], roll pitch yaw [rad].
+    In the file, ``kinematics`` has entries shoulder, upper_arm, forearm, wrist_1, wrist_2 and
+    wrist_3 with the pose of each joint in the preceding link: x y z [m], roll pitch yaw [rad].
 
     :raises OSError: the file cannot be read.
-    :raises ValueError: something is missing or not a number; the text names file, link and field.
+    :raises ValueError: a value is missing or not a number; the text names file, link and field.
     """
     import yaml
 
@@ -70,7 +70,7 @@ def read_calibration(path: Path, model: RobotModel) -> DhTable:
 
 def random_calibration(model: RobotModel, seed: int) -> DhTable:
     """
-    Return the table of an arm whose axes deviate as on real arms; see above.
+    Return the DH table of an arm whose axes deviate at random, by as much as on real arms.
 
     :raises ValueError: the seed is negative.
     """
@@ -81,13 +81,13 @@ def random_calibration(model: RobotModel, seed: int) -> DhTable:
     for i in range(1, 6):
         axes.directions[i] = _turned(axes.directions[i], random.normal(0.0, AXIS_TURN, 3))
         axes.points[i] += random.normal(0.0, AXIS_SHIFT, 3)
-    # The table ends on the last axis, so the flange has to lie on it.
+    # A DH table ends on the last axis, so the flange has to lie on that axis.
     axes.flange = _flange_on(axes)
     return _table(axes, model)
 
 
 def _link(path: Path, links: Mapping[Any, Any], name: str) -> Floats:
-    """Return the pose of a joint in the link before (4, 4)."""
+    """Return the pose of a joint in the preceding link (4, 4)."""
     link = links.get(name)
     values = []
     for field in _FIELDS:
@@ -132,14 +132,14 @@ def _nominal_axes(geometry: DhTable) -> _Axes:
 
 
 def _table(axes: _Axes, model: RobotModel) -> DhTable:
-    """Return the DH table: each x axis is the common normal of an axis and the next."""
+    """Return the DH table: each x axis is the common normal of a joint axis and the next one."""
     rows = []
     origin, x, z = np.zeros(3), np.array([1.0, 0.0, 0.0]), axes.directions[0]
     for i in range(1, 6):
         following = axes.directions[i]
         normal, d, a = _common_normal(origin, z, axes.points[i], following)
         alpha = _angle(normal, z, following)
-        # Of the two directions of the normal, the model's.
+        # Of the two directions of the normal, choose that of the model.
         nominal_a, nominal_alpha = model.geometry.a[i - 1], model.geometry.alpha[i - 1]
         if (a * nominal_a if nominal_a else alpha * nominal_alpha) < 0.0:
             normal, a, alpha = -normal, -a, -alpha
@@ -156,14 +156,14 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Floats, z: Floats, point: Floats, following: Floats
 ) -> tuple[Floats, float, float]:
-    """Return the direction of the common normal, where on the first axis it begins, its length."""
+    """Return the direction of the common normal, its start along the first axis, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:
         normal /= size
         d, a, _ = np.linalg.solve(np.column_stack([z, normal, -following]), point - origin)
         return normal, float(d), float(a)
-    # Any normal will do; this one goes through the origin of the row.
+    # Any normal of parallel axes will do; this one goes through the origin of the row.
     across = point - origin
     across = across - z * (z @ across)
     a = float(np.linalg.norm(across))
@@ -171,7 +171,7 @@ def _common_normal(
 
 
 def _flange_on(axes: _Axes) -> Floats:
-    """Return the flange with its z along the last axis and its origin on it."""
+    """Return the flange moved onto the last axis: z along the axis, origin on it."""
     z, point, flange = axes.directions[5], axes.points[5], axes.flange
     x = flange[:3, 0] - z * (z @ flange[:3, 0])
     x /= np.linalg.norm(x)

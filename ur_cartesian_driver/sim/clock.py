@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-When the next controller cycle is due.
+Clocks that determine when the next controller cycle is due.
 
 The real clock waits for absolute deadlines, so that errors do not add up: over ten minutes the
 simulated robot drifts by less than a cycle. The virtual clock never waits.
@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import time
 from typing import Literal, Protocol
 
-#: The event loop wakes up to this much late [s] (epoll counts in milliseconds). So it has to wake
-#: this much early, and the clock sleeps for the rest.
+#: The event loop wakes up to this much too late [s], because epoll counts in milliseconds. The
+#: clock therefore asks to be woken this much too early, and sleeps for the rest.
 _LOOP_GRAIN = 0.001
-#: A clock that is late by more than this [s] (suspended process, overloaded machine) starts anew
-#: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and while cycles race
-#: no client could answer in time.
+#: A clock that is late by more than this [s] (suspended process, overloaded machine) restarts
+#: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and no client could
+#: answer in time while the cycles run faster to catch up.
 _MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 
@@ -38,7 +38,7 @@ class Lateness:
 class Clock(Protocol):
     """Waits until the next cycle is due, while the event loop runs."""
 
-    #: Simulated time that it has skipped [s].
+    #: Simulated time that the clock has skipped [s].
     skipped: float
 
     async def next_cycle(self) -> None:
@@ -51,7 +51,7 @@ class VirtualClock:
     skipped = 0.0
 
     async def next_cycle(self) -> None:
-        """Let the servers run once, without waiting."""
+        """Run the servers once, without waiting."""
         await asyncio.sleep(0)
 
 
@@ -65,19 +65,19 @@ class RealClock:
         Begin with the first deadline one cycle from the first call.
 
         :param cycle: [s] of simulated time.
-        :param rate: seconds of simulated time per second.
-        :param when_late: whether a clock that starts anew has skipped the time that it was late.
+        :param rate: seconds of simulated time per second of real time.
+        :param when_late: 'skip': at a restart the lateness is added to ``skipped``; 'wait': not.
         """
         self._period, self._rate = cycle / rate, rate
         self._skips = when_late == 'skip'
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
-        #: How often the clock has started anew, and the simulated time that it has skipped [s].
+        #: Number of restarts of the clock, and the simulated time that it has skipped [s].
         self.slips, self.skipped = 0, 0.0
 
     async def next_cycle(self) -> None:
-        """Wait for the next deadline; let the servers run at least once."""
+        """Wait for the next deadline; meanwhile the servers run at least once."""
         if self._start is None:
             self._start = time.monotonic()
         self._count += 1
@@ -94,7 +94,7 @@ class RealClock:
             self.skipped += late * self._rate * self._skips
 
     def lateness(self) -> Lateness:
-        """Return the figures of the last 20,000 cycles."""
+        """Return the lateness of the last 20,000 cycles."""
         late = sorted(self._late) or [0.0]
         return Lateness(
             p50=late[len(late) // 2],

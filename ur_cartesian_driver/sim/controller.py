@@ -3,9 +3,9 @@
 """
 The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
-:func:`~.controller_assembly.assemble` makes one; its owner calls :meth:`Controller.step` once per
-cycle, and any other method between two steps. It never waits, and owns neither clock nor network,
-so it runs on a virtual clock as well.
+:func:`~.controller_assembly.assemble` makes a controller; its user calls :meth:`Controller.step`
+once per cycle, and any other method between two steps. A controller never waits and has neither
+clock nor network, so it also runs on a virtual clock.
 """
 
 from __future__ import annotations
@@ -53,35 +53,37 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Time from full speed to zero by the slider or a pause, and by a protective stop [s]. The
+#: Times from full speed to zero: by the slider or a pause, and by a protective stop [s]. The
 #: manufacturer publishes neither.
 SLIDER_TIME = 0.25
 PROTECTIVE_STOP_TIME = 0.1
-#: The same for a program that ends on its path: a recorded UR5e of URSim loses 6.25 per second.
+#: Time from full speed to zero for a program that ends on its path [s]: the speed scaling of a
+#: UR5e recorded in URSim falls by 6.25 per second.
 PROGRAM_STOP_TIME = 0.16
-#: States of a program in which its motion slows down to zero, or stays there.
+#: States of a program in which the arm slows down to a standstill, or stands still.
 _HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING)
-#: How many cycles back programs can ask for joint positions.
+#: Number of past cycles whose joint positions programs can ask for.
 MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
-#: From a line that unlocks a protective stop to its effect [s]; known is only: not at once.
+#: Delay from a line that unlocks a protective stop to its effect [s]. It is only known that the
+#: effect is not immediate.
 UNLOCK_TIME = 0.02
 
 
 class CycleFaults(Protocol):
-    """The faults of a controller, as far as its cycle needs them."""
+    """The faults of a controller, as its cycle uses them."""
 
-    #: Whether there is anything to do in a cycle.
+    #: Whether `step` has to be called in each cycle.
     active: bool
 
     def step(self) -> None:
-        """Apply all that is due in this cycle."""
+        """Apply all faults that are due in this cycle."""
 
 
 class Controller:
-    """A robot without its network; `sim.assembly` puts it together."""
+    """A robot without its network; `sim.controller_assembly` puts it together."""
 
     def __init__(
         self,
@@ -96,15 +98,15 @@ class Controller:
         :param sockets: the sockets of programs; None = in memory, for tests.
         """
         self.config = config
-        #: Duration of a cycle [s], and how many have passed.
+        #: Duration of a cycle [s], and number of cycles so far.
         self.cycle = config.cycle
         self.cycles = 0
-        #: Time in which the simulator, not the controller, stood still [s].
+        #: Time that the clock has skipped because this computer was too busy [s].
         self.skipped_time = 0.0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         self.motion.turn_ratio = config.turn_ratio
-        #: The bodies that the tool touches, and the compliance of the arm.
+        #: The bodies that the tool can touch, and the compliance of the arm.
         self.contact = ContactMotion(self.motion, config.contact_bodies)
         #: The measured motion: equal to the targets, unless it is disturbed.
         self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
@@ -137,7 +139,7 @@ class Controller:
         self.speed_slider = 1.0
         #: The rate at which motion runs now, 0..1; it follows slider, pauses and stops.
         self.scale = 1.0
-        #: Whether a program has ended in motion, and the arm slows down on its path.
+        #: Whether the arm slows down on its path because a program has ended in motion.
         self._stopping_on_path = False
         self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
@@ -159,46 +161,46 @@ class Controller:
 
     @property
     def time(self) -> float:
-        """The controller's clock [s]: whole cycles, none skipped."""
+        """The controller's clock [s]: it counts cycles and contains no skipped time."""
         return START_TIME + self.cycles * self.cycle
 
     @property
     def timestamp(self) -> float:
         """
-        The clock as clients read it [s].
+        The controller's clock as clients read it [s].
 
-        It contains the time in which this computer was too busy: clients that compare it with
-        their own clock would take states for old ones.
+        It contains the time that was skipped because this computer was too busy: otherwise
+        clients that compare it with their own clock would consider the states too old.
         """
         return self.time + self.skipped_time
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves, at the end of a motion or paused on its path."""
+        """Whether the arm stands still, at the end of a motion or paused on its path."""
         return self.scale == 0.0 or not self.motion.moving
 
     @property
     def on_path(self) -> bool:
-        """Whether a move is running or slows down, and not a stream of set-points."""
+        """Whether a path move is running or slowing down, rather than a stream of set-points."""
         return self.motion.on_path
 
     @property
     def speed_scaling(self) -> float:
-        """The slowing factor beside the speed slider, 0..1; 0 at rest and in pauses."""
+        """The speed scaling without the speed slider, 0..1; 0 at rest and in pauses."""
         if self.at_rest or not self.speed_slider:
             return 0.0
         return min(1.0, self.motion.scaling / self.speed_slider)
 
     @property
     def robot_status(self) -> RobotStatus:
-        """Bits of power and program."""
+        """The status bits of power and program."""
         powered = self.power.mode >= RobotMode.POWER_ON
         bits = RobotStatus.POWER_ON if powered else RobotStatus(0)
         return bits | RobotStatus.PROGRAM_RUNNING if self.programs.running else bits
 
     @property
     def safety_status(self) -> SafetyStatus:
-        """Bits of the safety system."""
+        """The status bits of the safety system."""
         return STATUS_BITS[self.safety.mode]
 
     @property
@@ -212,7 +214,7 @@ class Controller:
 
     @property
     def target(self) -> MotionGenerator | ArmState:
-        """The commanded place of the arm: the program's, and the displacement by force mode."""
+        """The commanded motion of the arm: the program's target, displaced by force mode."""
         return self.contact.target or self.motion
 
     @property
@@ -222,7 +224,7 @@ class Controller:
 
     @property
     def tool_accelerometer(self) -> Vector3:
-        """The reading of a sensor in the flange, gravity included, in its axes [m/s^2]."""
+        """The reading of an accelerometer in the flange, with gravity, in flange axes [m/s^2]."""
         motion = self.motion
         frames = self.arm.frames(motion.q)
         acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
@@ -236,14 +238,14 @@ class Controller:
 
     @property
     def takes_scripts(self) -> bool:
-        """Whether clients may send programs and commands: with no remote control, always."""
+        """Whether clients can send programs and commands; always if there is no remote control."""
         return self.remote_control or not self.config.has_remote_control
 
     def joint_history(self, steps: int) -> Vector6:
         """
         Return the joint positions some cycles ago.
 
-        :raises RuntimeException: farther back than the history goes.
+        :raises RuntimeException: the cycle lies before the history.
         """
         if not 0 <= steps < MAX_HISTORY:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{MAX_HISTORY - 1}')
@@ -281,7 +283,7 @@ class Controller:
         """
         Ramp the speed scaling towards its target, as fast as an arm can follow.
 
-        :param was_at_rest: the arm stood before this cycle, so it needs no ramp.
+        :param was_at_rest: the arm stood still before this cycle, so it needs no ramp.
         """
         held = self.programs.state in _HELD_STATES or self._stopping_on_path
         target = 0.0 if held else self.speed_slider
@@ -304,7 +306,7 @@ class Controller:
             self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
 
     def _pause_if_wanted(self, code: int, argument: int) -> None:
-        """Pause a program that has asked for it by `pause_on_error_code`."""
+        """Pause the program if its `pause_on_error_code` names this error."""
         if self.process.has_pause_on(code, argument):
             self.programs.pause()
 
@@ -321,9 +323,9 @@ class Controller:
 
     def brake(self) -> None:
         """
-        Stop for a program that has ended: on its path, or hard where there is none.
+        Stop the arm because the program has ended: on the path, or hard if there is no path.
 
-        An arm that stands on its path, paused or at a fault, drops the path.
+        If the arm already stands still on its path, paused or at a fault, the path is discarded.
         """
         if self.scale == 0.0 or self.motion.fault is not None:
             self.motion.stop_at_once()
@@ -334,7 +336,7 @@ class Controller:
             self.ownership.brake()
 
     def begin_program(self) -> None:
-        """Let the first motion of a program set out slowly."""
+        """Make the first motion of a program start slowly."""
         self.motion.begin_program()
 
     def end_modes(self) -> None:
@@ -355,7 +357,7 @@ class Controller:
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:
-        """Return why no program can run now; empty if one can."""
+        """Return the reason why no program can run now; empty = a program can run."""
         if self.safety.mode not in OPERATIONAL:
             return f'the safety mode is {self.safety.mode.name}'
         if self.power.mode is not RobotMode.RUNNING:
@@ -372,7 +374,7 @@ class Controller:
         """
         Load a program by its file name; return the reason of a refusal, else an empty string.
 
-        Directories do not matter here.
+        Directories in the name are ignored.
         """
         text = self.config.programs.get(file := PurePosixPath(name).name)
         return f'File not found: {name}' if text is None else self.programs.load(file, text)
@@ -419,13 +421,13 @@ class Controller:
         return ''
 
     def unlock_soon(self) -> None:
-        """Unlock a protective stop as a line on the primary interface does: without the wait."""
+        """Unlock a protective stop as by a line on the primary interface: without unlock delay."""
         if self.safety.mode is SafetyMode.PROTECTIVE_STOP:
             self._unlock_at = self.time + UNLOCK_TIME
 
     def watch_input(self, variable: str, frequency: float, action: str) -> None:
         """
-        Watch that an RTDE input is written often enough.
+        Check from now on that an RTDE input is written often enough.
 
         :param frequency: lowest rate at which it has to be written [Hz].
         :param action: what happens to the program otherwise: pause, stop or ignore.
@@ -436,7 +438,7 @@ class Controller:
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window; when there are many, one that no program waits for is not kept."""
+        """Show a window; if too many are open, a window that no program waits for is not kept."""
         if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
         self.messages.popup(popup)

@@ -14,7 +14,7 @@ from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
 
 
 class Assembly(NamedTuple):
-    """A controller that runs programs, and what can go wrong with it."""
+    """A controller that runs programs, and the injector of its faults."""
 
     controller: Controller
     faults: FaultInjector
@@ -22,9 +22,9 @@ class Assembly(NamedTuple):
 
 def assemble(config: SimulatorConfig, sockets: ScriptSockets | None = None) -> Assembly:
     """
-    Return a controller as configured, without network and clock.
+    Return a controller and its faults as configured, without network and clock.
 
-    :param sockets: what programs connect with; None = in memory, for tests.
+    :param sockets: the sockets of programs; None = in memory, for tests.
     """
     controller = Controller(config, controller_builtins, sockets)
     controller.faults = faults = FaultInjector(controller)

@@ -3,8 +3,8 @@
 """
 A simulated robot that listens on the ports of a real one.
 
-One thread runs one event loop with the controller's cycle and the servers, so there is nothing to
-lock. Calls from other threads are carried out between two cycles.
+One thread runs one event loop with the controller's cycle and the servers, so no locks are needed.
+Calls from other threads are carried out between two cycles.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
-#: From the port of a script interface to its read-only twin's: 30001 and 30011.
+#: Difference between the ports of a script interface and its read-only twin: 30001 and 30011.
 READ_ONLY_DISTANCE = 10
 #: The first version without a dashboard.
 POLYSCOPE_X = 10
@@ -60,12 +60,12 @@ class Ports:
 
     rtde: int
     primary: int
-    #: 0 for PolyScope X, which has none.
+    #: 0 for PolyScope X, which has no dashboard.
     dashboard: int
     secondary: int
     realtime: int
     interpreter: int
-    #: The Robot API of PolyScope X from 10.11 on; 0 for others.
+    #: Port of the Robot API of PolyScope X from 10.11 on; 0 for other software.
     robot_api: int = 0
 
 
@@ -92,7 +92,7 @@ class RobotSnapshot:
 
 class SimulatedRobot:
     """
-    A context manager: on entering, all ports listen; on leaving, nothing is left.
+    A simulated robot as a context manager: inside it all ports listen, after it all are closed.
 
     ::
 
@@ -108,14 +108,14 @@ class SimulatedRobot:
         clock: Clock | None = None,
     ) -> None:
         """
-        Make a robot; it lives from `start` to `close`, or as long as `run` runs.
+        Make a robot; it runs from `start` to `close`, or during `run`.
 
         :param sockets: the sockets of programs; None = TCP.
-        :param clock: when cycles are due; None = by the rate of the configuration.
+        :param clock: the clock of the cycles; None = a clock with the rate of the configuration.
         """
         self.config = config or SimulatorConfig()
         self._loop: asyncio.AbstractEventLoop | None = None
-        #: Called with the port and the bytes that a program's socket received, in our thread.
+        #: Called in the robot's thread with a port and the bytes that a program received from it.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
         impaired = ImpairedSockets(
             sockets or TcpScriptSockets(self._on_socket_data, self.config.host)
@@ -163,7 +163,7 @@ class SimulatedRobot:
     ) -> TcpServer[ReadOnlySession]:
         return TcpServer(f'read-only {name}', lambda: ReadOnlySession(greet(self.controller)))
 
-    # Life
+    # Start and end
 
     def start(self) -> SimulatedRobot:
         """
@@ -184,7 +184,7 @@ class SimulatedRobot:
         return self
 
     def close(self) -> None:
-        """Disconnect all clients and end the thread; may be called twice."""
+        """Disconnect all clients and end the thread; can be called twice."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
@@ -239,7 +239,7 @@ class SimulatedRobot:
             self.controller.sockets.close_all()
             for server in (*self._servers, *self._read_only.values()):
                 await server.close()
-            # Clients that connected at the last moment are accepted and disconnected.
+            # Time to accept and disconnect clients that connected at the last moment.
             await asyncio.sleep(0.01)
 
     async def _listen(self) -> None:
@@ -278,7 +278,7 @@ class SimulatedRobot:
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
-                # How long the computer compiles must not decide when a program starts.
+                # The time that this computer takes to compile must not affect a program's start.
                 await self._compiler.wait_until_idle()
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
@@ -334,7 +334,7 @@ class SimulatedRobot:
     @property
     def ports(self) -> Ports:
         """
-        The ports that are listened on.
+        The ports on which the servers listen.
 
         :raises RuntimeError: the robot has not been started.
         """
@@ -376,7 +376,7 @@ class SimulatedRobot:
         """
         Unlock the protective stop, as at the pendant.
 
-        :raises RuntimeError: not stopped, or stopped less than the unlock delay ago.
+        :raises RuntimeError: there is no stop, or it began less than the unlock delay ago.
         """
         self._safety(SafetyEvent.UNLOCK)
 
@@ -412,7 +412,7 @@ class SimulatedRobot:
         """
         Start a program as if a client had sent it; return when it is compiled.
 
-        On the thread of the robot's own event loop: at once.
+        In the thread of the robot's own event loop, the call returns at once.
         """
         compiled: Future[None] = Future()
 

@@ -22,15 +22,15 @@ from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 
-#: Upright enough to move anywhere, away from every singularity [rad].
+#: Joint positions with room to move in all directions, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
-#: One recording of a UR3 in URSim and one forum thread; movec, movep and optimovel have 1 here.
+#: From one recording of a UR3 in URSim and one forum thread; movec, movep and optimovel use 1.
 TURN_RATIO = 4.0
-#: More simulated seconds per second than any computer can do.
+#: More simulated seconds per second than any computer can achieve.
 MAX_RATE = 1e4
 _PRIMARY_PORT = 30001
-#: Not port 80, which only root may open.
+#: Not port 80 as on a real robot, because only root can open it.
 _ROBOT_API_PORT = 8000
 _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 
@@ -49,72 +49,75 @@ class SimulatorConfig:
     host: str = '127.0.0.1'
     #: Version of the robot's software; empty = 5.21.0, or 3.15.8 for a CB3 model.
     polyscope: str = ''
-    #: Ports; 0 = any free one.
+    #: Ports of the RTDE, primary and dashboard interfaces; 0 = any free port.
     rtde_port: int = 30004
     primary_port: int = _PRIMARY_PORT
     dashboard_port: int = 29999
-    #: None = 30002 and 30003 if the primary interface is on 30001, otherwise any free ones: a
-    #: robot on other ports is probably not the only one on this computer. Their read-only twins
-    #: (30011 to 30013) listen beside the standard ports only.
+    #: Ports of the secondary and real-time interfaces; None = 30002 and 30003 if the primary
+    #: interface is on 30001, otherwise any free ports, because a robot on other ports is probably
+    #: not the only one on this computer. The read-only twins of the three interfaces (30011 to
+    #: 30013) listen only if all three are on their standard ports.
     secondary_port: int | None = None
     realtime_port: int | None = None
-    #: Port of interpreter mode; None = 30020 or any free one, as above.
+    #: Port of interpreter mode; None = 30020 if the primary interface is on 30001, otherwise any
+    #: free port.
     interpreter_port: int | None = None
-    #: Port of the Robot API of PolyScope X, 80 on a real robot; None = 8000 or any free one.
+    #: Port of the Robot API of PolyScope X, 80 on a real robot; None = 8000 if the primary
+    #: interface is on 30001, otherwise any free port.
     robot_api_port: int | None = None
     #: Joint positions at start [rad].
     q: Vector6 = HOME
     power: Literal['running', 'off'] = 'running'
-    #: False = local control: the primary interface takes no scripts.
+    #: False = local control: scripts of clients are refused.
     remote_control: bool = True
-    #: False = the feature is off in the robot's settings: scripts are taken, and the dashboard
-    #: says that the robot is not in remote control.
+    #: False = the feature is off in the robot's settings: scripts are accepted, and the dashboard
+    #: reports that the robot is not in remote control.
     has_remote_control: bool = True
-    #: Turn of a movel that counts as much as a metre [rad]; 4 was recorded, 1 is the manual's.
+    #: Rotation of a movel that takes as long as a metre [rad]; 4 was recorded, the manual has 1.
     turn_ratio: float = TURN_RATIO
-    #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
+    #: Denavit-Hartenberg parameters of this arm; None = the nominal parameters of the model.
     geometry: DhTable | None = None
-    #: Limits of the joints; None = the model's. Where they are tighter, the arm keeps them,
-    #: and the configuration on the primary interface contains them.
+    #: Limits of the joints; None = those of the model. The arm keeps tighter limits, and the
+    #: configuration on the primary interface contains them.
     joint_limits: JointLimits | None = None
-    #: How far the arm fails to follow its targets, and the controller to keep up; None = not at
-    #: all. `sim.motion.imperfect_arm.typical_imperfections` returns typical values of a model.
+    #: Imperfections of the arm and its controller; None = a perfect arm and controller.
+    #: `sim.motion.imperfect_arm.typical_imperfections` returns typical values for a model.
     imperfections: Imperfections | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None
     #: Time after a protective stop during which pendant and dashboard refuse to unlock [s]; 5 s on
     #: a real robot.
     unlock_delay: float = 5.0
-    #: From `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten times as
-    #: long.
+    #: Times from `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten
+    #: times as long.
     power_on_time: float = 0.5
     brake_release_time: float = 0.5
     #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
-    #: Behaviour of the robot's clock when this computer was too busy for its cycles: 'skip' their
-    #: time, so that it keeps real time as on a real robot; 'wait', so that motions take as long as
-    #: they should by the robot's clock, as tests want it.
+    #: Behaviour of the robot's clock if this computer was too busy for some cycles: 'skip' adds
+    #: their time, so that the clock keeps real time as on a real robot; 'wait' does not, so that
+    #: motions take their nominal time by the robot's clock, as tests need it.
     when_late: Literal['skip', 'wait'] = 'skip'
-    #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
-    #: the first cycle.
+    #: Faults, as values of `sim.faults.fault_values` or as text; their times are measured from the
+    #: first cycle.
     faults: Sequence[Fault | str] = ()
-    #: Bodies that the tool can touch, as :class:`ContactBody` or in words: 'plane 0 0 0.1 0 0 1'.
+    #: Bodies that the tool can touch, as :class:`ContactBody` or as text: 'plane 0 0 0.1 0 0 1'.
     contacts: Sequence[ContactBody | str] = ()
     #: Digital inputs that are on from the start, such as 'standard 3'.
     inputs: Sequence[str] = ()
     contact_bodies: tuple[ContactBody, ...] = field(init=False, default=())
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
-    #: Seed of random switches between the threads of a program; None = they are switched only
-    #: where one takes time.
+    #: Seed of random switches between the threads of a program; None = no random switches, so
+    #: threads switch only when one takes time.
     interleaving_seed: int | None = None
     #: Programs that the dashboard can load: file name -> URScript.
     programs: Mapping[str, str] = field(default_factory=dict)
-    #: The one that is loaded from the start; empty = an empty one without a name.
+    #: Name of the program that is loaded from the start; empty = an empty, unnamed program.
     program: str = ''
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated, naming the field."""
+        """Refuse values that cannot be simulated; the error names the field."""
         if len(self.q) != 6:
             raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
         declare_types(self)
@@ -206,7 +209,7 @@ class SimulatorConfig:
 
     @property
     def has_standard_ports(self) -> bool:
-        """Tell whether the script interfaces are on 30001 to 30003, as on a real robot."""
+        """Return whether the script interfaces are on 30001 to 30003, as on a real robot."""
         ports = (self.primary_port, self.listening_secondary_port, self.listening_realtime_port)
         return ports == (_PRIMARY_PORT, _PRIMARY_PORT + 1, _PRIMARY_PORT + 2)
 

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The functions that programs call, one class for each of their subjects.
+The functions that programs can call, with one class for each subject.
 
-To add a function, write a public method into the class of its subject. Every public method of the
-classes in :data:`BUILTIN_GROUPS` is a function of programs, under its own name. Its parameters
-have the names and defaults of the robot's manual, because programs pass arguments by name. A
-function that takes time is a generator, which yields once per controller cycle.
+To add a function, add a public method to the class of its subject. Programs can call every public
+method of the classes in :data:`BUILTIN_GROUPS` under its own name. Its parameters have the names
+and defaults of the script manual, because programs can pass arguments by name. A function that
+takes time is a generator that yields once per controller cycle.
 `test/sim/programs` has at least one program for each function.
 """
 
@@ -66,7 +66,7 @@ BUILTIN_GROUPS: tuple[type[BuiltinGroup], ...] = (
 
 
 def controller_builtins(controller: Controller) -> Builtins:
-    """Return all functions of a primary program, with the language's own."""
+    """Return all functions that a primary program can call, including those of the language."""
     found = dict(core_builtins())
     for group in BUILTIN_GROUPS:
         found |= group(controller).functions()

@@ -45,7 +45,7 @@ def not_negative(value: Value, name: str) -> float:
 
 
 def whole(value: Value, name: str) -> int:
-    """Return a whole number; a float without a fraction will do, as divisions give floats."""
+    """Return a whole number; a whole float is accepted, because divisions give floats."""
     result = number(value, name)
     if not result.is_integer():
         raise RuntimeException(f'{name} is {result:g}; it must be a whole number')
@@ -69,7 +69,7 @@ def within(value: Value, name: str, low: float, high: float) -> float:
 
 
 def one_of(value: Value, name: str, choices: tuple[int, ...]) -> int:
-    """Return a whole number that is one of some."""
+    """Return a whole number that is one of the choices."""
     result = whole(value, name)
     if result not in choices:
         *first, last = map(str, choices)
@@ -100,19 +100,19 @@ def three(value: Value, name: str) -> Vector3:
 
 
 def pose(value: Value, name: str) -> Pose:
-    """Return the pose of a `p[...]`."""
+    """Return the pose in a script value `p[...]`."""
     if not isinstance(value, ScriptPose):
         raise RuntimeException(f'Type error: {name} must be a pose, not a {type_name(value)}')
     return Pose.from_rotation_vector(six(value, name))
 
 
 def is_pose(value: Value) -> bool:
-    """Tell whether a value is a pose, and not a list of joint positions."""
+    """Return whether a value is a pose rather than a list of joint positions."""
     return isinstance(value, ScriptPose)
 
 
 def script_pose(value: Pose) -> ScriptPose:
-    """Return the `p[...]` of a pose."""
+    """Return a pose as a script value `p[...]`."""
     return ScriptPose(*value.rotation_vector())
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The common base of groups of functions."""
+"""The base class of all groups of script functions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ur_cartesian_driver.sim.controller import Controller
 
 
 class BuiltinGroup:
-    """Functions of one subject: the public methods of a subclass; see the package."""
+    """The functions of one subject: the public methods of a subclass, see the package."""
 
     def __init__(self, controller: Controller) -> None:
-        """Read and change the state of this controller."""
+        """Give the functions access to the state of this controller."""
         self._controller = controller
 
     def functions(self) -> dict[str, Any]:

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Conveyors and their encoders: belts that stand still.
+Conveyors and their encoders; the simulated belts stand still.
 
-No pulses arrive, so a count is what a program sets. Moves relative to a belt are moves, as long as
-its count stays; a count that changes while the belt is tracked ends the program, because the arm
-would have to follow.
+No pulses arrive, so only programs change the tick count of an encoder. While a belt is tracked
+the moves of a program are ordinary moves, because the belt does not move. A program that changes
+the count of a tracked belt is ended, because the arm would have to follow the belt.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
 ENCODERS = 2
 DECODERS = 5
-#: Counts before an encoder begins anew, by the number of its range.
+#: Ticks after which an encoder wraps around, by `range_id`.
 RANGES = (2**32, 2**8, 2**16, 2**24, 2**32)
 
 
@@ -41,12 +41,12 @@ class _Encoder:
 @dataclass(slots=True)
 class _Conveyors:
     encoders: list[_Encoder] = field(default_factory=lambda: [_Encoder() for _ in range(ENCODERS)])
-    #: The encoder whose belt is tracked, or None.
+    #: Index of the encoder whose belt is tracked, or None.
     tracked: int | None = None
 
 
 class ConveyorBuiltins(BuiltinGroup):
-    """Counts live beyond their program; tracking ends with the functions that end it."""
+    """Counts and tracking outlive the program; only `stop_conveyor_tracking` ends tracking."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin with counts of zero."""
@@ -59,22 +59,22 @@ class ConveyorBuiltins(BuiltinGroup):
     def encoder_enable_pulse_decode(
         self, encoder_index: Value, decoder_type: Value, A: Value, B: Value = 0
     ) -> None:
-        """Count the pulses of inputs, where none arrive."""
+        """Check the arguments; no pulses arrive that the encoder could count."""
         self._encoder(encoder_index)
         index(decoder_type, 'decoder_type', DECODERS)
         for value, name in ((A, 'A'), (B, 'B')):
             index(value, name, 12)
 
     def encoder_enable_set_tick_count(self, encoder_index: Value, range_id: Value) -> None:
-        """Let a program count."""
+        """Set the range of an encoder whose count a program sets."""
         self._encoder(encoder_index).range = RANGES[index(range_id, 'range_id', len(RANGES))]
 
     def encoder_get_tick_count(self, encoder_index: Value) -> float:
-        """Return a count."""
+        """Return the tick count of an encoder."""
         return self._encoder(encoder_index).count
 
     def encoder_set_tick_count(self, encoder_index: Value, count: Value) -> None:
-        """Set a count."""
+        """Set the tick count of an encoder."""
         encoder, new = self._encoder(encoder_index), number(count, 'count')
         tracked = self._belts.tracked
         if tracked is not None and encoder is self._belts.encoders[tracked]:
@@ -88,30 +88,30 @@ class ConveyorBuiltins(BuiltinGroup):
     def encoder_unwind_delta_tick_count(
         self, encoder_index: Value, delta_tick_count: Value
     ) -> float:
-        """Return a difference of two counts as if the encoder had not begun anew between them."""
+        """Return a difference of two counts, corrected for a wrap-around between them."""
         turn = self._encoder(encoder_index).range
         delta = number(delta_tick_count, 'delta_tick_count')
         return delta - turn * round(delta / turn)
 
     def conveyor_pulse_decode(self, type: Value, A: Value, B: Value = 0) -> None:
-        """Count the pulses of the first encoder: the older name."""
+        """Check the arguments for the first encoder: the older function."""
         self.encoder_enable_pulse_decode(0, type, A, B)
 
     def get_conveyor_tick_count(self) -> float:
-        """Return the count of the first encoder: the older name."""
+        """Return the tick count of the first encoder: the older function."""
         return self.encoder_get_tick_count(0)
 
     def set_conveyor_tick_count(
         self, tick_count: Value, absolute_encoder_resolution: Value = 0
     ) -> None:
-        """Set the count of the first encoder: the older name."""
+        """Set range and tick count of the first encoder: the older function."""
         self.encoder_enable_set_tick_count(0, absolute_encoder_resolution)
         self.encoder_set_tick_count(0, int32(tick_count, 'tick_count'))
 
     def track_conveyor_linear(
         self, direction: Value, ticks_per_meter: Value, encoder_index: Value = 0
     ) -> None:
-        """Move relative to a belt, along a direction of the base."""
+        """Track a belt that moves along a direction of the base."""
         six(direction, 'direction')
         number(ticks_per_meter, 'ticks_per_meter')
         self._belts.tracked = index(encoder_index, 'encoder_index', ENCODERS)
@@ -123,20 +123,20 @@ class ConveyorBuiltins(BuiltinGroup):
         rotate_tool: Value = False,
         encoder_index: Value = 0,
     ) -> None:
-        """Move relative to a turntable."""
+        """Track a turntable."""
         pose(center, 'center')
         number(ticks_per_revolution, 'ticks_per_revolution')
         self._belts.tracked = index(encoder_index, 'encoder_index', ENCODERS)
 
     def stop_conveyor_tracking(self, a: Value = 20, aRot: Value = 'a') -> None:
-        """Move relative to the base again."""
+        """Stop tracking; moves are relative to the base again."""
         positive(a, 'a')
         self._belts.tracked = None
 
     def get_target_tcp_pose_along_path(self) -> ScriptPose:
-        """Return the target relative to the belt, which stands."""
+        """Return the target pose of the TCP relative to the belt, which stands still."""
         return script_pose(self._controller.target.T_base_tcp)
 
     def get_target_tcp_speed_along_path(self) -> list[float]:
-        """Return the target speed relative to the belt, which stands."""
+        """Return the target speed of the TCP relative to the belt, which stands still."""
         return list(self._controller.target.tcp_twist)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions of a program that controls the arm by torques: Jacobians, inertia, centrifugal torques.
+Functions for programs that control the arm by torques: Jacobians, inertia, centrifugal torques.
 
-The links of this arm weigh nothing: mass matrix and torques come from the payload, a point mass.
+The links of this arm have no mass: mass matrix and torques come from the payload, a point mass.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
 )
 from ur_cartesian_driver.urscript.script_values import Matrix, Value
 
-#: Half the time between the two Jacobians whose difference is the derivative [s].
+#: Half the time between the two Jacobians whose difference gives the time derivative [s].
 DIFFERENCE = 1e-4
 UNIT_ACCELERATIONS = tuple(vector6(1.0 if i == j else 0.0 for i in range(6)) for j in range(6))
 
 
 class DynamicsBuiltins(BuiltinGroup):
-    """Of the target joints where a program gives none; in base axes."""
+    """Functions of joint positions and speeds, by default the target's; in base axes."""
 
     def _q(self, q: Value) -> Vector6:
         return self._controller.motion.q if q is None else six(q, 'q')
@@ -43,7 +43,7 @@ class DynamicsBuiltins(BuiltinGroup):
     def get_jacobian_time_derivative(
         self, q: Value = None, qd: Value = None, tcp: Value = 'active_tcp'
     ) -> Matrix:
-        """Return how fast the Jacobian changes at these speeds of the joints."""
+        """Return the time derivative of the Jacobian at these joint speeds."""
         arm, tool, joints = self._controller.arm, self._tcp(tcp), self._q(q)
         ahead, behind = (
             arm.jacobian([a + step * b for a, b in zip(joints, self._qd(qd), strict=True)], tool)
@@ -52,7 +52,7 @@ class DynamicsBuiltins(BuiltinGroup):
         return Matrix(((ahead - behind) / (2.0 * DIFFERENCE)).tolist())
 
     def get_mass_matrix(self, q: Value = None, include_rotor_inertia: Value = False) -> Matrix:
-        """Return the matrix that maps joint accelerations to the moments for them [kg m^2]."""
+        """Return the matrix that maps joint accelerations to joint moments [kg m^2]."""
         joints = self._q(q)
         columns = [self._payload_moments(joints, ZERO6, qdd) for qdd in UNIT_ACCELERATIONS]
         return Matrix([list(row) for row in zip(*columns, strict=True)])
@@ -60,7 +60,7 @@ class DynamicsBuiltins(BuiltinGroup):
     def get_coriolis_and_centrifugal_torques(
         self, q: Value = None, qd: Value = None
     ) -> list[float]:
-        """Return the moments that constant speeds of the joints take [Nm]."""
+        """Return the joint moments that motion at constant joint speeds needs [Nm]."""
         return list(self._payload_moments(self._q(q), self._qd(qd), ZERO6))
 
     def _payload_moments(self, q: Vector6, qd: Vector6, qdd: Vector6) -> Vector6:

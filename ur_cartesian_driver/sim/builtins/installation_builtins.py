@@ -3,7 +3,8 @@
 """
 Settings of the installation, which PolyScope writes at the head of each program that it saves.
 
-They are checked; what they would do has no place here: buttons, wires and machines beside the arm.
+Their arguments are checked, but they have no effect on the arm, because buttons, wires and
+machines around it are not simulated.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
 
-#: What an input can do besides being read.
+#: Actions that a program can assign to an input; 'default' = none.
 INPUT_ACTIONS = ('default', 'freedrive')
 EUROMAP_PINS = 33
 
 
 def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
-    """Return the function of a program that gives one of some inputs an action."""
+    """Return the script function that assigns an action to one of ``count`` inputs."""
 
     def choose(_: Any, port: Value, action: Value) -> None:
         index(port, 'port', count)
@@ -34,7 +35,7 @@ def _input_action(count: int) -> Callable[[Any, Value, Value], None]:
 
 
 def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
-    """Return the function of a program that ties one of some outputs to the state of programs."""
+    """Return the script function that ties one of ``count`` outputs to the program state."""
 
     def choose(_: Any, outputId: Value, state: Value) -> None:
         index(outputId, 'outputId', count)
@@ -44,7 +45,7 @@ def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
 
 
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
-    """Return the older function for a list of outputs that are high while a program runs."""
+    """Return the older script function, for a list of outputs that are high during a program."""
 
     def choose(_: Any, outputs: Value) -> None:
         if type(outputs) is not list:
@@ -58,7 +59,7 @@ def _runstate_list(count: int) -> Callable[[Any, Value], None]:
 
 
 class InstallationBuiltins(BuiltinGroup):
-    """Actions of inputs, outputs that tell whether a program runs, and modes of the tool."""
+    """Input actions, outputs that follow the program state, and modes of the tool."""
 
     set_standard_digital_input_action = _input_action(8)
     set_configurable_digital_input_action = _input_action(8)
@@ -74,7 +75,7 @@ class InstallationBuiltins(BuiltinGroup):
     set_runstate_standard_digital_outputs = _runstate_list(8)
 
     def set_input_actions_to_default(self) -> None:
-        """Let inputs do nothing but be read."""
+        """Remove the actions of all inputs."""
 
     def set_tool_analog_input_domain(self, port: Value, domain: Value) -> None:
         """Choose 0 = current, 1 = voltage."""
@@ -100,7 +101,7 @@ class InstallationBuiltins(BuiltinGroup):
         index(type, 'type', 2)
 
     def motion_version_set(self, version: Value) -> None:
-        """Choose the motion generator, of which there is one here."""
+        """Choose the version of the motion generator; both are the same here."""
         one_of(version, 'version', (1, 2))
 
 
@@ -113,12 +114,12 @@ class EuromapBuiltins(BuiltinGroup):
         self._outputs = [False] * EUROMAP_PINS
 
     def get_euromap_input(self, port_number: Value) -> bool:
-        """Return low."""
+        """Return low: there is no machine that could set an input."""
         index(port_number, 'port_number', EUROMAP_PINS)
         return False
 
     def get_euromap_output(self, port_number: Value) -> bool:
-        """Return what was set."""
+        """Return the value to which an output was set."""
         return self._outputs[index(port_number, 'port_number', EUROMAP_PINS)]
 
     def set_euromap_output(self, port_number: Value, signal_value: Value) -> None:
@@ -128,6 +129,6 @@ class EuromapBuiltins(BuiltinGroup):
     def set_euromap_runstate_dependent_choice(
         self, port_number: Value, runstate_choice: Value
     ) -> None:
-        """Tie an output to the state of programs."""
+        """Tie an output to the program state."""
         index(port_number, 'port_number', EUROMAP_PINS)
         one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3))

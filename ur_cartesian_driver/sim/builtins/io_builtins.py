@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions of a program on inputs, outputs, flags, ports and registers.
+Script functions for inputs, outputs, flags, ports and registers.
 
-Most of them read or write one item of a list in :class:`ControllerIo`; the class bodies are their
-table.
+Most of them read or write one item of a list in :class:`ControllerIo`; each class body is a table
+of such functions.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class _IoGroup(BuiltinGroup):
 
 
 def _get_n(items: _Items[T]) -> Callable[[Any, Value], T]:
-    """Return the function of a program that reads item n."""
+    """Return the script function that reads item n."""
 
     def get(group: _IoGroup, n: Value) -> T:
         values = items(group._io)
@@ -39,7 +39,7 @@ def _get_n(items: _Items[T]) -> Callable[[Any, Value], T]:
 
 
 def _set_n(items: _Items[bool]) -> Callable[[Any, Value, Value], None]:
-    """Return the function of a program that sets item n."""
+    """Return the script function that sets item n."""
 
     def set_(group: _IoGroup, n: Value, b: Value) -> None:
         values = items(group._io)
@@ -49,7 +49,7 @@ def _set_n(items: _Items[bool]) -> Callable[[Any, Value, Value], None]:
 
 
 def _read(items: _Items[T]) -> Callable[[Any, Value], T]:
-    """Return the function of a program that reads an address."""
+    """Return the script function that reads an address."""
 
     def read(group: _IoGroup, address: Value) -> T:
         values = items(group._io)
@@ -61,7 +61,7 @@ def _read(items: _Items[T]) -> Callable[[Any, Value], T]:
 def _write(
     items: _Items[T], checked: Callable[[Value, str], T]
 ) -> Callable[[Any, Value, Value], None]:
-    """Return the function of a program that writes to an address."""
+    """Return the script function that writes to an address."""
 
     def write(group: _IoGroup, address: Value, value: Value) -> None:
         values, new = items(group._io), checked(value, 'value')
@@ -79,7 +79,7 @@ def _uint16(value: Value, name: str) -> int:
 
 
 class DigitalBuiltins(_IoGroup):
-    """Digital inputs and outputs, and flags, which survive the program."""
+    """Digital inputs, digital outputs and flags; flags outlive the program."""
 
     set_standard_digital_out = _set_n(lambda io: io.digital_out.standard)
     set_configurable_digital_out = _set_n(lambda io: io.digital_out.configurable)
@@ -97,7 +97,7 @@ class DigitalBuiltins(_IoGroup):
     get_flag = _get_n(lambda io: io.flags)
 
     def set_digital_out(self, n: Value, b: Value) -> None:
-        """Set standard 0-7, or tool 0-1 as 8-9: the old numbering."""
+        """Set an output by its old number: standard 0-7, tool 8-9."""
         channel, outputs = index(n, 'n', 10), self._io.digital_out
         side, i = (outputs.standard, channel) if channel < 8 else (outputs.tool, channel - 8)
         side[i] = truth(b)
@@ -114,7 +114,7 @@ class AnalogBuiltins(_IoGroup):
     get_analog_in = _get_n(lambda io: io.analog_in + io.tool_analog_in)
 
     def set_standard_analog_out(self, n: Value, f: Value) -> None:
-        """Set to a fraction 0..1 of the range."""
+        """Set an analog output to a fraction 0..1 of its range."""
         self._io.set_analog_out(index(n, 'n', 2), number(f, 'f'))
 
     set_analog_out = set_standard_analog_out  # the old name
@@ -128,7 +128,7 @@ class AnalogBuiltins(_IoGroup):
         self._io.analog_in_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
 
     def set_tool_voltage(self, voltage: Value) -> None:
-        """Set the tool's supply to 0, 12 or 24 V; a float will do."""
+        """Set the tool's supply to 0, 12 or 24 V; a whole float is accepted."""
         volts = whole(voltage, 'voltage')
         if volts not in (0, 12, 24):
             raise RuntimeException(f'voltage is {volts}; it must be 0, 12 or 24')
@@ -143,11 +143,11 @@ class AnalogBuiltins(_IoGroup):
         rx_idle_chars: Value,
         tx_idle_chars: Value,
     ) -> None:
-        """Accept settings of the tool's serial line, which has no other end here."""
+        """Accept any settings of the tool's serial line; nothing is connected to it here."""
 
 
 class PortBuiltins(_IoGroup):
-    """Ports, which Modbus clients of a real robot share; here memory that survives programs."""
+    """Ports: shared with Modbus clients on a real robot, here memory that outlives programs."""
 
     read_port_bit = _read(lambda io: io.port_bits)
     read_port_register = _read(lambda io: io.port_registers)
@@ -156,7 +156,7 @@ class PortBuiltins(_IoGroup):
 
 
 class RegisterBuiltins(_IoGroup):
-    """General purpose registers: programs only read what RTDE clients write."""
+    """General purpose registers; RTDE clients write the input registers, programs read them."""
 
     read_input_boolean_register = _read(lambda io: io.inputs.bits)
     read_input_integer_register = _read(lambda io: io.inputs.integers)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program that convert between joints and poses, and set the TCP."""
+"""Script functions that convert between joint positions and poses, and set the TCP."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 def solve(
     controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
 ) -> Vector6 | None:
-    """Return the joints nearest to given ones at which the TCP has a pose."""
+    """Return the joint positions for a TCP pose that are nearest to ``near``, or None."""
     return nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
 
 
 def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     """
-    Return joints as they are, and for a pose the solution nearest to the present joints.
+    Return joint positions unchanged; for a pose, return the solution nearest to the present ones.
 
     :raises RuntimeException: the pose cannot be reached.
     """
@@ -45,7 +45,7 @@ def _reached(q: Vector6 | None, function: str) -> Vector6:
 
 
 def pose_of(controller: Controller, value: Value, name: str) -> Pose:
-    """Return a pose as it is, and for joints the pose of the TCP there."""
+    """Return a pose unchanged; for joint positions, return the TCP pose at them."""
     if is_pose(value):
         return pose(value, name)
     return controller.arm.forward(six(value, name)) @ controller.motion.T_flange_tcp
@@ -69,7 +69,7 @@ class KinematicsBuiltins(BuiltinGroup):
         maxOrientationError: Value = 1e-10,
         tcp: Value = 'active_tcp',
     ) -> list[float]:
-        """Return the joints of a pose nearest to `qnear`, by default to the present ones."""
+        """Return the joint solution nearest to `qnear`, by default to the present joints."""
         return list(_reached(self._solve(x, qnear, tcp), 'get_inverse_kin'))
 
     def get_inverse_kin_has_solution(
@@ -80,18 +80,18 @@ class KinematicsBuiltins(BuiltinGroup):
         maxOrientationError: Value = 1e-10,
         tcp: Value = 'active_tcp',
     ) -> bool:
-        """Tell whether a pose can be reached."""
+        """Return whether a pose can be reached."""
         return self._solve(pose, qnear, tcp) is not None
 
     def get_forward_kin(
         self, q: Value = 'current_joint_positions', tcp: Value = 'active_tcp'
     ) -> ScriptPose:
-        """Return the pose of the TCP at joints, by default the present ones."""
+        """Return the pose of the TCP at joint positions, by default at the present ones."""
         joints = self._controller.motion.q if q == 'current_joint_positions' else six(q, 'q')
         return script_pose(self._controller.arm.forward(joints) @ self._tcp(tcp))
 
     def is_within_safety_limits(self, pose: Value, qNear: Value = None) -> bool:
-        """Tell whether a pose can be reached, or joints lie within their limits."""
+        """Return whether a pose can be reached, or joint positions lie within their limits."""
         if is_pose(pose):
             return self._solve(pose, qNear, 'active_tcp') is not None
         limits = self._controller.arm.model.position_limits

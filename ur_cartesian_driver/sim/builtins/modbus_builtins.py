@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Modbus signals of a program: memory in the place of devices.
+Modbus signals of programs: they are kept in memory, without any devices.
 
-Each device answers and does nothing: inputs stay 0, outputs keep what was written. So a program
-runs as far as it does not wait for its machine.
+Each device seems to answer but does nothing: inputs stay 0, outputs keep the values that were
+written. A program therefore runs until it waits for its machine.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
 
-#: By the number of a type: what a signal reads at first, and whether it is an output.
+#: Initial value of a signal, and whether it is an output, by the number of its type.
 SIGNAL_TYPES = ((False, False), (False, True), (0, False), (0, True))
 MAX_REGISTERS = 123
 
@@ -30,10 +30,10 @@ class _Signal:
 
 
 class ModbusBuiltins(BuiltinGroup):
-    """Signals live until they are deleted, also beyond their program."""
+    """Signals exist until they are deleted, even after their program has ended."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin without signals, as without an installation."""
+        """Begin without signals, like a robot whose installation has none."""
         super().__init__(controller)
         self._signals: dict[str, _Signal] = {}
 
@@ -56,9 +56,10 @@ class ModbusBuiltins(BuiltinGroup):
         register_count: Value = 1,
     ) -> None:
         """
-        Add or replace a signal: 0, 1 = digital input, output; 2, 3 = register read, written.
+        Add or replace a signal.
 
-        :param register_count: with more than one its value is a list.
+        :param signal_type: 0, 1 = digital input, output; 2, 3 = input register, output register.
+        :param register_count: with more than one register, the value of the signal is a list.
         """
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
@@ -91,25 +92,25 @@ class ModbusBuiltins(BuiltinGroup):
         self._signals[text(signal_name, 'signal_name')] = signal
 
     def modbus_delete_signal(self, signal_name: Value) -> None:
-        """Delete a signal; a name that is not known is no error."""
+        """Delete a signal; an unknown name is no error."""
         self._signals.pop(text(signal_name, 'signal_name'), None)
 
     def modbus_get_signal_status(
         self, signal_name: Value, is_secondary_program: Value = False
     ) -> Value:
-        """Return a bool, a register, or a list of registers."""
+        """Return the value of a signal: a bool, a register, or a list of registers."""
         value = self._signal(signal_name).value
         return value[:] if type(value) is list else value
 
     def modbus_get_error(self, signal_name: Value) -> int:
-        """Return 0: the device answers."""
+        """Return 0 = no error: the device seems to answer."""
         self._signal(signal_name)
         return 0
 
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write one register, or all of a signal that has several."""
+        """Write the register of a signal, or a list of all its registers."""
         signal = self._signal(signal_name)
         given = register_value if type(register_value) is list else [register_value]
         if len(given) != signal.registers_to_write:
@@ -134,7 +135,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_send_custom_command(
         self, IP: Value, slave_number: Value, function_code: Value, data: Value
     ) -> None:
-        """Send bytes to a device that does nothing."""
+        """Check the arguments; there is no device that could receive the bytes."""
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
         index(function_code, 'function_code', 256)
@@ -142,21 +143,21 @@ class ModbusBuiltins(BuiltinGroup):
             raise RuntimeException(f'Type error: data must be a list, not a {type_name(data)}')
 
     def modbus_set_digital_input_action(self, signal_name: Value, action: Value) -> None:
-        """Choose what an input does besides being read."""
+        """Assign an action to an input."""
         self._signal(signal_name)
         text(action, 'action')
 
     def modbus_set_runstate_dependent_choice(
         self, signal_name: Value, runstate_choice: Value
     ) -> None:
-        """Tie an output to the state of programs."""
+        """Tie an output to the program state."""
         self._signal(signal_name)
         one_of(runstate_choice, 'runstate_choice', (0, 1, 2, 3))
 
     def modbus_set_signal_update_frequency(
         self, signal_name: Value, update_frequency: Value
     ) -> None:
-        """Choose how often the device is asked [Hz]."""
+        """Set the rate at which a device would be polled [Hz]."""
         self._signal(signal_name)
         not_negative(update_frequency, 'update_frequency')
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program that move the arm; `motion_ownership` says which thread may."""
+"""Script functions that move the arm; `motion_ownership` decides which thread can call them."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from ur_cartesian_driver.urscript.script_values import Value
 
 
 class MotionBuiltins(BuiltinGroup):
-    """Moves with an end, streams of set-points, stops."""
+    """Moves to a waypoint, streams of set-points, and stops."""
 
     @property
     def _motion(self) -> MotionGenerator:
         return self._controller.motion
 
     def _take(self, waypoint: Pose | None = None) -> None:
-        """Take the motion, which leads to a waypoint unless it is a stream of set-points."""
+        """Take ownership of the motion; a stream of set-points has no waypoint."""
         freedrive = self._controller.freedrive
         if freedrive is not FreedriveState.OFF:
             raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')
@@ -49,12 +49,12 @@ class MotionBuiltins(BuiltinGroup):
     def _run(
         self, call: Callable[[], Move], waypoint: Pose | None = None, abortable: bool = False
     ) -> Steps:
-        """Take the motion, call the motion generator, and wait until the call may return."""
+        """Take ownership, call the motion generator, and wait until the call can return."""
         self._take(waypoint)
         yield from self._controller.ownership.run(call, abortable)
 
     def _stop(self, call: Callable[[], Move]) -> Steps:
-        """Take the motion and stop, which is possible in freedrive, too."""
+        """Take ownership and stop; unlike a move, a stop is possible in freedrive."""
         self._controller.ownership.take(self._controller.programs.current_thread)
         yield from self._controller.ownership.run(call)
 
@@ -72,7 +72,7 @@ class MotionBuiltins(BuiltinGroup):
         t: Value = 0,
         r: Value = 0,
     ) -> Steps:
-        """Move straight in joint space; for a pose, to the solution nearest to the present one."""
+        """Move straight in joint space; for a pose, to its solution nearest the present joints."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
@@ -85,7 +85,7 @@ class MotionBuiltins(BuiltinGroup):
     def movel(
         self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
     ) -> Steps:
-        """Move straight in space; for joints, to the pose that they reach."""
+        """Move the tool straight; for joint positions, to the TCP pose at them."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
@@ -94,7 +94,7 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def movep(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
-        """Move straight at constant speed, corners rounded by arcs."""
+        """Move the tool straight at constant speed, with corners rounded by arcs."""
         a_, v_, _ = _limits(a, v, 0)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
@@ -109,7 +109,7 @@ class MotionBuiltins(BuiltinGroup):
         r: Value = 0,
         mode: Value = 0,
     ) -> Steps:
-        """Move on the circle through two more points."""
+        """Move on a circular arc through `pose_via` to `pose_to`."""
         a_, v_, _ = _limits(a, v, 0)
         radius, mode_ = not_negative(r, 'r'), one_of(mode, 'mode', (0, 1))
         via, to = self._pose(pose_via, 'pose_via'), self._pose(pose_to, 'pose_to')
@@ -124,7 +124,7 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
-        """Move straight in space with limited jerk, at fractions of the joints' limits."""
+        """Move the tool straight with limited jerk, at fractions of the joints' limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
         yield from self._run(lambda: self._motion.optimovel(target, a_, v_, radius), target)
@@ -149,9 +149,9 @@ class MotionBuiltins(BuiltinGroup):
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
-        Move as by `movep`: what else "servo circular" of the manual does is not published.
+        Move like `movep`; how "servo circular" of the manual differs from it is not published.
 
-        It takes a cycle even at its target, because programs call it in a loop with nothing else.
+        A call at its target takes a cycle, too: programs call it in a loop without another wait.
         """
         passed = False
         for _ in self.movep(pose, a, v, r):
@@ -161,12 +161,12 @@ class MotionBuiltins(BuiltinGroup):
             yield
 
     def speedj(self, qd: Value, a: Value, t: Value = None) -> Steps:
-        """Go to joint speeds; return after a time, or when they are reached."""
+        """Change to joint speeds; return after `t`, or without it when the speeds are reached."""
         target, acceleration, time = six(qd, 'qd'), positive(a, 'a'), _duration(t)
         yield from self._run(lambda: self._motion.speedj(target, acceleration, time))
 
     def speedl(self, xd: Value, a: Value, t: Value = None, aRot: Value = 'a') -> Steps:
-        """Go to a speed of the tool; return after a time, or when it is reached."""
+        """Change to a tool speed; return after `t`, or without it when the speed is reached."""
         twist, acceleration, time = six(xd, 'xd'), positive(a, 'a'), _duration(t)
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         yield from self._run(
@@ -179,7 +179,7 @@ class MotionBuiltins(BuiltinGroup):
         yield from self._stop(lambda: self._motion.stopj(acceleration))
 
     def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
-        """Brake the tool on its tangent; return at rest."""
+        """Brake the tool along its tangent; return at rest."""
         acceleration = positive(a, 'a')
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         yield from self._stop(lambda: self._motion.stopl(acceleration, angular_acceleration))
@@ -191,35 +191,35 @@ class MotionBuiltins(BuiltinGroup):
         viscous_scale: Value = None,
         coulomb_scale: Value = None,
     ) -> Steps:
-        """Take a cycle and check the torques; a robot without dynamics does not move by them."""
+        """Check the torques and wait a cycle; without dynamics, torques do not move the arm."""
         six(torque, 'torque')
         self._take()
         yield
 
     def is_steady(self) -> bool:
-        """Tell whether the arm has stood for half a second."""
+        """Return whether the arm has stood still for half a second."""
         return self._motion.steady
 
 
 class ModeBuiltins(BuiltinGroup):
-    """Freedrive, a state only; force mode and tool contact."""
+    """Freedrive (as a state only), force mode and tool contact."""
 
     def freedrive_mode(self, freeAxes: Value = None, feature: Value = None) -> None:
-        """Let the arm be moved by hand."""
+        """Enter freedrive, in which a person can move the arm by hand."""
         if freeAxes is not None:
             six(freeAxes, 'freeAxes')
         self._controller.freedrive = FreedriveState.FREEDRIVE
 
     def end_freedrive_mode(self) -> None:
-        """End it; harmless when there is none."""
+        """Leave freedrive or teach mode; harmless if the arm is in neither."""
         self._controller.freedrive = FreedriveState.OFF
 
     def get_freedrive_status(self) -> int:
-        """Return 0, normal operation: no one pushes the arm near a singularity."""
+        """Return 0 = normal operation: the arm is never pushed near a singularity here."""
         return 0
 
     def teach_mode(self) -> None:
-        """Let the arm be moved by hand."""
+        """Enter teach mode, in which a person can move the arm by hand."""
         self._controller.freedrive = FreedriveState.TEACH
 
     end_teach_mode = end_freedrive_mode
@@ -227,7 +227,7 @@ class ModeBuiltins(BuiltinGroup):
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value
     ) -> None:
-        """Enter force mode, or change it; all types are taken for 2, a frame that stays."""
+        """Enter or change force mode; every type is treated as 2, a frame that does not move."""
         frame = pose(task_frame, 'task_frame')
         compliant = tuple(flag != 0.0 for flag in six(selection_vector, 'selection_vector'))
         one_of(type, 'type', (1, 2, 3))
@@ -243,21 +243,21 @@ class ModeBuiltins(BuiltinGroup):
         self._controller.contact.force_mode = None
 
     def force_mode_set_damping(self, damping: Value) -> None:
-        """Accept 0..1; the law here has no damping."""
+        """Accept a damping of 0..1, without effect: the simulated law has no damping."""
         within(damping, 'damping', 0, 1)
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
-        """Scale how fast compliant axes give way, 0..2."""
+        """Scale the speed of compliant axes per missing force by 0..2."""
         self._controller.contact.gain_scaling = within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
-        """Return how many steps ago the tool was not in contact; 0 = it is in none."""
+        """Return the number of cycles since the tool was last free of contact; 0 = no contact."""
         wanted = ZERO6 if direction is None else six(direction, 'direction')
         return min(self._controller.contact.steps_back(wanted[:3]), MAX_HISTORY - 1)
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
-    """Return acceleration, speed and time; a time makes the first two irrelevant."""
+    """Return acceleration, speed and time; with a time, the first two only shape its ramps."""
     time = not_negative(t, 't')
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arithmetic on poses: rotation vectors for programs, quaternions inside."""
+"""Arithmetic on poses: programs see rotation vectors, the computation uses quaternions."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _invert_matrix = core_builtins()['inv']
 
 
 class PoseBuiltins(BuiltinGroup):
-    """Functions that need nothing but their arguments."""
+    """Functions that depend only on their arguments."""
 
     def pose_trans(self, p_from: Value, p_from_to: Value) -> ScriptPose:
         """Return the composition T1 T2."""
         return script_pose(pose(p_from, 'p_from') @ pose(p_from_to, 'p_from_to'))
 
     def pose_inv(self, p_from: Value) -> ScriptPose:
-        """Return the inverse."""
+        """Return the inverse of a pose."""
         return script_pose(pose(p_from, 'p_from').inverse())
 
     def inv(self, m: Value) -> Value:
@@ -59,7 +59,7 @@ class PoseBuiltins(BuiltinGroup):
         return script_pose(Pose(subtract(to.position, start.position), rotation))
 
     def pose_dist(self, pose_from: Value, pose_to: Value) -> float:
-        """Return the length of `pose_sub` as six numbers."""
+        """Return the norm of the six numbers of `pose_sub`."""
         return dist(self.pose_sub(pose_to, pose_from), (0.0,) * 6)
 
     def point_dist(self, p_from: Value, p_to: Value) -> float:
@@ -67,7 +67,7 @@ class PoseBuiltins(BuiltinGroup):
         return pose(p_from, 'p_from').distance_to(pose(p_to, 'p_to'))
 
     def interpolate_pose(self, p_from: Value, p_to: Value, alpha: Value) -> ScriptPose:
-        """Return the pose at a fraction of the path; fractions outside 0..1 extrapolate."""
+        """Return the pose at a fraction of the way; fractions outside 0..1 extrapolate."""
         start, to = pose(p_from, 'p_from'), pose(p_to, 'p_to')
         return script_pose(start.interpolate(to, number(alpha, 'alpha')))
 
@@ -75,7 +75,7 @@ class PoseBuiltins(BuiltinGroup):
         """Return roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll) [rad]."""
         vector = three(rotation_vector, 'rotation_vector')
         r = rotation_from_quaternion(quaternion_from_rotation_vector(vector))
-        if abs(r[6]) > 1.0 - 1e-12:  # gimbal lock: roll and yaw turn about one axis, yaw does all
+        if abs(r[6]) > 1.0 - 1e-12:  # gimbal lock: roll and yaw share an axis, so roll = 0
             return [0.0, -asin(max(-1.0, min(1.0, r[6]))), atan2(-r[1], r[4])]
         return [atan2(r[7], r[8]), -asin(r[6]), atan2(r[3], r[0])]
 
@@ -86,7 +86,7 @@ class PoseBuiltins(BuiltinGroup):
         return list(rotation_vector_from_quaternion(rotation))
 
     def wrench_trans(self, T_from_to: Value, w_from: Value) -> list[float]:
-        """Return a wrench, given in one frame, in the axes and about the origin of another."""
+        """Return a wrench given in one frame, expressed in the axes and origin of another."""
         to_from = pose(T_from_to, 'T_from_to').inverse()
         fx, fy, fz, tx, ty, tz = six(w_from, 'w_from')
         turn = Pose((0.0, 0.0, 0.0), to_from.quaternion)

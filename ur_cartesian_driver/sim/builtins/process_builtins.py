@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions around a process: path offset, screws, force limits, reaction to error codes.
+Functions for processes: path offset, screws, force limits, reaction to error codes.
 
-Arguments are checked as on the robot. An arm without dynamics has no wrench to limit and no torque
-to hold with, so those functions have no effect. The path offset moves the target
+Arguments are checked as on the robot. The functions for screws, forces and torques have no effect,
+because the arm has no dynamics. The path offset displaces the target
 (:mod:`~ur_cartesian_driver.sim.motion.controller_offset`); it ends with the program.
 """
 
@@ -28,18 +28,18 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
 
 class PathOffsetBuiltins(BuiltinGroup):
-    """A Cartesian offset on top of the moves."""
+    """A Cartesian offset that is added to the moves."""
 
     @property
     def _offset(self) -> ControllerPathOffset:
         return self._controller.motion.path_offset
 
     def path_offset_enable(self) -> None:
-        """Begin; limits and filter stay as they are."""
+        """Enable the path offset; limits and filter keep their values."""
         self._offset.enabled = True
 
     def path_offset_disable(self, a: Value = 20) -> Steps:
-        """End, and brake in joint space; return at rest."""
+        """Disable the path offset and brake in joint space; return at rest."""
         acceleration, controller = positive(a, 'a'), self._controller
         controller.ownership.take(controller.programs.current_thread)
         yield from controller.ownership.run(
@@ -47,14 +47,14 @@ class PathOffsetBuiltins(BuiltinGroup):
         )
 
     def path_offset_set(self, offset: Value, type: Value) -> None:
-        """Set the offset in a frame, cut to the limits along and about each axis."""
+        """Set the offset in a frame, clamped to the limits along and about each axis."""
         frame, wanted = _frame(type), six(offset, 'offset')
         if not self._offset.enabled:
             raise RuntimeException('path_offset_set needs path_offset_enable before it.')
         self._offset.set(frame, wanted)
 
     def path_offset_get(self, type: Value) -> ScriptPose:
-        """Return the offset that is applied now, in a frame."""
+        """Return the currently applied offset, expressed in a frame."""
         return ScriptPose(*self._offset.applied(_frame(type)))
 
     def path_offset_set_alpha_filter(self, alpha: Value) -> None:
@@ -72,15 +72,15 @@ def _frame(type: Value) -> int:
 
 
 class ProcessBuiltins(BuiltinGroup):
-    """Screws, forces and torques have no effect; the reaction to error codes is real."""
+    """Screws, forces and torques are only checked; the reaction to error codes takes effect."""
 
     def screw_driving(self, f: Value, v_limit: Value) -> None:
-        """Push along the tool's z axis with a force [N], at most at a speed [m/s]."""
+        """Check the force along the tool's z axis [N] and the speed limit [m/s]."""
         number(f, 'f')
         not_negative(v_limit, 'v_limit')
 
     def end_screw_driving(self) -> None:
-        """End it; harmless when it has not begun."""
+        """End screw driving; harmless if it has not begun."""
 
     def tool_wrench_limit_set(
         self,
@@ -92,7 +92,7 @@ class ProcessBuiltins(BuiltinGroup):
         My: Value = None,
         Mz: Value = None,
     ) -> None:
-        """Limit forces [N] and torques [Nm] of acceleration in a frame of the flange."""
+        """Check limits of forces [N] and torques [Nm] due to acceleration, in a flange frame."""
         pose(frame_offset, 'frame_offset')
         names = ('Fx', 'Fy', 'Fz', 'Mx', 'My', 'Mz')
         given = zip(names, (Fx, Fy, Fz, Mx, My, Mz), strict=True)
@@ -104,17 +104,17 @@ class ProcessBuiltins(BuiltinGroup):
         """Remove the limits."""
 
     def high_holding_torque_enable(self) -> None:
-        """Hold a standing arm with more torque, as is the default."""
+        """Hold an arm at rest with more torque, which is the default."""
 
     def high_holding_torque_disable(self) -> None:
-        """Hold a standing arm with its normal torque, until the program ends."""
+        """Hold an arm at rest with normal torque until the program ends."""
 
     def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:
-        """Accept a threshold within 0..1; target and actual position are one here."""
+        """Accept a threshold within 0..1; deviations never cause a warning here."""
         within(threshold, 'threshold', 0, 1)
 
     def pause_on_error_code(self, code: Value, argument: Value = None) -> None:
-        """Pause the program when an error code occurs; without an argument, with any."""
+        """Pause the program when an error code occurs; None = with any argument."""
         self._controller.process.pause_on.add(
             (whole(code, 'code'), None if argument is None else whole(argument, 'argument'))
         )

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program on time, the robot's state, and the pendant."""
+"""Script functions for time, the robot's state, and the pendant."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, V
 
 
 class TimeBuiltins(BuiltinGroup):
-    """Time and functions that take time; the speed slider scales neither."""
+    """Time, and functions that take time; the speed slider does not scale them."""
 
     def get_steptime(self) -> float:
-        """Return the cycle [s]."""
+        """Return the duration of a cycle [s]."""
         return self._controller.cycle
 
     def sync(self) -> Steps:
-        """Use up the rest of the frame."""
+        """Wait for the next cycle."""
         yield
 
     def sleep(self, t: Value) -> Steps:
-        """Wait for a time [s], whole frames, at least one."""
+        """Wait for a time [s], rounded up to whole cycles, at least one."""
         end = self._controller.time + not_negative(t, 't')
         yield
         while self._controller.time < end - 1e-9:
@@ -49,7 +49,7 @@ class TimeBuiltins(BuiltinGroup):
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
-        """Execute what clients of the interpreter port send, until the mode is ended."""
+        """Execute the statements of clients of the interpreter port, until the mode ends."""
         yield from self._controller.interpreter_mode.run(
             clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
         )
@@ -59,13 +59,13 @@ class TimeBuiltins(BuiltinGroup):
         self._controller.interpreter_mode.end()
 
     def clear_interpreter(self) -> None:
-        """Delete what statements have defined, after the one that is being executed."""
+        """Delete the statements' definitions, after the statement that is being executed."""
         self._controller.interpreter_mode.clear()
 
     def rtde_set_watchdog(
         self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
     ) -> None:
-        """Watch that an input is written often enough; the watch ends with the program."""
+        """Check until the program ends that an RTDE input is written often enough."""
         self._controller.watch_input(
             text(variable_name, 'variable_name'),
             not_negative(min_frequency, 'min_frequency'),
@@ -77,7 +77,7 @@ class PendantBuiltins(BuiltinGroup):
     """Messages and popups."""
 
     def textmsg(self, s1: Value, s2: Value = '') -> None:
-        """Write to the log and send to all clients of the primary interface."""
+        """Write a text to the log and send it to all clients of the primary interface."""
         self._controller.messages.text(to_text(s1) + to_text(s2))
 
     def popup(
@@ -88,7 +88,7 @@ class PendantBuiltins(BuiltinGroup):
         error: Value = False,
         blocking: Value = False,
     ) -> Steps:
-        """Show a window; a blocking one holds its thread until it is closed."""
+        """Show a window; a blocking window holds its thread until the window is closed."""
         popup = Popup(
             text=to_text(s),
             title=to_text(title),
@@ -104,7 +104,7 @@ class PendantBuiltins(BuiltinGroup):
 def _list_of(
     values: Callable[[Controller], tuple[float, ...]],
 ) -> Callable[[BuiltinGroup], list[float]]:
-    """Return the function of a program that returns numbers of the controller as a list."""
+    """Return the script function that returns numbers of the controller as a list."""
 
     def get(group: BuiltinGroup) -> list[float]:
         return list(values(group._controller))
@@ -113,7 +113,7 @@ def _list_of(
 
 
 class RobotBuiltins(BuiltinGroup):
-    """The robot's measurements [rad, m, s and their derivatives], and its payload."""
+    """The robot's motion [rad, m and their derivatives], its sensors, payload and power."""
 
     get_target_joint_positions = _list_of(lambda c: c.target.q)
     get_joint_positions = get_target_joint_positions  # the old name
@@ -128,7 +128,7 @@ class RobotBuiltins(BuiltinGroup):
     get_joint_torques = _list_of(lambda _: (0.0,) * 6)
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
-        """Return the actual positions some cycles ago [rad]."""
+        """Return the actual joint positions of this many cycles ago [rad]."""
         return list(self._controller.joint_history(whole(steps, 'steps')))
 
     def force(self) -> float:
@@ -141,19 +141,19 @@ class RobotBuiltins(BuiltinGroup):
         return 25.0
 
     def get_controller_temp(self) -> float:
-        """Return room temperature."""
+        """Return room temperature [°C]."""
         return 25.0
 
     def get_tool_current(self) -> float:
-        """Return the current of the tool [A], which has none."""
+        """Return 0: no current of the tool is simulated [A]."""
         return 0.0
 
     def get_tool_accelerometer_reading(self) -> list[float]:
-        """Return what a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
+        """Return the acceleration at the flange including gravity, in flange axes [m/s^2]."""
         return list(self._controller.tool_accelerometer)
 
     def zero_ftsensor(self) -> None:
-        """Let the sensor read zero as it is."""
+        """Zero the force sensor at its present reading."""
         self._controller.contact.zero()
 
     def ft_rtde_input_enable(
@@ -186,7 +186,7 @@ class RobotBuiltins(BuiltinGroup):
     def set_target_payload(
         self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
     ) -> None:
-        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], at once."""
+        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], without a transition."""
         not_negative(transition_time, 'transition_time')
         matrix = (0.0,) * 6 if inertia is None else six(inertia, 'inertia')
         if min(matrix[:3]) < 0.0 or max(abs(item) for item in matrix) > 133.0:
@@ -198,25 +198,25 @@ class RobotBuiltins(BuiltinGroup):
         )
 
     def get_target_payload(self) -> float:
-        """Return the mass [kg]."""
+        """Return the mass of the payload [kg]."""
         return self._controller.payload.mass
 
     get_target_payload_cog = _list_of(lambda c: c.payload.cog)
     get_target_payload_inertia = _list_of(lambda c: c.payload.inertia)
 
     def set_gravity(self, d: Value) -> None:
-        """Set the direction away from the earth [m/s^2]."""
+        """Set the acceleration that counters gravity, in the base [m/s^2]."""
         self._controller.gravity = three(d, 'd')
 
     def set_pos(self, q: Value) -> None:
-        """Put the arm at joint positions, which only a simulated arm can do."""
+        """Put the arm at joint positions at once, as only a simulated arm can."""
         self._controller.motion.teleport(six(q, 'q'))
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """
-        Reset the turns of joints without limits.
+        Reset the full turns of joints without limits.
 
-        :param qNear: the position becomes the one nearest to these joints; None = no change.
+        :param qNear: they become the equivalent positions nearest to these; None = no change.
         """
         if qNear is None:
             return

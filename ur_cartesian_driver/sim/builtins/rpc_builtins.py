@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Remote procedure calls of a program: XML-RPC over its sockets.
+Remote procedure calls of programs: XML-RPC over the sockets of programs.
 
-A pose travels as a struct with the members x, y, z, rx, ry and rz, as the manufacturer's examples
-of servers expect. Each call has a connection of its own; the program waits for its answer, however
-long that takes. A call that fails ends the program.
+A pose is sent as a struct with the members x, y, z, rx, ry and rz, as the manufacturer's example
+servers expect. Each call opens its own connection; the program waits for the answer without a time
+limit. A call that fails ends the program.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ MAX_ANSWER = 1024 * 1024
 
 
 class RpcBuiltins(BuiltinGroup):
-    """The factory; a program calls methods of the object that it returns."""
+    """The factory of remote objects, whose methods a program calls."""
 
     def rpc_factory(self, type: Value, url: Value) -> RemoteObject:
-        """Return the procedures of a server; nothing is sent before the first call."""
+        """Return an object with a server's procedures; nothing is sent before the first call."""
         if text(type, 'type').lower() != 'xmlrpc':
             raise RuntimeException(f'type is {type!r}; it must be "xmlrpc"')
         return RemoteProcedures(self._controller, text(url, 'url'))
@@ -54,7 +54,7 @@ class RemoteProcedures(RemoteObject):
         """
         Take the address of the server.
 
-        :raises RuntimeException: it is no address of HTTP.
+        :raises RuntimeException: the URL is not an HTTP address.
         """
         try:
             parts = urlsplit(url)
@@ -86,7 +86,7 @@ class RemoteProcedures(RemoteObject):
         """Send a request; return the body of the answer."""
         sockets, controller = self._controller.sockets, self._controller
         self._calls += 1
-        name = f'\0{id(self)} {self._calls}'  # no name of a program's own sockets
+        name = f'\0{id(self)} {self._calls}'  # cannot clash with a program's sockets
         sockets.open(name, self._host, self._port)
         try:
             deadline = controller.time + CONNECT_TIMEOUT
@@ -112,7 +112,7 @@ class RemoteProcedures(RemoteObject):
             sockets.close(name)
 
     def _body(self, method: str, received: bytes, closed: bool) -> bytes | None:
-        """Return the body of an answer of HTTP; None where it has not arrived."""
+        """Return the body of an HTTP answer; None = it has not fully arrived."""
         head, separator, body = received.partition(b'\r\n\r\n')
         if len(received) > MAX_ANSWER:
             raise self._failure(method, 'the answer is longer than 1 MiB')

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions of a program on sockets.
+The socket functions of URScript programs.
 
-A timeout of zero or less waits for ever, so a connection closed by its peer ends a read at once,
-with the result of a timeout. An incomplete value stays in the buffer.
+A timeout of zero or less is no time limit. If the peer has closed the connection, a read ends at
+once with the same result as after a timeout. An incomplete value stays in the buffer.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import to_text, Value
 
 CONNECT_TIMEOUT = 2.0
-#: Reads of a socket within a cycle; the next one waits. A peer that writes without a pause is held
-#: back by that and by TCP, and the program gets on with its other work. How many a real
-#: controller does is not published.
+#: Most reads of one socket in a cycle; the next read waits for the next cycle. This bound and TCP
+#: hold back a peer that writes without a pause, so that the program can do its other work. The
+#: bound of a real controller is not published.
 READS_PER_CYCLE = 32
-#: Values in one read of numbers, and characters in one string.
+#: Most values in one read of numbers, and most characters in one string.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 
 T = TypeVar('T')
 
 
 class SocketBuiltins(BuiltinGroup):
-    """They wait on the controller's clock, so they also work on the virtual clock."""
+    """Functions that wait on the controller's clock, so they also work on the virtual clock."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin without reads."""
         super().__init__(controller)
-        #: Socket name -> the cycle of its last read, and the reads in it.
+        #: Socket name -> the cycle of its last read, and the number of reads in that cycle.
         self._reads: dict[str, tuple[int, int]] = {}
 
     @property
@@ -63,13 +63,13 @@ class SocketBuiltins(BuiltinGroup):
         return self._sockets.state(name) is SocketState.OPEN
 
     def socket_close(self, socket_name: Value = 'socket_0') -> None:
-        """Close; a name that is not open is no error."""
+        """Close a socket; a name that is not open is no error."""
         self._sockets.close(text(socket_name, 'socket_name'))
 
     def _wait(
         self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
     ) -> Generator[None, None, T | None]:
-        """Return what `take` finds in the received bytes; None after a timeout or a close."""
+        """Return the result of `take` on the received bytes; None after a timeout or a close."""
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
@@ -84,7 +84,7 @@ class SocketBuiltins(BuiltinGroup):
             yield
 
     def _has_read_enough(self, name: str) -> bool:
-        """Count a read; tell whether it has to wait for the next cycle."""
+        """Count a read; return whether it has to wait for the next cycle."""
         now = self._controller.cycles
         cycle, reads = self._reads.get(name, (now, 0))
         reads = reads + 1 if cycle == now else 1
@@ -132,7 +132,7 @@ class SocketBuiltins(BuiltinGroup):
         interpret_escape: Value = False,
         timeout: Value = 2,
     ) -> Generator[None, None, str]:
-        """Read all received text, or the part between a prefix and a suffix; '' for a timeout."""
+        """Read all text received, or the part between prefix and suffix; '' after a timeout."""
         before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
         data = yield from self._wait(socket_name, timeout, _between(before, after))
         return '' if data is None else data.decode('latin-1')
@@ -140,14 +140,14 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_line(
         self, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, str]:
-        """Read up to the end of the line; the result is without it."""
+        """Read one line; return it without its line end, or '' after a timeout."""
         data = yield from self._wait(socket_name, timeout, _through(b'\n'))
         return '' if data is None else data.decode('latin-1').rstrip('\r\n')
 
     def socket_get_var(
         self, name: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, int]:
-        """Ask for a variable by `GET name`, expect `name value`; 0 for a timeout."""
+        """Send `GET name`; return the value in the answer `name value`, 0 after a timeout."""
         self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
         answer = yield from self.socket_read_line(socket_name)
         try:

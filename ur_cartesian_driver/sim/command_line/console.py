@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A command in a shell: signals end it like Ctrl-C, and errors are one sentence."""
+"""Runs a command in a shell: signals end it like Ctrl-C, and each error is one sentence."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from types import FrameType
 
 from ur_cartesian_driver.motion.errors import DriverError
 
-#: The exit status of a command that a signal ended, less the signal's number, as in a shell.
+#: Plus the number of a signal: the exit status of a command that the signal ended, as in a shell.
 SIGNAL_STATUS = 128
 
 
@@ -50,7 +50,7 @@ def _end(number: int, _frame: FrameType | None) -> None:
 
 
 def _discard_unwritten_output() -> None:
-    """Forget what cannot be written; Python would try again when it exits."""
+    """Discard output that cannot be written; otherwise Python would try again when it exits."""
     try:
         sys.stdout.flush()
     except OSError:

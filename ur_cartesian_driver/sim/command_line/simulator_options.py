@@ -115,7 +115,7 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def take_negative_numbers(command: argparse.ArgumentParser) -> None:
-    """Let six numbers that begin with a minus be a value; argparse has no public option."""
+    """Accept numbers that begin with a minus as a value; argparse has no public option for it."""
     command._negative_number_matcher = _NUMBERS
 
 
@@ -152,7 +152,7 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
 
 
 def fault(text: str) -> Fault:
-    """Return a fault of the simulator, and when it happens."""
+    """Return a fault of the simulator, with its trigger."""
     return parsed(parse_fault, text)
 
 
@@ -169,7 +169,7 @@ def port_number(text: str) -> int:
 
 
 def parsed(parse: Callable[[str], T], text: str) -> T:
-    """Let argparse print the reason that a parser gives."""
+    """Return the parsed text; if the parser refuses it, argparse prints the reason."""
     try:
         return parse(text)
     except ValueError as error:
@@ -180,7 +180,7 @@ def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
     """
     Return six numbers separated by commas.
 
-    :param bounds: of the first three, and of the last three.
+    :param bounds: largest magnitudes of the first three numbers, and of the last three.
     """
     try:
         numbers = tuple(float(part) for part in text.split(','))
@@ -190,6 +190,6 @@ def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
         raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
     for i, number in enumerate(numbers):
         bound = bounds[i // 3]
-        if not abs(number) <= bound:  # NaN neither
+        if not abs(number) <= bound:  # refuses NaN, too
             raise argparse.ArgumentTypeError(f'{number:g} is not within {-bound:g} and {bound:g}')
     return numbers

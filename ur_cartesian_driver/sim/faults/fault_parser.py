@@ -42,7 +42,7 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     ThrottleFault,
 )
 
-# A number and the unit right behind it, such as 2s, are two words.
+# A number and the unit directly after it, such as 2s, are two words.
 _WORD = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[A-Za-z_]\w*|=|\S+?(?=\s|$)')
 _END = 'the end'
 
@@ -63,14 +63,14 @@ class _WordReader:
         return word
 
     def skip(self, word: str) -> bool:
-        """Take a word if it is the next one."""
+        """Take the next word if it is this one; return whether it is."""
         if self.peek() != word:
             return False
         self.take()
         return True
 
     def wrong(self, expected: str, word: str | None = None) -> ValueError:
-        """Return the error for the next word, or for one that was taken."""
+        """Return the error for the next word, or for a word that was taken already."""
         word = self.peek() if word is None else word
         return ValueError(
             f'The fault {self._text!r} is not understood at {word!r}; expected {expected}.'
@@ -129,7 +129,7 @@ _DEVIATION: dict[str, Reader] = {
     'amount': _number('an amount'),
 }
 
-#: The first word of a fault: its class, and how the following words are read into its fields.
+#: First word of a fault -> its class, and the readers of its fields from the following words.
 _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
     {
         **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},

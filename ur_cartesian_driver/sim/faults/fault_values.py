@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The faults of the simulated robot: each is a value with its effect and its time.
+The faults of the simulated robot: each is a value with its effect and its trigger.
 
-`fault_parser` reads faults from text; `injector` lets them happen.
+`fault_parser` reads faults from text; `injector` makes them happen.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ DeviationShape: TypeAlias = Literal['offset', 'ramp', 'noise']
 DEVIATION_AXES: tuple[DeviationAxis, ...] = get_args(DeviationAxis)
 DEVIATION_QUANTITIES: tuple[DeviationQuantity, ...] = get_args(DeviationQuantity)
 DEVIATION_SHAPES: tuple[DeviationShape, ...] = get_args(DeviationShape)
-#: Random bytes that a robot sends if nothing else is asked for.
+#: Number of random bytes that the robot sends if no other number is given.
 GARBAGE_SIZE = 64
 
 
-# --- When ------------------------------------------------------------------------------------
+# --- Triggers --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class AfterTime:
-    """A time after the fault was set, on the controller's clock [s]."""
+    """A time has passed on the controller's clock since the fault was set [s]."""
 
     seconds: float = 0.0
 
@@ -54,7 +54,7 @@ FaultTrigger: TypeAlias = AfterTime | AfterDistance | PlaneCrossing
 IMMEDIATELY = AfterTime()
 
 
-# --- What ------------------------------------------------------------------------------------
+# --- Effects ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,12 +105,12 @@ class EventFault(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedSliderFault(Fault):
-    """Somebody moves the speed slider, 0..1."""
+    """The speed slider is moved to a fraction 0..1."""
 
     fraction: float
 
     def __post_init__(self) -> None:
-        """Reject a fraction that the slider does not have."""
+        """Reject a fraction outside the range of the slider."""
         if not 0.0 <= self.fraction <= 1.0:
             raise ValueError(f'The speed slider is set to {self.fraction:g}; use 0 to 1.')
 
@@ -120,11 +120,11 @@ class ForeignMotionFault(Fault):
     """Another client's program replaces the running one and moves the arm away."""
 
     axis: DeviationAxis
-    #: In base axes, from where the tool is [m or rad].
+    #: Distance from the present pose of the tool, in base axes [m or rad].
     distance: float
 
     def script(self) -> str:
-        """Return that program."""
+        """Return the program of the other client."""
         step = ', '.join(
             f'{self.distance:.9f}' if axis == self.axis else '0' for axis in DEVIATION_AXES
         )
@@ -146,7 +146,7 @@ class DeviationFault(Fault):
     seed: int = 0
 
     def value(self, elapsed: float, random: Random) -> float:
-        """Return the deviation so long after it began [s]."""
+        """Return the deviation ``elapsed`` seconds after its beginning."""
         if self.shape == 'noise':
             return random.gauss(0.0, self.amount)
         return self.amount * elapsed if self.shape == 'ramp' else self.amount
@@ -161,33 +161,33 @@ class DropFault(LastingInterfaceFault):
 
 
 class HalfOpenFault(InterfaceFault):
-    """The present connections stay open and dead, new ones work: as if a cable was cut."""
+    """The present connections stay open but dead, while new ones work, as if a cable was cut."""
 
 
 class SilenceFault(LastingInterfaceFault):
-    """The robot hears, but every message that it sends on an interface is lost."""
+    """The robot receives, but every message that it sends on an interface is lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayFault(LastingInterfaceFault):
-    """Everything on an interface takes longer [s], in each direction."""
+    """All data on an interface is delayed by a time [s], in each direction."""
 
     seconds: float
 
     def __post_init__(self) -> None:
-        """Reject a delay that is none."""
+        """Reject a delay of zero or less."""
         if self.seconds <= 0.0:
             raise ValueError(f'The delay is {self.seconds:g} s; use more than 0.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThrottleFault(LastingInterfaceFault):
-    """An interface carries no more than a rate [bytes/s], in each direction."""
+    """An interface carries at most a rate [bytes/s] in each direction."""
 
     rate: float
 
     def __post_init__(self) -> None:
-        """Reject a rate that carries nothing: that is another fault."""
+        """Reject a rate of zero or less: this would be the fault silence."""
         if self.rate <= 0.0:
             raise ValueError(
                 f'The rate is {self.rate:g} bytes/s; use more than 0, or the fault silence.'
@@ -202,7 +202,7 @@ class GarbageFault(InterfaceFault):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Reject a size that is nothing or too much for a connection."""
+        """Reject a size of zero or less, or too large for a connection."""
         if not 1 <= self.size <= 1_000_000:
             raise ValueError(f'The size of the garbage is {self.size} bytes; use 1 to 1000000.')
 

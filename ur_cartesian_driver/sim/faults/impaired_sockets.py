@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 
-#: Bytes that are held back; the rest stays in the kernel, and so with the peer.
+#: Most bytes that are held back here; further bytes stay in the kernel, and so with the peer.
 _MAX_INCOMING = 65_536
 
 
@@ -20,7 +20,7 @@ class ImpairedSockets:
     """
 
     def __init__(self, sockets: ScriptSockets) -> None:
-        """Wrap the sockets that connect."""
+        """Wrap the sockets that make the connections."""
         self._sockets = sockets
         self._impairment: Impairment | None = None
         self._now = 0.0
@@ -39,17 +39,17 @@ class ImpairedSockets:
         self._sockets.open(name, address, port)
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a name."""
+        """Return the state of a socket."""
         return self._sockets.state(name)
 
     def received(self, name: str) -> bytearray:
-        """Return what has arrived; delayed bytes come before newer ones."""
+        """Return the unread bytes; delayed bytes come before newer ones."""
         if name in self._impaired:
             return self._arrived[name]
         return self._sockets.received(name)
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send; bytes that a fault drops count as sent."""
+        """Send data; bytes that a fault drops are reported as sent."""
         if name not in self._impaired:
             return self._sockets.send(name, data)
         if self._sockets.state(name) is not SocketState.OPEN:
@@ -58,33 +58,33 @@ class ImpairedSockets:
         return True
 
     def close(self, name: str) -> None:
-        """Close one."""
+        """Close a socket."""
         self._names.discard(name)
         self._impaired.pop(name, None)
         self._arrived.pop(name, None)
         self._sockets.close(name)
 
     def close_all(self) -> None:
-        """Close all."""
+        """Close all sockets."""
         self._names.clear()
         self._impaired.clear()
         self._arrived.clear()
         self._sockets.close_all()
 
     def poll(self) -> None:
-        """Go on with connecting and sending."""
+        """Continue connecting and sending."""
         self._sockets.poll()
 
-    # As faults see it: an Impairable
+    # The interface for faults: an Impairable
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Impair all sockets from now on; None = no longer."""
+        """Impair all sockets from now on; None = end the impairment."""
         self._impairment, self._now = impairment, now
         for name in self._names:
             self._impair_socket(name)
 
     def pump(self, now: float) -> bool:
-        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
+        """Pass on the bytes that are due; return whether to call again in the next cycle."""
         self._now = now
         for name, impaired in tuple(self._impaired.items()):
             self._pump(name, impaired)

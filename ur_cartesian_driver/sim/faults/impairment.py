@@ -3,9 +3,9 @@
 """
 Impaired connections, without sockets or a clock: which bytes are held back, and until when.
 
-An impaired connection hands its bytes over in both directions, and asks once per cycle for those
-that are due; a sound one does without. Times are the controller's, so results are deterministic on
-the virtual clock.
+The server of an impaired connection hands the bytes of both directions over, and asks once per
+cycle for the bytes that are due; a sound connection is not handled here. Times are on the
+controller's clock, so results are deterministic on the virtual clock.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ class Impairment:
     drops_outgoing: bool = False
     #: New connections are closed at once.
     refuses_connections: bool = False
-    #: In each direction [s].
+    #: Delay in each direction [s].
     delay: float = 0.0
-    #: In each direction [bytes/s].
+    #: Bound on the rate in each direction [bytes/s].
     rate: float = inf
 
 
 class Impairable(Protocol):
-    """An interface with its connections, as faults see it."""
+    """The operations of faults on an interface and its connections."""
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Impair all connections from now on; None = no longer."""
+        """Impair all connections from now on; None = end the impairment."""
 
     def pump(self, now: float) -> bool:
-        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
+        """Pass on the bytes that are due; return whether to call again in the next cycle."""
 
     def drop(self) -> None:
         """Cut all connections."""
@@ -61,7 +61,7 @@ class DelayLine:
         self.size = 0
 
     def put(self, data: bytes, due: float) -> None:
-        """Hold a piece back until it is due; it arrives after all before it."""
+        """Hold a piece back until it is due; pieces arrive in the order of the calls."""
         self._pieces.append((due, data))
         self.size += len(data)
 
@@ -82,7 +82,7 @@ class DelayLine:
             self._budget -= len(part)
             arrived += part
         if not self._pieces or self._budget == inf:
-            self._budget = 0.0  # what was not used is gone
+            self._budget = 0.0  # an unused budget is not saved
         self.size -= len(arrived)
         return bytes(arrived)
 
@@ -94,7 +94,7 @@ class ImpairedConnection:
         """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
-        #: The delays of the client's bytes, and of the robot's.
+        #: The delay lines of the client's bytes, and of the robot's bytes.
         self.incoming, self.outgoing = DelayLine(now), DelayLine(now)
 
     @property
@@ -131,5 +131,5 @@ class ImpairedConnection:
         return 0.0 if self.impairment is None else self.impairment.delay
 
     def _release_terms(self, now: float) -> tuple[float, float]:
-        """Return until when pieces are due, and at which rate; at once when sound again."""
+        """Return the time up to which pieces are due and their rate; infinite when sound again."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Lets faults happen to the simulated robot when they are triggered.
+Makes faults happen to the simulated robot when they are triggered.
 
-:class:`FaultInjector` counts in the controller's cycles, so it is as deterministic as they are; it
-costs nothing while no fault is set.
+:class:`FaultInjector` counts the controller's cycles, so it is as deterministic as the controller;
+it costs nothing while no fault is set.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 _log = logging.getLogger(__name__)
 
-# Cycles are summed in floats.
+# Tolerance, because cycles are summed in floats.
 _ROUNDING = 1e-9
 
 
@@ -53,7 +53,7 @@ def _safety(event: SafetyEvent) -> Callable[[Controller], object]:
     return lambda controller: controller.safety_event(event)
 
 
-#: They return why they are refused, if they are.
+#: Event -> its action, which returns the reason if it is refused.
 _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType(
     {
         FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
@@ -74,25 +74,25 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType
 
 @dataclass(slots=True)
 class _PendingFault:
-    """A fault that has not happened yet, and what its trigger counts from."""
+    """A fault that has not happened yet, and the values from which its trigger counts."""
 
     fault: Fault
     set_at: float
     travelled: float
-    #: Whether the TCP was beyond the plane.
+    #: Whether the TCP was beyond the plane when the fault was set.
     side: bool
 
 
 @dataclass(slots=True)
 class _ActiveFault:
-    """A fault that lasts, since when, and its noise."""
+    """A fault that lasts, the time of its start, and the source of its noise."""
 
     fault: TimedFault
     since: float
     random: Random = field(default_factory=Random)
 
     def is_over(self, now: float) -> bool:
-        """Whether its time is up."""
+        """Return whether the duration of the fault has passed."""
         return now >= self.since + self.fault.duration - _ROUNDING
 
 
@@ -100,11 +100,11 @@ class FaultInjector:
     """The faults of one robot: those that wait for their trigger and those that last."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin with none."""
+        """Begin without faults."""
         self._controller = controller
         #: The interfaces that can be impaired, by their names in faults.
         self.interfaces: dict[str, Impairable] = {}
-        #: Whether there is anything to do in a cycle.
+        #: Whether `step` has to be called in each cycle.
         self.active = False
         self._pending: list[_PendingFault] = []
         self._active: list[_ActiveFault] = []
@@ -130,7 +130,7 @@ class FaultInjector:
         """
         Forget faults that have not happened, and end those that last.
 
-        What has happened stays: a stop, a dropped or half-open connection.
+        Effects that have happened remain: a stop, a dropped or half-open connection.
         """
         self._pending.clear()
         self._active.clear()
@@ -151,10 +151,10 @@ class FaultInjector:
                 del self._delayed_interfaces[name]
         self.active = bool(self._pending or self._active or self._delayed_interfaces)
 
-    # When
+    # Triggers
 
     def _measure_path(self) -> None:
-        """Add the motion of the TCP; a change of the active TCP is none."""
+        """Add the distance that the TCP has moved; a change of the active TCP adds nothing."""
         vx, vy, vz, _, _, _ = self._controller.motion.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 
@@ -170,7 +170,7 @@ class FaultInjector:
             return self._travelled - pending.travelled >= trigger.metres - _ROUNDING
         return self._is_beyond(trigger) != pending.side
 
-    # What
+    # Effects
 
     def _start_fault(self, fault: Fault, now: float) -> None:
         controller = self._controller
@@ -196,7 +196,7 @@ class FaultInjector:
             interface.inject(Random(fault.seed).randbytes(fault.size))
 
     def _apply_running(self, now: float) -> None:
-        """Apply all faults that last to this cycle."""
+        """Apply all lasting faults to this cycle."""
         self._active = [running for running in self._active if not running.is_over(now)]
         self._apply_deviations(now)
         impaired = self._impairments()

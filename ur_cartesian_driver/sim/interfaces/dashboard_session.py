@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One client of the dashboard: what each command reads or changes.
+One client of the dashboard, and the effect of each command.
 
-A command that this software does not have is answered like one that does not exist.
+A command that this version of the robot's software lacks is answered like an unknown command.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _RUNTIME_WORDS = {
     RuntimeState.PAUSING: 'PAUSED',
     RuntimeState.PAUSED: 'PAUSED',
 }
-#: What moves the arm, its power or its programs: refused in local control, and ever after to a
-#: client that connected in it.
+#: Commands that control the arm, its power or its programs. They are refused in local control,
+#: and permanently to a client that connected in it.
 _REMOTE_ONLY = frozenset(
     {
         'load',
@@ -51,7 +51,7 @@ _REMOTE_ONLY = frozenset(
         'restart safety',
     }
 )
-#: The words of real robots.
+#: The refusal in the words of real robots.
 _LOCAL_CONTROL = (
     'Command is not allowed due to safety reasons, please switch robot to Remote Control mode and '
     'reconnect to port 29999'
@@ -62,9 +62,9 @@ _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
 class DashboardHandlers:
     """
-    The object that the commands act on: a controller, and its pendant.
+    The effects of the commands on a controller and its pendant.
 
-    A method carries out a command; it returns None, or a reply other than success.
+    A method carries out a command; it returns None for success, otherwise the reply.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -74,14 +74,14 @@ class DashboardHandlers:
         self.pendant = controller.pendant
         config = controller.config
         self.version = '.'.join(map(str, config.version))
-        #: Without the mark of its generation, as the robot writes it.
+        #: The model without the letter of its generation, as the robot writes it.
         self.robot_model = config.model.upper().removesuffix('E')
 
-    # What replies name
+    # Values in replies
 
     @property
     def loaded(self) -> str:
-        """The name of the loaded program; an empty one without a name is there from the start."""
+        """The name of the loaded program; an empty, unnamed program is loaded from the start."""
         return self.programs.loaded or '<unnamed>'
 
     @property
@@ -96,10 +96,10 @@ class DashboardHandlers:
 
     @property
     def remote_control(self) -> str:
-        """Whether clients may control the robot."""
+        """Whether the robot is in remote control."""
         return str(self.controller.remote_control).lower()
 
-    # What commands do
+    # Effects of commands
 
     def load(self, name: str) -> str | None:
         """Load a program; some clients write its name in quotation marks."""
@@ -125,7 +125,7 @@ class DashboardHandlers:
         return None
 
     def restart_safety(self, _: str) -> None:
-        """Leave a fault or violation; the arm is without power then."""
+        """Leave a fault or violation, if there is one; afterwards the arm has no power."""
         if self.controller.safety_event(SafetyEvent.RESTART):
             self.controller.power_off()
 
@@ -157,11 +157,11 @@ class DashboardHandlers:
         return None
 
     def clear_operational_mode(self, _: str) -> None:
-        """Give the operational mode back."""
+        """Give back control of the operational mode."""
         self.pendant.operational_mode = 'NONE'
 
 
-#: Commands to the controller; they fail if they return a reason.
+#: Commands to the controller; a command fails if it returns a reason.
 _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
     {
         'play': lambda controller: controller.programs.play(),
@@ -170,12 +170,12 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'power on': Controller.power_on,
         'power off': Controller.power_off,
         'brake release': Controller.release_brakes,
-        # The controller stays, or nothing could be tested afterwards.
+        # The controller keeps running, or nothing could be tested afterwards.
         'shutdown': Controller.power_off,
         'close popup': Controller.close_popups,
     }
 )
-#: Commands that do something else; all others only reply.
+#: Commands with another effect; the remaining commands only reply.
 _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = MappingProxyType(
     {
         'load': DashboardHandlers.load,
@@ -189,7 +189,7 @@ _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = Mappin
         'clear operational mode': DashboardHandlers.clear_operational_mode,
     }
 )
-#: Values of replies, where they are not the argument: {0} = the handlers, {1} = the argument.
+#: Values in replies, if not the argument itself: {0} = the handlers, {1} = the argument.
 _VALUES: Mapping[str, str] = MappingProxyType(
     {
         'running': '{0.running}',
@@ -226,11 +226,11 @@ class DashboardSession(ClientSession):
         self._server = DashboardServerCodec(controller.config.version[:2])
 
     def open(self) -> bytes:
-        """Greet."""
+        """Return the greeting."""
         return encode_line(BANNER)
 
     def feed(self, data: bytes) -> bytes:
-        """Answer each line by one line."""
+        """Answer each line with one line."""
         answers = b''
         for request in self._server.feed(data):
             answers += self._answer(request)

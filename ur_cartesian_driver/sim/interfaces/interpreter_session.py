@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One client of the interpreter port: it sends statements and gets a line for each."""
+"""One client of the interpreter port: it sends statements and gets a line in reply to each."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
 
-#: A whole function may stand on one line [bytes].
+#: Longest line [bytes]; a line can contain a whole function.
 _MAX_LINE_LENGTH = 1024 * 1024
 
 
 class InterpreterSession(ClientSession):
-    """Hands statements over; their answers can come later."""
+    """Hands statements over to interpreter mode; answers can come later."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for statements."""
@@ -22,7 +22,7 @@ class InterpreterSession(ClientSession):
         self._answers: list[str] = []
 
     def feed(self, data: bytes) -> bytes:
-        """Hand over each line, return what can be answered at once."""
+        """Hand over each line; return the answers that are available at once."""
         for line in self._lines.feed(data):
             self._interpreter_mode.receive(line, self._answers.append)
         return self.answers()

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The commands that clients may send to a script port besides programs, one line each.
+The one-line commands that clients can send to a script port in addition to programs.
 
-Any other line is a statement: it is compiled as a program of its own, which replaces the running
-one, as on the robot. A client that connected in local control is refused everything.
+Any other line is a statement: it is compiled as a separate program, which replaces the running
+program, as on the robot. All input of a client that connected in local control is refused.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'stop program': lambda controller: controller.programs.stop(),
         'pause program': lambda controller: controller.programs.pause(),
         'resume program': lambda controller: controller.programs.play(),
-        # Whether motions are for the arm or for the screen only; here they are the same.
+        # These send motions to the arm or only to the screen; here there is no difference.
         'set real': lambda _: None,
         'set sim': lambda _: None,
     }
@@ -40,9 +40,9 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 
 def execute_command(controller: Controller, item: UploadedItem, *, may_send: bool) -> None:
     """
-    Execute what a client has sent; answers go to all clients.
+    Execute an item that a client has sent; answers go to all clients.
 
-    :param may_send: whether its connection may; else it is read-only.
+    :param may_send: False = the connection of the client is read-only.
     """
     if not may_send:
         controller.messages.error(

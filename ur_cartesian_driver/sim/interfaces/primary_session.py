@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One client of an interface that takes scripts: primary, secondary, real-time.
+One client of an interface that accepts scripts: primary, secondary, real-time.
 
-All three take programs and commands. What they send differs; apart from the greeting, it goes to
-all clients. Whether a client may send is decided when it connects, and not again. Each has a
-read-only twin, which sends the same and ignores its input.
+All three accept programs and commands, and send different data; apart from the greeting, the data
+goes to all clients. A client is refused in local control, and permanently if it connected in local
+control. Each interface has a read-only twin, which sends the same data and ignores its input.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 
 class ScriptSession(ClientSession):
-    """Executes programs and commands; the first state comes in the cycle of the connection."""
+    """Executes programs and commands; a stream, not the session, sends the states."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for programs."""
@@ -35,10 +35,10 @@ class ScriptSession(ClientSession):
 
 
 class PrimarySession(ScriptSession):
-    """A client of the primary or secondary interface, which begin with the version."""
+    """A client of the primary or secondary interface, both of which begin with the version."""
 
     def open(self) -> bytes:
-        """Introduce the controller: clients wait for this before anything else."""
+        """Return the version message, for which clients wait before anything else."""
         return version_frame(self._controller)
 
 
@@ -54,9 +54,9 @@ class ReadOnlySession(ClientSession):
         self._greeting = greeting
 
     def open(self) -> bytes:
-        """Begin as the interface does."""
+        """Return the greeting of the interface."""
         return self._greeting
 
     def feed(self, data: bytes) -> bytes:
-        """Ignore it."""
+        """Ignore the data."""
         return b''

@@ -52,21 +52,21 @@ TOOL_OUTPUTS: Mapping[str, str] = MappingProxyType(
     {'voltage_48v': 'actual_robot_voltage', 'temperature': 'tool_temperature', 'mode': 'tool_mode'}
 )
 
-#: Of the version message, as recorded on four robots (3.5 to 5.1).
+#: Timestamp of the version message, as recorded on four robots (3.5 to 5.1).
 NO_TIMESTAMP = 2**64 - 1
 #: States per second.
 STATE_RATE = 10.0
-#: Joint acceleration limit that is reported [rad/s^2], as by a recorded UR5e.
+#: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
 _JOINT_ACCELERATION = 40.0
-#: By the type of the robot; others are not known.
+#: Type of the robot -> type of its controller box; the others are not known.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
-#: Limit of an endless joint on the wire, which has no infinity [rad].
+#: Limit that is sent for an endless joint instead of infinity [rad].
 _UNLIMITED = 1e6
 
 
 def version_frame(controller: Controller) -> bytes:
-    """Return the message that comes first on every connection."""
+    """Return the version message, the first message on every connection."""
     major, minor, bugfix, build = controller.config.version
     return encode_message(
         VersionMessage(
@@ -81,7 +81,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """Stream to all clients: messages at once, states at their rate and at a new safety mode."""
+    """The data for all clients: messages at once, states periodically and at a new safety mode."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""
@@ -96,7 +96,7 @@ class PrimaryStream:
             yield encode_message(message)
 
     def is_due(self) -> bool:
-        """Tell, once a cycle, whether the state is sent in it."""
+        """Return whether a state is due in this cycle; to be called once per cycle."""
         before, self._safety_mode = self._safety_mode, self._controller.safety.mode
         return (
             self._controller.cycles % self._cycles_per_state == 0
@@ -104,7 +104,7 @@ class PrimaryStream:
         )
 
     def state(self) -> bytes:
-        """Return a state frame, its sub-packages in the order of a recorded UR5e."""
+        """Return a state frame, with its sub-packages in the order recorded on a UR5e."""
         controller = self._controller
         kinematics, configuration = self._constant
         packages: tuple[SubPackage, ...] = (

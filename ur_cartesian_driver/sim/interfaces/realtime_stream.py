@@ -59,7 +59,7 @@ class RealtimeStream:
     """The packets that all clients of the real-time interface get."""
 
     def __init__(self, controller: Controller) -> None:
-        """Look up how each field is computed."""
+        """Look up the function that computes each field."""
         self._controller = controller
         self._size = packet_size(controller.config.version)
         self._getters = [

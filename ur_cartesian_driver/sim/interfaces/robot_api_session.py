@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One HTTP client of the Robot API of PolyScope X: what each request reads or changes.
+One HTTP client of the Robot API of PolyScope X, and the effect of each request.
 
-Paths and bodies are written out once more here and not taken from the driver's table: a simulator
-that shares it agrees with its mistakes. Which answers are documented: doc/simulation.md.
+Paths and bodies are written out here again instead of taken from the driver's table: a simulator
+with the same table would agree with its mistakes. doc/simulation.md lists the documented answers.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from ur_cartesian_driver.sim.state.controller_state import Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 BASE_PATH = '/universal-robots/robot-api'
-#: The first software that serves it.
+#: The first software version that has the Robot API.
 FIRST_VERSION = (10, 11)
 #: Largest request [bytes].
 _MAX_REQUEST_SIZE = 65536
-#: How long an action may take until it is answered 504 [s].
+#: Time after which an action that is not done is answered with 504 [s].
 _ACTION_TIMEOUT = 10.0
 
 _PROGRAM_STATES = {
@@ -42,7 +42,7 @@ _PROGRAM_STATES = {
     RuntimeState.PAUSING: 'PAUSED',
     RuntimeState.PAUSED: 'PAUSED',
 }
-#: The API knows five safety modes.
+#: Safety modes with another name in the API, which has only five modes.
 _SAFETY_MODES = {
     SafetyMode.ROBOT_EMERGENCY_STOP: 'EMERGENCY_STOP',
     SafetyMode.SYSTEM_EMERGENCY_STOP: 'EMERGENCY_STOP',
@@ -58,7 +58,7 @@ class Refused(Exception):
     """A request that is not carried out."""
 
     def __init__(self, status: HTTPStatus, message: str, **fields: Any) -> None:
-        """Take the answer."""
+        """Take the status and the fields of the answer."""
         super().__init__(message)
         self.status, self.fields = status, {'message': message, **fields}
 
@@ -92,7 +92,7 @@ def _restart_safety(controller: Controller) -> None:
     controller.power_off()
 
 
-#: Actions on the arm: what they do, and what then is waited for.
+#: Action on the arm -> its effect, and the condition for its answer.
 _STATE_ACTIONS: Mapping[
     str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
 ] = MappingProxyType(
@@ -103,7 +103,7 @@ _STATE_ACTIONS: Mapping[
             lambda c: _refuse_if(c.release_brakes()),
             lambda c: c.power.mode is RobotMode.RUNNING,
         ),
-        # Without the wait of the pendant, as the client library's tests have it.
+        # Without the waiting time of the pendant, as the client library's tests expect.
         'UNLOCK_PROTECTIVE_STOP': (
             lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK_BY_LINE)),
             lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
@@ -123,7 +123,7 @@ def _play(controller: Controller, state: RuntimeState) -> None:
     _refuse_if(controller.programs.play())
 
 
-#: Actions on the program, in the same form.
+#: Action on the program -> its effect, and the condition for its answer.
 _PROGRAM_ACTIONS: Mapping[
     str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
 ] = MappingProxyType(
@@ -219,13 +219,13 @@ def _log(controller: Controller, body: Body) -> Fields:
 
 
 def _openapi(controller: Controller, _: Body) -> Fields:
-    """Tell the version of the API, by which clients decide what they may ask for."""
+    """Return the version of the API, by which clients decide which requests they can send."""
     version = controller.config.version[:2]
     number = '5.0.107' if version >= (10, 14) else '3.1.4' if version >= (10, 12) else '3.0.0'
     return {'openapi': '3.1.0', 'info': {'title': 'Robot API', 'version': number}}
 
 
-#: Method and path below BASE_PATH: the first software that has it, and its effect.
+#: Method and path below BASE_PATH -> the first software that has this request, and its effect.
 _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
     {
         ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),
@@ -273,7 +273,7 @@ class RobotApiSession(ClientSession):
         self._last_request = False
 
     def feed(self, data: bytes) -> bytes:
-        """Take a part of a request; return what can be answered at once."""
+        """Take a part of a request; return the answers that are available at once."""
         self._buffer += data
         if len(self._buffer) > _MAX_REQUEST_SIZE:
             raise RemoteProtocolError(f'a request is longer than {_MAX_REQUEST_SIZE} bytes')
@@ -283,7 +283,7 @@ class RobotApiSession(ClientSession):
         """
         Return the answers that are due; called in each cycle.
 
-        :raises HangUp: behind the answer to a client that wants no other.
+        :raises HangUp: with the answers, if the client has sent its last request.
         """
         answers = b''
         while True:
@@ -300,7 +300,7 @@ class RobotApiSession(ClientSession):
                 raise HangUp(answers)
 
     def _due_answer(self, waiting: Waiting) -> bytes:
-        """Return the answer to an action; nothing as long as the robot carries it out."""
+        """Return the answer to an action; empty while the robot carries the action out."""
         if waiting.is_done(self._controller):
             return _response(HTTPStatus.OK, {'message': waiting.message})
         if self._controller.time >= self._waits_until:
@@ -308,7 +308,7 @@ class RobotApiSession(ClientSession):
         return b''
 
     def _next_request(self) -> tuple[str, str, bytes] | None:
-        """Return method, path and body of the next whole request."""
+        """Return method, path and body of the next request; None = it is not complete."""
         head, end, rest = bytes(self._buffer).partition(b'\r\n\r\n')
         if not end:
             return None
@@ -328,7 +328,7 @@ class RobotApiSession(ClientSession):
         return method, path, rest[:size]
 
     def _answer(self, method: str, path: str, body: bytes) -> bytes:
-        """Carry out a request; nothing yet if it takes a while."""
+        """Carry out a request and return the answer; empty if the answer comes later."""
         route = path.removeprefix(BASE_PATH)
         version = self._controller.config.version[:2]
         methods = {m for (m, p), (since, _) in _ROUTES.items() if p == route and version >= since}
@@ -354,7 +354,7 @@ class RobotApiSession(ClientSession):
         return _response(HTTPStatus.OK, answer)
 
     def _not_found(self, path: str) -> bytes:
-        """Redirect a path that ends with a slash too many, as the robot does."""
+        """Return the answer to an unknown path; a superfluous last slash is redirected."""
         known = {f'{BASE_PATH}{route}/' for _, route in _ROUTES}
         if path in known:
             return _response(HTTPStatus.TEMPORARY_REDIRECT, {}, location=path.rstrip('/'))
@@ -363,9 +363,9 @@ class RobotApiSession(ClientSession):
 
 def _text(body: Body, field: str) -> str:
     """
-    Return a text of a request.
+    Return the text in a field of a request.
 
-    :raises ValueError: it is missing, or no text.
+    :raises ValueError: the field is missing, or not a text.
     """
     value = body.get(field)
     if not isinstance(value, str):

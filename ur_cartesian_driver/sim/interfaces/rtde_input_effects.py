@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The RTDE inputs, and what writing them does.
+The effects of writing RTDE inputs.
 
-Outputs and slider come with a mask of the channels to set. A package is applied as a whole: masks
-first, wherever they stand in the recipe.
+The controller's outputs and slider come with a mask of the channels to set. A package is applied
+as a whole, masks first, wherever they are in the recipe.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def _write_item(values: str, i: int) -> Write:
     return write
 
 
-#: What writes each input register; values have the types of the recipe.
+#: Input register -> the function that writes it; values have the types of the recipe.
 _WRITE: Mapping[str, Write] = {
     'input_bit_registers0_to_31': _write_packed(0),
     'input_bit_registers32_to_63': _write_packed(32),

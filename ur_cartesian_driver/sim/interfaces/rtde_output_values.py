@@ -3,9 +3,9 @@
 """
 The values of the RTDE outputs in the simulated controller.
 
-Actual values equal the targets, unless the arm gives way, is imperfect, or a fault makes them
-differ. Links weigh nothing; only the payload does. Outputs that would need more (temperatures,
-encoders) are zero or have the plausible values of :data:`FIXED`.
+Actual values equal the targets, unless the arm is compliant, is imperfect, or a fault makes them
+differ. Only the payload has a mass, the links have none. Outputs of quantities that are not
+simulated (temperatures, encoders) are zero or have the plausible values of :data:`FIXED`.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ _VOLTAGE, _CURRENT = 48.0, 0.5
 
 
 def _elbow(controller: Controller) -> Vector3:
-    """Return the position of the elbow: the third joint [m]."""
+    """Return the position of the elbow, the third joint [m]."""
     return controller.arm.frames(controller.motion.q).origins[2]
 
 
 def _elbow_velocity(controller: Controller) -> Vector3:
-    """Return the velocity of the elbow [m/s]; the first two joints move it."""
+    """Return the velocity of the elbow [m/s]; only the first two joints move it."""
     motion = controller.motion
     frames = controller.arm.frames(motion.q)
     return point_motion(frames, motion.qd, motion.qdd, frames.origins[2], 2).velocity
@@ -92,7 +92,7 @@ def _tool_mode(controller: Controller) -> int:
 
 
 def _joint_mode(controller: Controller) -> int:
-    """Return the mode of each joint: the brakes hold until the arm is RUNNING."""
+    """Return the mode of each joint; the brakes hold until the arm is RUNNING."""
     if controller.power.mode is RobotMode.RUNNING:
         return _RUNNING
     return _IDLE if _powered(controller) else _POWER_OFF
@@ -103,13 +103,13 @@ def _actual_acceleration(controller: Controller) -> Vector6:
 
 
 def _target_currents(controller: Controller) -> Vector6:
-    """Return the joint currents, which only an imperfect arm has [A]."""
+    """Return the joint currents without noise [A]; only an imperfect arm has currents."""
     imperfections = controller.config.imperfections
     return imperfections.holding_current if imperfections and _powered(controller) else ZERO6
 
 
 def _joint_currents(controller: Controller) -> Vector6:
-    """Return the same as measured [A]."""
+    """Return the measured joint currents [A]; only an imperfect arm has currents."""
     arm = controller.actual.imperfect_arm
     return arm.currents() if arm is not None and _powered(controller) else ZERO6
 
@@ -194,14 +194,14 @@ FIXED: Mapping[str, Any] = MappingProxyType(
         'joint_temperatures': (25.0,) * 6,
         'actual_main_voltage': _VOLTAGE,
         'tool_temperature': 25.0,
-        # Both in volts, as on the primary interface.
+        # Both inputs are in volts, as on the primary interface.
         'tool_analog_input_types': 3,
     }
 )
 
 
 def _register_getters(direction: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
-    """Return the function that reads each register of one direction."""
+    """Return the functions that read the registers of one direction, by output."""
 
     def item(values: str, i: int) -> Getter:
         return lambda controller: getattr(of(controller), values)[i]
@@ -225,7 +225,7 @@ def output_getter(name: str, zero: Any) -> Getter:
     """
     Return the function that computes an output.
 
-    :param zero: its value if it is not simulated.
+    :param zero: the value of an output that is not simulated.
     """
     found = COMPUTED.get(name) or REGISTERS.get(name)
     if found is not None:

@@ -24,7 +24,7 @@ from ur_cartesian_driver.sim.motion.imperfect_arm import Imperfections
 
 
 class _OutputSchedule:
-    """A recipe, the functions that compute its values, and how often it is due."""
+    """A recipe, the functions that compute its values, and the cycles in which it is due."""
 
     def __init__(self, output: OutputStream, maximum: float) -> None:
         self.output = output
@@ -33,15 +33,16 @@ class _OutputSchedule:
             output_getter(name, zero)
             for name, zero in zip(output.recipe.names, output.recipe.zeros(), strict=True)
         ]
-        #: As the manufacturer's guide has it, so a client that asks for 300 of 500 Hz gets 500.
+        #: Cycles per package, rounded down as in the manufacturer's guide: a client that asks for
+        #: 300 of 500 Hz gets 500.
         self._cycles = max(1, floor(maximum / output.frequency + 1e-9))
 
     def is_due(self, cycle: int) -> bool:
-        """Tell whether a package is due in this cycle."""
+        """Return whether a package is due in this cycle."""
         return cycle % self._cycles == 0
 
     def package(self, controller: Controller) -> bytes:
-        """Return the frame of this cycle."""
+        """Return the package of this cycle."""
         return self._recipe.pack([get(controller) for get in self._getters])
 
 
@@ -53,7 +54,7 @@ class _PacketGaps:
         self._left_out = 0
 
     def leaves_out(self) -> bool:
-        """Tell whether to leave out the packets of this cycle."""
+        """Return whether to leave out the packets of this cycle."""
         if self._left_out > 0:
             self._left_out -= 1
             return True
@@ -72,7 +73,7 @@ class RtdeSession(ClientSession):
         """
         Wait for requests.
 
-        :param taken_inputs: inputs that a client writes; shared by all sessions.
+        :param taken_inputs: the inputs that are reserved by clients; shared by all sessions.
         """
         major, minor, bugfix, build = controller.config.version
         self._controller = controller
@@ -103,7 +104,7 @@ class RtdeSession(ClientSession):
         return self._server.data_to_send()
 
     def close(self) -> None:
-        """Let others write the inputs of this client."""
+        """Release the inputs of this client for other clients."""
         self._server.close()
 
     def packages(self) -> Iterator[bytes]:

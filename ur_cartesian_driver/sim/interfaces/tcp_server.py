@@ -3,8 +3,8 @@
 """
 A TCP port that serves any number of clients of one kind.
 
-A session decides what to answer; it knows no sockets, only bytes in and bytes out. A client that
-does not read is dropped, so that it can stall neither the cycle nor the other clients.
+A session decides on the answers; it has no socket, only bytes in and bytes out. A client that
+does not read is dropped, so that it cannot stall the cycle or the other clients.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impair
 
 _log = logging.getLogger(__name__)
 
-#: Bytes that a client may leave unread, besides those in the kernel.
+#: Most bytes that a client can leave unread, in addition to those in the kernel.
 MAX_UNREAD_BYTES = 1_000_000
-#: A client with more unread bytes gets no states: many send scripts and never read.
+#: A client with more unread bytes gets no states: many clients send scripts and never read.
 MAX_UNREAD_BYTES_FOR_STATE = 16_384
 
 
@@ -39,20 +39,20 @@ class ClientSession(ABC):
     """One client's conversation."""
 
     def open(self) -> bytes:
-        """Return the bytes sent unasked at the start: by default none, the client begins."""
+        """Return the bytes to send at the start; by default none, because the client begins."""
         return b''
 
     @abstractmethod
     def feed(self, data: bytes) -> bytes:
         """
-        Take bytes from the client, return the answer.
+        Take bytes from the client; return the answer.
 
         :raises ProtocolError: the client violates the protocol; it is disconnected.
         :raises HangUp: the conversation is over.
         """
 
     def close(self) -> None:  # noqa: B027  # most sessions hold nothing
-        """Release the client's resources: by default none."""
+        """Release the client's resources; by default there are none."""
 
 
 S = TypeVar('S', bound=ClientSession)
@@ -91,7 +91,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._handle_incoming(b'')
 
     def _transport_reading(self, wanted: bool) -> None:
-        """Pause reading when too much is held back, so that the client has to wait."""
+        """Resume reading, or pause it so that the client has to wait."""
         if self._transport is None or self._transport.is_closing():
             return
         if wanted:
@@ -137,21 +137,21 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self.abort()
 
     def write_state(self, data: bytes) -> None:
-        """Send a state, unless the client has not read the last ones."""
+        """Send a state, unless the client has left too many bytes unread."""
         if self._transport is not None and (
             self._transport.get_write_buffer_size() < MAX_UNREAD_BYTES_FOR_STATE
         ):
             self.write(data)
 
     def impair_connection(self, impairment: Impairment | None) -> ImpairedConnection:
-        """Impair this connection; None = no longer."""
+        """Impair this connection; None = end the impairment."""
         if self._impaired is None:
             self._impaired = ImpairedConnection(impairment, self._server.now)
         self._impaired.impairment = impairment
         return self._impaired
 
     def pump(self, now: float) -> bool:
-        """Pass on the bytes that are due; tell whether the connection is still impaired."""
+        """Pass on the bytes that are due; return whether the connection is still impaired."""
         impaired = self._impaired
         if impaired is None:
             return False
@@ -182,29 +182,29 @@ class TcpServer(Generic[S]):
 
     def __init__(self, name: str, make_session: Callable[[], S]) -> None:
         """
-        Listen nowhere yet.
+        Begin without listening.
 
-        :param name: of the interface, for the log.
-        :param make_session: called for each client.
+        :param name: the name of the interface, for the log.
+        :param make_session: returns the session of a new client.
         """
         self.name = name
         self.make_session = make_session
         self.connections: set[_ClientConnection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
-        #: The impairment of all connections, and the controller's clock while there is one [s].
+        #: The impairment of all connections, and the controller's clock during it [s].
         self.impairment: Impairment | None = None
         self.now = 0.0
 
     @property
     def port(self) -> int:
-        """The port that is listened on."""
+        """The port on which the server listens."""
         assert self._server is not None
         return int(self._server.sockets[0].getsockname()[1])
 
     @property
     def refuses_connections(self) -> bool:
-        """Whether new connections are closed at once: the server closes, or a fault."""
+        """Whether new connections are closed at once, because the server closes or by a fault."""
         return self.closing or (
             self.impairment is not None and self.impairment.refuses_connections
         )
@@ -240,16 +240,16 @@ class TcpServer(Generic[S]):
         for connection in tuple(self.connections):
             connection.write_state(data)
 
-    # As faults see it: an Impairable
+    # The interface for faults: an Impairable
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Impair all connections from now on; None = no longer."""
+        """Impair all connections from now on; None = end the impairment."""
         self.impairment, self.now = impairment, now
         for connection in self.connections:
             connection.impair_connection(impairment)
 
     def pump(self, now: float) -> bool:
-        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
+        """Pass on the bytes that are due; return whether to call again in the next cycle."""
         self.now = now
         held = [connection.pump(now) for connection in tuple(self.connections)]
         return self.impairment is not None or any(held)
@@ -269,12 +269,12 @@ class TcpServer(Generic[S]):
         self.broadcast(data)
 
     async def close(self) -> None:
-        """Stop listening and disconnect everybody."""
+        """Stop listening and disconnect all clients."""
         if self._server is None:
             return
         self.closing = True
         self._server.close()
         self.drop()
-        await asyncio.sleep(0)  # the loop reports an abort in its next turn
+        await asyncio.sleep(0)  # the loop reports an abort in its next iteration
         await self._server.wait_closed()
         self._server = None

@@ -3,8 +3,8 @@
 """
 The motion generator of the simulated controller: from motion calls to one target per cycle.
 
-Deterministic, without clock and sockets. :class:`MotionGenerator` takes the calls; profiles are
-functions of time, geometry is a function of a path parameter, and servo laws integrate speeds.
+It is deterministic and has no clock and no sockets. :class:`MotionGenerator` takes the calls.
+Profiles are functions of time, paths are functions of a parameter, servo laws integrate speeds.
 """
 
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator

@@ -4,10 +4,10 @@
 The motion that the robot measures.
 
 The simulated arm follows its targets exactly, so actual values equal the targets, unless the arm
-gives way, is to be imperfect, or a fault makes them deviate. A deviation of the pose shows in pose
-and joint positions, one of the twist in twist and joint speeds; like a faulty measurement, neither
-shows in the other. A deviation of the acceleration shows in acceleration and accelerometer and,
-integrated, in twist and joint speeds, because many clients check it there.
+is compliant, is configured as imperfect, or a fault makes them deviate. A deviation of the pose
+changes pose and joint positions, a deviation of the twist changes twist and joint speeds; as with
+a faulty measurement, neither changes the other. A deviation of the acceleration changes
+acceleration and accelerometer and, integrated, twist and joint speeds: many clients check these.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
-# A solution farther than this from the target is another branch [rad].
+# A solution farther than this from the target is on another branch [rad].
 _BRANCH_JUMP = 0.5
 
 
@@ -40,12 +40,12 @@ class ActualMotion:
         """
         Follow the targets of this motion.
 
-        :param imperfections: None = exactly.
-        :param contact: how the arm gives way.
+        :param imperfections: of the arm; None = it follows its targets exactly.
+        :param contact: the compliance of the arm.
         """
         self._motion, self._contact = motion, contact
         self.imperfect_arm = ImperfectArm(motion, imperfections) if imperfections else None
-        #: The motion without deviations.
+        #: The motion without faults and compliance.
         self._undisturbed: Motion = self.imperfect_arm or motion
         self._pose_fault: Vector6 | None = None
         self._twist_fault: Vector6 | None = None

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The target of the arm: where it is to be in a cycle, how fast it moves, and for which TCP."""
+"""The target of the arm in a cycle: its position, its motion, and the TCP."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     twist_between,
 )
 
-#: Still this long [s]: steady.
+#: An arm that has stood still for this long is steady [s].
 STEADY_AFTER = 0.5
 
 
@@ -36,14 +36,14 @@ class ArmTarget:
     The target of the last cycle.
 
     ``q``, ``qd``, ``qdd`` [rad, rad/s, rad/s^2], ``T_base_tcp`` and ``tcp_twist`` (base axes,
-    [m/s, rad/s]). Speeds are differences of positions over the cycle, so they always fit these.
+    [m/s, rad/s]). Speeds are differences of positions over the cycle, so they always agree.
 
-    :param cycle: [s].
-    :param q: where the arm stands [rad].
+    :param cycle: duration of a cycle [s].
+    :param q: joint positions at the start [rad].
     """
 
     def __init__(self, arm: Arm, cycle: float, q: Vector6) -> None:
-        """Stand still at ``q`` with the flange as TCP."""
+        """Begin at rest at ``q`` with the flange as TCP."""
         self.arm = arm
         self.cycle = cycle
         self.kinematics = JointKinematics(arm, cycle)
@@ -55,7 +55,7 @@ class ArmTarget:
 
     @property
     def T_flange_tcp(self) -> Pose:
-        """The tool centre point; motions that began before it was set keep the one before."""
+        """The TCP; motions that began before the TCP was set keep the previous one."""
         return self._T_flange_tcp
 
     @T_flange_tcp.setter
@@ -64,13 +64,13 @@ class ArmTarget:
         self.T_base_tcp = self.forward(self.q)
 
     def activate_tcp(self) -> None:
-        """Let the motion that begins now use the TCP that was set last."""
+        """Use the TCP that was set last for the motion that begins now."""
         self.T_tcp_flange = self._T_flange_tcp.inverse()
         self._active_tcp = self._T_flange_tcp
 
     @property
     def tcp_is_active(self) -> bool:
-        """Whether the TCP belongs to the running motion."""
+        """Whether the running motion uses the TCP that was set last."""
         return self._active_tcp is self._T_flange_tcp
 
     @property
@@ -88,9 +88,9 @@ class ArmTarget:
 
     def move_to(self, q: Vector6, pose: Pose, rates: TargetRates | None = None) -> None:
         """
-        Be at joint positions and their pose in this cycle.
+        Move the target to joint positions and their pose in this cycle.
 
-        :param rates: where they are known already.
+        :param rates: the speeds and accelerations; None = as differences over the cycle.
         """
         if rates is None:
             rate = 1.0 / self.cycle
@@ -105,13 +105,13 @@ class ArmTarget:
         self._still_for = 0.0 if max(map(abs, qd)) > NO_CHANGE else self._still_for + self.cycle
 
     def hold(self) -> None:
-        """Stay for this cycle."""
+        """Stay in place for this cycle."""
         self.qdd = difference_rate(STILL, self.qd, 1.0 / self.cycle)
         self.qd = self.tcp_twist = STILL
         self._still_for += self.cycle
 
     def copy(self) -> ArmTarget:
-        """Return a target that is where this one is."""
+        """Return a target with the same position, motion and TCP."""
         other = ArmTarget(self.arm, self.cycle, self.q)
         other.T_flange_tcp = self._T_flange_tcp
         other.activate_tcp()
@@ -119,13 +119,13 @@ class ArmTarget:
         return other
 
     def take_over(self, other: ArmTarget) -> None:
-        """Be where another target is, and move as it does."""
+        """Take over the position and the motion of another target."""
         self.q, self.qd, self.qdd = other.q, other.qd, other.qdd
         self.T_base_tcp, self.tcp_twist = other.T_base_tcp, other.tcp_twist
         self._still_for = other._still_for
 
     def teleport(self, q: Vector6) -> None:
-        """Stand at joint positions [rad] without having moved there."""
+        """Stand still at joint positions [rad] without having moved there."""
         self.q, self.qd, self.qdd = q, STILL, STILL
         self.tcp_twist = STILL
         self.T_base_tcp = self.forward(q)

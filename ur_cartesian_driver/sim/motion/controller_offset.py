@@ -3,18 +3,18 @@
 """
 The controller's path offset: a Cartesian offset on top of the motion of a program.
 
-The motion goes on as if there were none, and in each cycle the target is displaced by the
-filtered offset. Frames, filter, limits and the final stop follow the script manual. Where it is
-silent the law is ours:
+The motion runs as if there were no offset, and in each cycle the target is displaced by the
+filtered offset. Frames, filter, limits and the final stop follow the script manual. The rules on
+which the manual says nothing are ours:
 
-* the newest offset replaces the one before, also if that was set in another frame;
-* the offset is held at rest, in pauses and in stops; it does not count while set-points (servoj,
-  speedj, speedl) lead the arm, which begin where it is;
-* the frame MOTION stays as it was where the tool stands or leads along its own z axis, and before
-  the first motion there is none, and so no offset;
-* an offset that needs more than the speed of a joint, or changes its speed by more than
-  :data:`MAX_JOINT_ACCELERATION`, is a protective stop: the manual only warns of one;
-* when the program ends, the offset is held until the arm stands, which stays where it is.
+* a new offset replaces the previous offset, even if that was set in another frame;
+* the offset is held at rest, in pauses and in stops; it has no effect while set-points (servoj,
+  speedj, speedl) lead the arm, which start from the displaced position;
+* the frame MOTION is kept while the tool stands still or moves along its own z axis; before the
+  first motion this frame does not exist, and offsets in it have no effect;
+* an offset that needs more than the maximum speed of a joint, or a joint acceleration above
+  :data:`MAX_JOINT_ACCELERATION`, causes a protective stop, of which the manual only warns;
+* when the program ends, the offset is held until the arm stands still, and the arm stays there.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 
 #: Frames of an offset, as programs name them.
 BASE, TCP, MOTION, WORLD = FRAMES = (1, 2, 3, 4)
-#: The limits of a robot as it comes [m, rad].
+#: The default limits of a robot [m, rad].
 MAX_TRANSLATION, MAX_ROTATION = 0.1, 0.52
-#: A slower tool has no direction [m/s]; nor has one that leads along its z axis within this sine.
+#: The frame MOTION is kept below this speed [m/s], and along the tool's z axis within this sine.
 _MIN_SPEED, _MIN_ANGLE_SINE = 1e-6, 0.01
-#: Smaller offsets are none [m, rad].
+#: Smaller differences between filtered and wanted offset are treated as zero [m, rad].
 _NONE = 1e-12
-#: A step that is too long by less than this factor is rounding.
+#: A step that is too long by less than this factor is accepted as rounding.
 _ROUNDING = 1.0 + 1e-6
 
 Axes = tuple[Vector3, Vector3, Vector3]
@@ -73,10 +73,10 @@ class ControllerPathOffset:
     """
 
     def __init__(self, motion_target: ArmTarget) -> None:
-        """Begin without one."""
+        """Begin without an offset."""
         self._motion = motion_target
         self.enabled = False
-        #: Coefficient of the filter, 1 = none; limits along and about each axis [m, rad].
+        #: Coefficient of the filter, 1 = no filter; limits along and about each axis [m, rad].
         self.alpha, self.max_translation, self.max_rotation = 1.0, MAX_TRANSLATION, MAX_ROTATION
         #: The displaced target; None = there is no offset.
         self.target: ArmTarget | None = None
@@ -88,13 +88,13 @@ class ControllerPathOffset:
 
     @property
     def is_active(self) -> bool:
-        """Whether there is anything to do in a cycle."""
+        """Whether the offset is enabled, or still displaces the target."""
         return self.enabled or self.target is not None
 
     # -- what programs do ----------------------------------------------------------------------
 
     def set(self, frame: int, offset: Vector6) -> None:
-        """Set the offset in a frame [m, rad], cut to the limits."""
+        """Set the offset in a frame [m, rad], clamped to the limits."""
         if frame != self._frame:
             self._frame, self._applied = frame, self.applied(frame)
         bounds = (self.max_translation,) * 3 + (self.max_rotation,) * 3
@@ -103,7 +103,7 @@ class ControllerPathOffset:
         )
 
     def applied(self, frame: int) -> Vector6:
-        """Return the offset that is applied now, in a frame [m, rad]."""
+        """Return the currently applied offset, expressed in a frame [m, rad]."""
         if self.target is None or frame == self._frame:
             return self._applied
         motion, displaced = self._motion.T_base_tcp, self.target.T_base_tcp
@@ -119,25 +119,25 @@ class ControllerPathOffset:
         return vector6([dot(axis, each) for each in (shift, turn) for axis in axes])
 
     def end(self) -> None:
-        """Let the motion go on without an offset, from where the arm is."""
+        """End the offset; the motion continues from the displaced position."""
         self.enabled, self._wanted = False, ZERO6
         self.end_displacement()
 
     def end_displacement(self) -> None:
-        """Continue the motion from the arm's place; the wanted offset can be applied again."""
+        """Continue the motion from the displaced position; keep the wanted offset for later."""
         target = self.target
         if target is not None:
             self._motion.take_over(target)
         self.target, self._applied, self._change, self._change_rate = None, ZERO6, ZERO6, ZERO6
 
     def end_of_program(self) -> None:
-        """Hold the offset until the arm stands; forget limits and filter."""
+        """Hold the offset until the arm stands still; reset limits and filter."""
         self.enabled, self.alpha = False, 1.0
         self.max_translation, self.max_rotation = MAX_TRANSLATION, MAX_ROTATION
         self._axes = None if self.target is None else self._axes
 
     def forget(self) -> None:
-        """Forget the offset: the arm is somewhere else."""
+        """Discard the offset, because the arm was put somewhere else."""
         self.target, self._wanted = None, ZERO6
         self.end_displacement()
 
@@ -145,9 +145,10 @@ class ControllerPathOffset:
 
     def step(self, *, moving: bool, is_led: bool) -> MotionFault | None:
         """
-        Displace the target for a cycle; return why the arm cannot follow.
+        Displace the target for a cycle; return a fault if the arm cannot follow.
 
-        :param moving: the motion goes on; ``is_led``: by set-points.
+        :param moving: whether the arm is in motion.
+        :param is_led: whether set-points lead the arm.
         """
         self._update_axes()
         if not self.enabled and not moving:
@@ -168,7 +169,7 @@ class ControllerPathOffset:
         return fault
 
     def hold(self) -> None:
-        """Stay for this cycle."""
+        """Keep the displaced target in place for this cycle."""
         if self.target is not None:
             self.target.hold()
 
@@ -205,7 +206,7 @@ class ControllerPathOffset:
         return None
 
     def _is_sudden(self, target: ArmTarget, q: Vector6, change: Vector6) -> bool:
-        """Tell whether a joint cannot follow the offset."""
+        """Return whether a joint cannot follow the offset."""
         motion = self._motion
         rate = scale6(subtract6(change, self._change), 1.0 / motion.cycle)
         most = MAX_JOINT_ACCELERATION * motion.cycle
@@ -215,7 +216,7 @@ class ControllerPathOffset:
         )
 
     def _displaced(self, pose: Pose) -> Pose:
-        """Return a pose of the motion with the offset."""
+        """Return a pose of the motion displaced by the offset."""
         offset = self._applied
         if self._frame == TCP:
             return pose @ Pose.from_rotation_vector(offset)
@@ -232,7 +233,7 @@ class ControllerPathOffset:
         return _BASE_AXES if frame == BASE or self._axes is None else self._axes
 
     def _update_axes(self) -> None:
-        """Let the frame MOTION follow the tool."""
+        """Align the frame MOTION with the motion of the tool."""
         direction = self._motion.tcp_twist[:3]
         speed = norm(direction)
         if speed < _MIN_SPEED:

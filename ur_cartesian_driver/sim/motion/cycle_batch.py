@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Solve some hundred cycles of a path together, before they are due.
+Solve several hundred cycles of a path together, before they are due.
 
-While speed scaling does not change, the cycles up to the end of a section of the path are known.
-numpy solves them for a small part of the time that they take one by one
-(:mod:`~.cycle_stepper`), to the same positions within rounding. Whatever interferes (another
-scaling, a stop, a new motion, a teleported arm) discards the rest; where the arm cannot keep the
-time, the cycles are done one by one.
+While the speed scaling does not change, the cycles up to the end of a section of the path are
+known. Solving them together with numpy takes a small fraction of the time that they take one by
+one (:mod:`~.cycle_stepper`), with the same positions up to rounding. Any interference (another
+scaling, a stop, a new motion, a teleported arm) discards the remaining cycles. If the arm cannot
+keep to the time of the path, its cycles are done one by one.
 """
 
 from __future__ import annotations
@@ -29,53 +29,54 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 
-#: Most cycles of a batch, and fewest: for less numpy takes longer.
+#: Most and fewest cycles in a batch: for fewer cycles numpy takes longer.
 _MAX_CYCLES = 384
 _MIN_CYCLES = 12
-#: Cycles that are done one by one where the arm cannot keep the time.
+#: Cycles that are done one by one after a batch that could not be solved.
 _BACK_OFF = 50
 
 
 class CycleStep(NamedTuple):
-    """The progress of a motion, and the time of its own that it took [s]."""
+    """The progress of a motion in one cycle, and the time of the path that it took [s]."""
 
     q: Vector6
     pose: Pose
     duration: float
-    #: Its speeds, where they are known already.
+    #: Speeds and accelerations, if they are known already.
     rates: TargetRates | None = None
 
 
 class CycleBatch:
     """
-    The cycles that are solved, of the path that an arm follows.
+    The solved cycles of the path that an arm follows.
 
-    :param target: of the arm.
+    :param target: the target of the arm.
     """
 
     def __init__(self, target: ArmTarget) -> None:
-        """Begin with none."""
+        """Begin without solved cycles."""
         self._target = target
-        #: The last one first: joints, pose, rates, and the time in the section of the path [s].
+        #: The cycles, last first: joints, pose, rates, and time in the section of the path [s].
         self._cycles: list[list[float]] = []
-        #: What they were solved for: motion and section, time of a cycle [s], max tool speed.
+        #: The cycles were solved for this motion; section, time of a cycle [s], max tool speed.
         self._motion: PathMotion | None = None
         self._solved_for = (0, 0.0, 0.0)
-        #: Whether they are solved by inverse kinematics.
+        #: Whether the cycles were solved by inverse kinematics.
         self.on_tool_path = False
-        #: The joints of the last one that was taken.
+        #: The joints of the last cycle that was taken.
         self._q: Vector6 = target.q
         self._back_off = 0
 
     def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Move on by the next cycle of a motion; None where it has to be found by itself.
+        Advance a motion by its next solved cycle; None = this cycle has to be done by itself.
 
-        :param duration: the time of the path in a cycle [s]; ``max_tool_speed`` [m/s].
+        :param duration: the time of the path in a cycle [s].
+        :param max_tool_speed: bound on the tool speed [m/s].
         """
         target, asked = self._target, (motion.index, duration, max_tool_speed)
         if self._motion is not motion or self._solved_for != asked:
-            # Solved once it is the same twice: while the scaling changes, it would be in vain.
+            # Solve only after two equal calls: while the scaling changes, batches are useless.
             self._motion, self._solved_for, self._cycles, self._back_off = motion, asked, [], 0
             return None
         if not self._cycles or self._q is not target.q or not target.tcp_is_active:
@@ -96,7 +97,7 @@ class CycleBatch:
     def _solve(
         self, motion: PathMotion, duration: float, max_tool_speed: float
     ) -> list[list[float]]:
-        """Return the cycles that follow within the section and that the arm can keep."""
+        """Return the next cycles within the section, as far as the arm can follow."""
         target, section = self._target, motion.sections[motion.index]
         stands = section.profile.length <= 0.0
         if stands or duration <= 0.0 or not target.tcp_is_active:
@@ -104,7 +105,7 @@ class CycleBatch:
         count = min(int((motion.next_change - motion.time) / duration) - 1, _MAX_CYCLES)
         if count < _MIN_CYCLES:
             return []
-        # Added up as one by one, so that they are rounded alike.
+        # Added up like single cycles, so that the times are rounded in the same way.
         times = np.add.accumulate([motion.time, *([duration] * count)])[1:]
         setpoints = section.path.rows(section.offset + section.profile.rows(times))
         self.on_tool_path = setpoints.shape[1] == 7
@@ -130,7 +131,7 @@ class CycleBatch:
         return self._as_cycles(q[: count + 1], poses[: count + 1], times[:count])
 
     def _as_cycles(self, q: Floats, poses: Floats, times: Floats) -> list[list[float]]:
-        """Return cycles with their rates, the last one first; row 0 is where the arm is."""
+        """Return cycles with their rates, last one first; row 0 is the arm's present position."""
         rate = 1.0 / self._target.cycle
         qd = rate * np.diff(q, axis=0)
         qdd = rate * np.diff(qd, axis=0, prepend=np.array([self._target.qd]))

@@ -3,9 +3,8 @@
 """
 One cycle of a motion, as far as the arm can follow.
 
-Limits stretch the time and keep the path: the step of a cycle is shortened where a joint would
-exceed its speed, could no longer brake before the end of its range, and where the tool would be
-too fast.
+Limits stretch the time and keep the path: the step of a cycle is shortened if a joint would exceed
+its speed or could no longer brake before the end of its range, or if the tool would be too fast.
 """
 
 from __future__ import annotations
@@ -25,20 +24,21 @@ from ur_cartesian_driver.sim.motion.servo_motions import JointStopMotion, ServoL
 
 Motion: TypeAlias = PathMotion | ServoLikeMotion
 
-#: A step that is too long by less than this factor is rounding.
+#: A step that is too long by less than this factor is accepted as rounding.
 ROUNDING = 1.0 + 1e-6
-# A step is shortened this often before its end counts as out of reach.
+# A step is shortened this many times before its end is considered out of reach.
 _ATTEMPTS = 12
-# Beside a singularity half a step turns the joints hardly less than the whole one. So the step is
-# divided by a power, at most this one, of the factor by which it is too long, and by at most so
-# many times that factor.
+# Near a singularity, half a step turns the joints hardly less than the whole step. The step is
+# therefore divided by a power of the factor by which it is too long, but not by more than this
+# power, nor by more than this multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
-# A tool motion at less than this part of its speed for so long [s] has met a wall, unless a joint
-# turns at more than this part of its limit: then it passes a singularity.
+# A tool motion that is slower than this fraction of its speed for this long [s] is stuck, unless a
+# joint turns faster than this fraction of its limit: then the arm passes a singularity.
 _STALLED = 0.01
 _STALLED_AFTER = 1.0
 _TURNING = 0.2
-# A joint line does not begin where the tool's path before it ends if it is so much too fast.
+# If the first step of a joint line is too long by this factor, the line does not begin where the
+# tool's path before it ends.
 _JUMP_RATIO = 50.0
 
 
@@ -54,7 +54,7 @@ class CycleStepper:
         self._batch = CycleBatch(target)
 
     def forget_stall(self) -> None:
-        """Give a motion that had stalled its time again."""
+        """Restart the time after which a motion is considered stalled."""
         self._stalled_for = 0.0
 
     def advance(
@@ -63,8 +63,8 @@ class CycleStepper:
         """
         Advance by ``duration`` [s] or as far as the arm can follow.
 
-        :param max_tool_speed: [m/s]; stops in joint space need not keep it.
-        :returns: a fault when the arm cannot follow at all.
+        :param max_tool_speed: bound on the tool speed [m/s], which joint stops can exceed.
+        :returns: the step, or a fault if the arm cannot follow.
         """
         if isinstance(motion, PathMotion):
             solved = self._batch.next(motion, duration, max_tool_speed)
@@ -106,22 +106,23 @@ class CycleStepper:
         return self._target.forward(q)
 
     def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
-        """Tell whether a step does not shrink with its time: a jump to another branch."""
+        """Return whether a step does not shrink with its time: a jump to another branch."""
         if isinstance(setpoint, Pose):
             return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
         return self._on_tool_path and joints > _JUMP_RATIO
 
     def _stalls(self, slow: bool) -> bool:
-        """Tell whether a tool motion has hardly advanced for a while: it never will."""
+        """Return whether a tool motion has hardly advanced for a while, so it never will."""
         self._stalled_for = self._stalled_for + self._target.cycle if slow else 0.0
         return self._stalled_for > _STALLED_AFTER
 
 
 def _step_divisor(step: tuple[float, float], before: tuple[float, float]) -> float:
     """
-    Return by what to divide a step so that it is not too long: a secant in logarithms.
+    Return the divisor that makes a step short enough, by a secant in logarithms.
 
-    :param step: its time and by which factor it is too long; ``before``: the last one.
+    :param step: the time of the step, and the factor by which it is too long.
+    :param before: the same of the step that was tried before.
     """
     (h, ratio), (h_before, ratio_before) = step, before
     if ratio_before <= ratio:

@@ -4,8 +4,8 @@
 An arm that does not follow its targets exactly, and a controller that does not keep up.
 
 Each joint lags behind its target, is held back by friction, bends under acceleration and rings
-when that changes. It is measured with noise, in steps, and reads a speed of exactly 0 soon after
-it has stopped. The targets are not touched.
+when the acceleration changes. Measured positions have noise and a finite resolution; the measured
+speed is exactly 0 soon after a joint has stopped. The targets are not changed.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
-#: Remainder of friction and ringing at which the computation ends [rad], [rad/s].
+#: Friction and ringing below which a joint is considered settled [rad], [rad/s].
 _RESIDUE = 1e-8
-#: After how many cycles the noise repeats, and by how many the quantities are apart in it.
+#: Period of the noise, and shift of the noise from one quantity to the next [cycles].
 _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
 
 
@@ -31,35 +31,35 @@ class Imperfections:
     """
     The imperfections of an arm and its controller; the defaults are an e-Series.
 
-    "Recorded" are figures of recordings of real arms; the rest is assumed.
+    "Recorded" marks figures from recordings of real arms; the others are assumed.
     """
 
-    #: How far the servo of a joint is behind its target [s]. Recorded: 0.0003 to 0.0013, with an
-    #: error of at most 0.0005 rad at 0.5 rad/s (UR5e), 0.001 at 0.8 and 0.0036 at 2.7 (UR3).
+    #: Time by which a joint lags behind its target [s]. Recorded: 0.0003 to 0.0013, with an error
+    #: of at most 0.0005 rad at 0.5 rad/s (UR5e), 0.001 at 0.8 and 0.0036 at 2.7 (UR3).
     lag: float = 0.0005
-    #: Error of a moving joint against its direction [rad]. Recorded: 0.0001 to 0.0003.
+    #: Error of a moving joint opposite to its direction [rad]. Recorded: 0.0001 to 0.0003.
     friction: float = 0.00015
-    #: Error of a resting joint against the direction in which it came [rad]. Recorded: 0.0001 or
-    #: less on e-Series and UR3, 0.0002 to 0.0004 on a CB3 UR10.
+    #: Error of a resting joint opposite to the direction of its last motion [rad]. Recorded:
+    #: 0.0001 or less on e-Series and UR3, 0.0002 to 0.0004 on a CB3 UR10.
     static_error: float = 0.0001
-    #: Time constant from one of these two errors to the other [s]. Assumed.
+    #: Time constant of the change between ``friction`` and ``static_error`` [s]. Assumed.
     friction_time: float = 0.02
-    #: Error of a joint per acceleration [rad per rad/s^2]. Assumed; stops from 2 to 4 rad/s^2 then
-    #: ring for as long as recorded.
+    #: Error of a joint per acceleration [rad per rad/s^2]. Assumed; with this value, stops from 2
+    #: to 4 rad/s^2 ring for as long as recorded.
     acceleration_error: float = 8e-5
     #: Frequency of the ringing after a change of acceleration [Hz]. Assumed.
     ringing_frequency: float = 10.0
-    #: Rate at which it dies out [1/s]. Recorded: at most 0.31 s above 0.005 rad/s, 0.58 s above
-    #: 0.001 rad/s.
+    #: Decay rate of the ringing [1/s]. Recorded: at most 0.31 s above 0.005 rad/s, at most 0.58 s
+    #: above 0.001 rad/s.
     ringing_decay: float = 6.0
-    #: Noise of measured joint positions, peak to peak [rad]. Recorded with resolution: 0.00005 to
-    #: 0.00017.
+    #: Noise of measured joint positions, peak to peak [rad]. Recorded, including the resolution:
+    #: 0.00005 to 0.00017.
     position_noise: float = 1e-4
-    #: Step of measured joint positions [rad]. Assumed: 17 bits, the least noise recorded.
+    #: Resolution of measured joint positions [rad]. Assumed: 17 bits, the least noise recorded.
     position_resolution: float = 2.0 * pi / 2**17
     #: Noise of measured joint speeds, peak to peak [rad/s]. Assumed.
     speed_noise: float = 0.002
-    #: Where the target stands, smaller speeds read exactly 0 [rad/s]. Recorded.
+    #: Smaller speeds are measured as exactly 0 while the target stands still [rad/s]. Recorded.
     speed_deadband: float = 0.001
     #: Share of RTDE packets after which one is left out. Recorded: 0.07 at 500 Hz.
     single_gaps: float = 0.07
@@ -68,16 +68,16 @@ class Imperfections:
     #: Most RTDE packets that are left out in a row. Recorded: gaps of 12 ms at 500 Hz, of 40 ms at
     #: 125 Hz.
     max_skipped: int = 5
-    #: Currents of the joints of an arm that is switched on [A]. Assumed, whatever it carries.
+    #: Joint currents of an arm that is switched on [A]. Assumed, independent of the payload.
     holding_current: Vector6 = (0.1, -1.6, -1.1, -0.3, 0.1, 0.05)
     #: Noise of measured currents, peak to peak [A]. Assumed.
     current_noise: float = 0.06
-    #: The same seed, the same noise and the same gaps.
+    #: Seed of the noise and of the gaps.
     seed: int = 1
 
 
 def typical_imperfections(model: RobotModel, seed: int = 1) -> Imperfections:
-    """Return what was recorded of the series of a model, or is assumed of it."""
+    """Return the imperfections recorded, or assumed, for the series of a model."""
     found = Imperfections(seed=seed)
     if model.series != 'CB3':
         return found
@@ -88,7 +88,7 @@ def typical_imperfections(model: RobotModel, seed: int = 1) -> Imperfections:
 
 
 class Motion(Protocol):
-    """Place and motion of an arm, in base axes."""
+    """Position and motion of an arm, in base axes."""
 
     @property
     def q(self) -> Vector6:
@@ -108,17 +108,17 @@ class Motion(Protocol):
 
 
 class ImperfectArm:
-    """The measured motion of an arm with imperfections; `step` once per cycle."""
+    """The measured motion of an arm with imperfections; call `step` once per cycle."""
 
     def __init__(self, motion: MotionGenerator, imperfections: Imperfections) -> None:
-        """Stand at the target, but for the static errors of an unknown past."""
+        """Begin at the target, apart from random static errors."""
         self._motion, self._imperfections = motion, imperfections
         random = Random(imperfections.seed)
         self._joints = [
             _Joint(imperfections, motion.cycle, position, random.uniform(-1.0, 1.0))
             for position in motion.q
         ]
-        # Drawn once: a cycle has little time.
+        # The noise is drawn once, because a cycle has little time.
         self._noise = [
             vector6(random.uniform(-0.5, 0.5) for _ in range(6)) for _ in range(_NOISE_CYCLES)
         ]
@@ -188,8 +188,8 @@ class _Joint:
     """
     One joint: a first-order lag, friction, and a damped oscillator that its acceleration excites.
 
-    Both are solved exactly for an acceleration that is constant over a cycle, so any cycle is
-    short enough.
+    Friction and oscillator are solved exactly for conditions that are constant over a cycle, so
+    any cycle is short enough.
     """
 
     __slots__ = (
@@ -215,12 +215,12 @@ class _Joint:
         self, imperfections: Imperfections, cycle: float, q: float, direction: float
     ) -> None:
         """
-        Stand at ``q`` [rad].
+        Begin at rest at ``q`` [rad].
 
-        :param direction: from where it came there, -1 to 1.
+        :param direction: direction of the motion before, -1 to 1; it scales the static error.
         """
         self._imperfections, self._cycle = imperfections, cycle
-        # A ramp is followed with exactly this lag, whatever the cycle.
+        # A ramp is followed with exactly this lag, independent of the cycle.
         self._follow_share = cycle / (cycle + imperfections.lag)
         self._drag_share = 1.0 - exp(-cycle / imperfections.friction_time)
         decay, omega = imperfections.ringing_decay, 2.0 * pi * imperfections.ringing_frequency
@@ -230,9 +230,9 @@ class _Joint:
         self.target = self._followed = q
         self._direction, self._drag = direction, -imperfections.static_error * direction
         self._bend = self._bend_speed = 0.0
-        #: Where the joint is [rad], and how fast it moves [rad/s].
+        #: Position [rad] and speed [rad/s] of the joint.
         self.position, self.speed = q + self._drag, 0.0
-        #: Whether nothing changes until the target moves.
+        #: Whether the joint does not change until its target moves.
         self.is_settled = True
         #: Whether the speed is measured as something other than 0.
         self.reads_speed = False
@@ -247,7 +247,7 @@ class _Joint:
         self._bend = bent + self._by_bend[0] * bend + self._by_speed[0] * speed
         self._bend_speed = self._by_bend[1] * bend + self._by_speed[1] * speed
         deadband, friction = imperfections.speed_deadband, imperfections.static_error
-        # Not by the sign of a speed that is only the rounding of inverse kinematics.
+        # A smaller speed can be rounding of inverse kinematics, whose sign means nothing.
         if abs(qd) > deadband:
             self._direction, friction = copysign(1.0, qd), imperfections.friction
         self._drag -= self._drag_share * (self._drag + friction * self._direction)

@@ -3,13 +3,13 @@
 """
 From motion calls to one target per control cycle.
 
-A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of it. The caller
-polls ``Move.returned`` and may make its next call in the same frame; then the motion goes on
-without an idle cycle.
+A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. The
+caller polls ``Move.returned`` and can make its next call in the same cycle; then the motion goes
+on without an idle cycle.
 
 Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
-are solved by inverse kinematics each cycle, from the solution before; where there is none the arm
-creeps up to the last solution and stops there with a fault.
+are solved by inverse kinematics in each cycle, starting from the previous solution; if there is no
+solution, the arm creeps up to the last one that exists and stops there with a fault.
 """
 
 from __future__ import annotations
@@ -63,11 +63,11 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: The first path of a program sets out slowly: for so long [s] its time runs at a rate that grows
-#: evenly from 0 to 1, which costs half of that. Recorded on UR3, UR3e and UR10e.
+#: The first path of a program starts slowly: for this long [s], the rate of its time grows evenly
+#: from 0 to 1, which delays it by half of this time. Recorded on UR3, UR3e and UR10e.
 START_TIME = 0.16
-#: What movej does without `a` and `v` [rad/s^2, rad/s]. Recorded on a UR3; the manual rounds them
-#: to 1.4 and 1.05.
+#: Acceleration and speed of movej without `a` and `v` [rad/s^2, rad/s]. Recorded on a UR3; the
+#: manual rounds them to 1.4 and 1.05.
 DEFAULT_JOINT_ACCELERATION, DEFAULT_JOINT_SPEED = radians(80.0), radians(60.0)
 
 
@@ -75,28 +75,28 @@ class MotionGenerator:
     """
     The target of the arm, one control cycle after the other; see :class:`ArmTarget`.
 
-    ``warnings`` collects reports for the controller, which takes them out. After a ``fault``
-    the arm stands until ``clear_fault``. ``max_tool_speed`` [m/s] is kept by all motion but stops.
+    ``warnings`` collects reports until the controller takes them. After a ``fault`` the arm stands
+    still until ``clear_fault``. All motions except joint stops keep ``max_tool_speed`` [m/s].
 
-    :param cycle: [s].
-    :param q: where the arm stands [rad].
+    :param cycle: duration of a cycle [s].
+    :param q: joint positions at the start [rad].
     """
 
     def __init__(self, arm: Arm, cycle: float, q: Vector6) -> None:
-        """Stand still at ``q`` with the flange as TCP."""
+        """Begin at rest at ``q`` with the flange as TCP."""
         self.arm = arm
         self.cycle = cycle
         self.max_tool_speed = MAX_TOOL_SPEED
-        #: How fast movel turns the tool for each m/s of its speed [rad/s].
+        #: Speed at which movel turns the tool for each m/s of its ``v`` [rad/s].
         self.turn_ratio = 1.0
-        #: The target of the motion, and what a program adds to it.
+        #: The target of the motion, and the offset that a program adds to the target.
         self._target = ArmTarget(arm, cycle, q)
         self.path_offset = ControllerPathOffset(self._target)
         self._active = RunningMotion(self._target)
         self._reports = MotionReports()
         self._paths = PathQueue(self._target, self._active, self._reports)
         self._stepper = CycleStepper(self._target)
-        #: The rate at which the time of a path runs, without speed scaling: 1 but for the start.
+        #: The rate at which the time of a path runs, without speed scaling: 1 except at the start.
         self._start_rate = 1.0
 
     # -- state -------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ class MotionGenerator:
 
     @property
     def T_flange_tcp(self) -> Pose:
-        """The tool centre point. A change takes effect on the next call, not on a running one."""
+        """The TCP. A change takes effect with the next call; a running call keeps its TCP."""
         return self._target.T_flange_tcp
 
     @T_flange_tcp.setter
@@ -154,7 +154,7 @@ class MotionGenerator:
 
     @property
     def scaling(self) -> float:
-        """The speed scaling of the last cycle: what was asked for, less at a limit of the arm."""
+        """The speed scaling of the last cycle: as requested, or less at a limit of the arm."""
         return min(self._active.rate, self._active.scale)
 
     @property
@@ -164,7 +164,7 @@ class MotionGenerator:
 
     @property
     def fault(self) -> MotionFault | None:
-        """Why the arm stands, until ``clear_fault``."""
+        """The fault that stopped the arm, until ``clear_fault``."""
         return self._reports.fault
 
     @property
@@ -189,7 +189,7 @@ class MotionGenerator:
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move straight with the tool; a, v [m/s^2, m/s; for rotations :attr:`turn_ratio`]."""
+        """Move the tool straight; a, v [m/s^2, m/s], for rotations times :attr:`turn_ratio`."""
         parameters, ratio = ProfileParameters(acceleration=a, speed=v, time=t), self.turn_ratio
         return self._start_path(
             'movel', lambda start: LinearMovePath(start.pose, T_base_tcp, ratio), parameters, r
@@ -199,8 +199,8 @@ class MotionGenerator:
         """
         Move straight at constant tool speed, through circular fillets.
 
-        The speed holds until the fillet: if no other motion follows, the arm brakes within it,
-        harder than ``a`` where it has to.
+        The speed is constant up to the fillet: if no other motion follows, the arm brakes within
+        the fillet, harder than ``a`` if necessary.
         """
         radius = self._drivable_radius('movep', r, v)
         parameters = constant_speed_parameters(a, v, radius)
@@ -210,7 +210,7 @@ class MotionGenerator:
         self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0, mode: int = 0
     ) -> Move:
         """
-        Move on a circle; mode 1 keeps the orientation fixed to the tangent.
+        Move on a circular arc; mode 1 keeps the orientation fixed relative to the tangent.
 
         :raises MotionError: the three points do not lie on a circle.
         """
@@ -265,7 +265,7 @@ class MotionGenerator:
         )
 
     def _drivable_radius(self, name: str, radius: float, speed: float) -> float:
-        """Return the radius, 0 where the tool passes it within one cycle: that is no blend."""
+        """Return the blend radius; 0 = no blend, if the tool would pass it within one cycle."""
         if not 0.0 < radius < speed * self.cycle:
             return radius
         self._reports.blend_too_small(name, radius)
@@ -276,7 +276,7 @@ class MotionGenerator:
     def servoj(
         self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
     ) -> Move:
-        """Lead the set-point to ``q`` within ``t`` scaled seconds, and follow it."""
+        """Move the set-point to ``q`` within ``t`` scaled seconds, and follow the set-point."""
         qd, before = self._active.nominal_joint_speed(), self._active.motion
         begin = before.setpoint(before.elapsed) if isinstance(before, ServoMotion) else self.q
         return self._replace(
@@ -298,20 +298,20 @@ class MotionGenerator:
 
     def stopj(self, a: float) -> Move:
         """
-        Brake in joint space at ``a`` [rad/s^2]; in real time, the path is not kept.
+        Brake in joint space at ``a`` [rad/s^2], in real time; the path is not kept.
 
-        It takes a cycle at least: programs stop again and again until the arm is steady.
+        A stop takes at least one cycle, because programs repeat it until the arm is steady.
         """
         return self._replace(self._active.joint_stop(a))
 
     def stopl(self, a: float, a_rot: float | None = None) -> Move:
-        """Brake along the tool's tangent; in real time, and a cycle at least."""
+        """Brake along the tool's tangent, in real time; a stop takes at least one cycle."""
         if not self.moving:
             return self.stopj(a)
         return self._replace(self._active.tool_stop(a, a if a_rot is None else a_rot))
 
     def end_path_offset(self, a: float) -> Move:
-        """Brake in joint space at ``a`` [rad/s^2], and go on without a path offset from there."""
+        """Brake in joint space at ``a`` [rad/s^2], and continue from there without an offset."""
         self.path_offset.end()
         return self._replace(JointStopMotion(self._target.q, self._target.qd, a))
 
@@ -322,23 +322,23 @@ class MotionGenerator:
         return self._active.replace(motion)
 
     def begin_program(self) -> None:
-        """Let the next path set out slowly."""
+        """Make the next path start slowly."""
         self._start_rate = 0.0
 
     def stop_at_once(self) -> None:
-        """Stay where the target is (the power is cut); let a running call return."""
+        """Stop at the present target, as if the power is cut; a running call returns."""
         self._paths.clear()
         self._active.abort()
         self._active.motion = None
         self._active.hold()
 
     def clear_fault(self) -> None:
-        """Allow motion again; the call that failed goes on from where the arm stands."""
+        """Allow motion again; the failed call continues from the arm's present position."""
         self._reports.fault = None
         self._stepper.forget_stall()
 
     def teleport(self, q: Vector6) -> None:
-        """Stand at ``q`` [rad] without having moved there."""
+        """Stand still at ``q`` [rad] without having moved there."""
         self._target.teleport(q)
         self.path_offset.forget()
         self._active.motion = self._active.move = None
@@ -347,7 +347,7 @@ class MotionGenerator:
     # -- one cycle ---------------------------------------------------------------------------
 
     def step(self, scale: float) -> None:
-        """Do one cycle at ``scale`` (0 to 1) of the speed: path unchanged, 0 is a pause."""
+        """Do one cycle at ``scale`` times the speed (0..1, 0 = pause), on the same path."""
         active = self._active
         self._paths.end_of_frame()
         active.scale = scale
@@ -376,7 +376,7 @@ class MotionGenerator:
         duration = cycle if motion.real_time else active.scale * start * cycle
         step = self._stepper.advance(motion, duration, self.max_tool_speed)
         if isinstance(step, MotionFault) and isinstance(motion, ToolStopMotion):
-            # No straight line left: brake in joint space.
+            # The arm cannot continue on the straight line: brake in joint space.
             motion = active.motion = active.joint_stop(motion.acceleration)
             step = self._stepper.advance(motion, cycle, self.max_tool_speed)
         if isinstance(step, MotionFault):
@@ -396,7 +396,7 @@ class MotionGenerator:
                 active.move.returned = True
 
     def _next_start_rate(self) -> float:
-        """Return the mean rate of a path's time in this cycle; a pause holds it."""
+        """Return the mean rate of a path's time in this cycle; it does not grow in a pause."""
         if self._active.scale <= 0.0:
             return 1.0
         before = self._start_rate

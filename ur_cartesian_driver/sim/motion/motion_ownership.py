@@ -3,11 +3,12 @@
 """
 Ownership of the arm among the threads of a program.
 
-One thread owns the motion: from its first motion call until it ends, or until the arm stands and
-the thread is in no motion call. Meanwhile a motion call of any other thread, a stop included, ends
-the program. A thread that is killed in the middle of a call leaves the arm moving; if no thread
-takes over in the same cycle, the controller brakes. (A stream of servoj, speedj or speedl that is
-not continued in the cycle in which its last call returned ends in the motion generator itself.)
+A thread owns the motion from its first motion call until the thread ends, or until the arm stands
+still and the thread is in no motion call. Meanwhile a motion call of any other thread, including a
+stop, ends the program. If a thread is killed in the middle of a call, the arm keeps moving; if no
+thread takes over in the same cycle, the controller brakes. (A stream of servoj, speedj or speedl
+that is not continued in the cycle in which its last call returned is ended by the motion
+generator.)
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.motion_values import MotionError, Move
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
-#: What a function of a program is that takes time: it yields once per cycle.
+#: A running script function that takes time: it yields once per cycle.
 Steps = Generator[None, None, None]
 
-#: How the controller brakes when a program ends or a stream dries up [rad/s^2]. The real value is
-#: not published; users call the stop very sudden.
+#: Deceleration when the controller brakes by itself: a program has ended off a path, a thread was
+#: killed, a move is aborted [rad/s^2]. Not published; users call the robot's stop very sudden.
 HARD_STOP = 15.0
 
 
@@ -51,7 +52,7 @@ class MotionOwnership:
         """
         Make a thread the owner.
 
-        :raises RuntimeException: another thread is in or between motions.
+        :raises RuntimeException: another thread owns the motion.
         """
         held = self._owner is not None and (self._calls > 0 or self._motion.moving)
         if held and self._owner != thread:
@@ -59,15 +60,15 @@ class MotionOwnership:
         self._owner, self._abandoned = thread, False
 
     def abort(self) -> None:
-        """Let the move that runs, if it can be aborted, brake and return."""
+        """Make the running move brake and return, if it can be aborted."""
         self._aborting = self._abortable > 0
 
     def run(self, call: Callable[[], Move], abortable: bool = False) -> Steps:
         """
-        Make a call of the motion generator and wait until it may return.
+        Make a call of the motion generator and wait until the call can return.
 
         :param abortable: `abort` makes the call brake at :data:`HARD_STOP` and return.
-        :raises RuntimeException: the call makes no sense.
+        :raises RuntimeException: the motion generator refuses the call.
         """
         try:
             move = call()
@@ -78,7 +79,7 @@ class MotionOwnership:
         finished = False
         try:
             if move.returned and not self._motion.moving:
-                yield  # programs repeat moves to where the arm stands: these take a cycle, too
+                yield  # a move to the arm's own position takes a cycle, too: programs repeat it
             while not move.returned:
                 if self._aborting and abortable:
                     self._aborting = False
@@ -91,21 +92,21 @@ class MotionOwnership:
             self._abandoned = self._abandoned or not finished
 
     def release(self, thread: Hashable) -> None:
-        """Let go when a thread has ended."""
+        """Take the motion from a thread that has ended."""
         if self._owner == thread:
             self._owner = None
 
     def end_of_frame(self) -> None:
-        """Brake if no thread has continued a motion that was left alone."""
+        """Brake if no thread has continued a motion whose thread was killed."""
         if self._calls == 0 and self._abandoned:
             self.brake()
 
     def let_go(self) -> None:
-        """Take the motion from every thread, and let it be."""
+        """Take the motion from its thread, without stopping the arm."""
         self._owner, self._abandoned = None, False
 
     def brake(self) -> None:
-        """Stop as hard as the controller does on its own."""
+        """Take the motion from its thread and brake at :data:`HARD_STOP`."""
         self.let_go()
         if self._motion.moving:
             self._motion.stopj(HARD_STOP)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault, MotionWarning, Move
 
-#: Arguments of C171 by move: a waypoint was skipped; a blend is too small.
+#: Arguments of C171 by move: for a skipped waypoint, and for a blend that is too small.
 _BLEND_SKIPPED_ARGUMENTS = {
     'movej': 4,
     'optimovej': 4,
@@ -19,13 +19,13 @@ _BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
 
 
 class MotionReports:
-    """Warnings to be taken out, and the fault at which the arm stands."""
+    """Warnings that the controller has not sent yet, and the fault that stopped the arm."""
 
     def __init__(self) -> None:
         """Begin with nothing to report."""
         self.fault: MotionFault | None = None
         self.warnings: list[MotionWarning] = []
-        #: The movep that has been reported to be too fast.
+        #: The last movep that was reported as too fast.
         self._too_fast: Move | None = None
 
     def blend_skipped(self, name: str) -> None:
@@ -55,7 +55,7 @@ class MotionReports:
         )
 
     def movep_too_fast(self, call: Move, reason: str) -> None:
-        """Report once of a movep that the arm cannot keep its speed."""
+        """Report once for each movep that the arm cannot keep its speed."""
         if call is not self._too_fast:
             self._too_fast = call
             self._warn(196, 0, f'MoveP speed too high: {reason}')

@@ -16,9 +16,9 @@ class Move:
     """
     One running motion call.
 
-    ``returned`` becomes true when the script call may return: the waypoint is reached, the next
+    ``returned`` becomes true when the script call can return: the waypoint is reached, the next
     cycle enters its blend, the stop has ended, the time is over, or another motion took over. The
-    arm may go on moving.
+    arm may still be moving.
     """
 
     returned: bool = False
@@ -26,7 +26,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionFault:
-    """Why the arm stopped by itself: error code ``C<code>A<argument>`` and its text."""
+    """The reason why the arm stopped by itself: error ``C<code>A<argument>`` and its text."""
 
     code: int
     argument: int

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The motion that the arm makes, and how a servo-like motion or a stop takes its place."""
+"""The running motion of the arm, and its replacement by a servo-like motion or a stop."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: How hard the arm brakes when servoj set-points stay away, or before a path [rad/s^2].
+#: Deceleration when servoj set-points stop coming, or before a path begins [rad/s^2].
 UNATTENDED_DECELERATION = 15.0
 
 
 class RunningMotion:
     """
-    The running motion, its call, and the speeds at which another one takes over.
+    The running motion, its call, and the speeds from which another motion takes over.
 
-    :param target: of the arm.
+    :param target: the target of the arm.
     """
 
     def __init__(self, target: ArmTarget) -> None:
@@ -35,7 +35,7 @@ class RunningMotion:
         self._target = target
         self.motion: Motion | None = None
         self.move: Move | None = None
-        #: The speed scaling of the last cycle: requested, and followed by the arm.
+        #: The speed scaling of the last cycle: as requested, and as achieved by the arm.
         self.scale = self.rate = 1.0
 
     @property
@@ -58,12 +58,12 @@ class RunningMotion:
         return self.move
 
     def abort(self) -> None:
-        """Let the running call return."""
+        """Make the running call return."""
         if self.move is not None:
             self.move.returned = True
 
     def hold(self) -> None:
-        """Stay for this cycle; no limit of the arm slows that down."""
+        """Stay in place for this cycle; the requested speed scaling is reported as achieved."""
         self._target.hold()
         self.rate = self.scale
 
@@ -98,7 +98,7 @@ class RunningMotion:
         return self._unscaled(self._twist())
 
     def _joint_speed(self) -> Vector6:
-        """Return the joint speed at the end of the last cycle (``qd`` is the mean of it)."""
+        """Return the joint speed at the end of the last cycle; the target has the mean speed."""
         motion = self.motion
         if motion is None or isinstance(motion, JointStopMotion):
             return STILL if motion is None else motion.qd

@@ -3,8 +3,9 @@
 """
 Motions without a path: servoj, speedj, speedl and the two stops.
 
-``preview`` looks ahead without going there, because the step may have to be shortened. Stops run
-in real time, whatever the speed scaling is, so that they always end; the others in scaled time.
+``preview`` looks ahead without changing the motion, because the step may have to be shortened.
+Stops run in real time, independent of the speed scaling, so that they always end; the other
+motions run in scaled time.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class _ToolMotion:
 @dataclass(slots=True)
 class JointSpeedMotion(_JointMotion):
     """
-    speedj: the leading axis changes its speed at ``acceleration``, all reach theirs together.
+    speedj: the leading axis changes its speed at ``acceleration``; all axes arrive together.
 
     :param duration: [s] after which the call returns; None = when the speed is reached.
     """
@@ -75,21 +76,21 @@ class JointSpeedMotion(_JointMotion):
     duration: float | None
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
-        """Return set-point and state after ``h`` seconds; the mean speed carries."""
+        """Return set-point and state after ``h`` seconds, from the mean speed."""
         change = subtract6(self.target, self.qd)
         size = max(map(abs, change))
         full = h if size <= _MIN_SPEED else min(h, size / self.acceleration)
         step = self.acceleration * h
         part = step / size if size > step else 1.0
         qd = self.target if part >= 1.0 else add_scaled6(self.qd, change, part)
-        # The change takes ``full`` seconds at the mean of both speeds, the rest is even.
+        # The change takes ``full`` seconds at the mean of both speeds, the rest has the new speed.
         q = add_scaled6(add_scaled6(self.q, self.qd, 0.5 * full), qd, 0.5 * full)
         q = add_scaled6(q, qd, h - full)
         return q, (q, qd, self.elapsed + h)
 
     @property
     def is_over(self) -> bool:
-        """Whether the call may return."""
+        """Whether the call can return."""
         return _speed_call_is_over(self.duration, self.elapsed, self.qd == self.target)
 
 
@@ -98,11 +99,11 @@ class ServoMotion(_JointMotion):
     """
     servoj: qdd = gain (u - (q + lookahead qd)), limited; u runs evenly between set-points.
 
-    A recorded UR5e does so at gain 300 and lookahead 0.1, within 0.06 urad. It follows a ramp
-    with a lag of exactly ``lookahead``; natural frequency sqrt(gain), damping
-    lookahead sqrt(gain) / 2.
+    A recorded UR5e agrees with this law within 0.06 urad, at gain 300 and lookahead 0.1. The law
+    follows a ramp with a lag of exactly ``lookahead``; its natural frequency is sqrt(gain), its
+    damping ratio lookahead sqrt(gain) / 2.
 
-    :param begin: the set-point before, from which u runs to the target during the duration.
+    :param begin: the previous set-point, from which u runs to the target during the duration.
     """
 
     begin: Vector6
@@ -123,7 +124,7 @@ class ServoMotion(_JointMotion):
         return q, (q, qd, self.elapsed + h)
 
     def setpoint(self, elapsed: float) -> Vector6:
-        """Return u a time after the call."""
+        """Return u at a time after the call [s]."""
         if elapsed >= self.duration - _ROUNDING:
             return self.target
         change = subtract6(self.target, self.begin)
@@ -131,13 +132,13 @@ class ServoMotion(_JointMotion):
 
     @property
     def is_over(self) -> bool:
-        """Whether the call may return."""
+        """Whether the call can return."""
         return self.elapsed >= self.duration - _ROUNDING
 
 
 @dataclass(slots=True)
 class JointStopMotion(_JointMotion):
-    """stopj: the leading axis brakes at ``acceleration`` [rad/s^2], all stand at the same time."""
+    """stopj: the leading axis brakes at ``acceleration`` [rad/s^2]; all axes stop together."""
 
     acceleration: float
     real_time = True
@@ -154,17 +155,17 @@ class JointStopMotion(_JointMotion):
 
     @property
     def is_over(self) -> bool:
-        """Whether the arm stands."""
+        """Whether the arm stands still."""
         return self.qd == STILL
 
 
 @dataclass(slots=True)
 class ToolSpeedMotion(_ToolMotion):
     """
-    speedl: the twist changes along a straight line, as recorded on a UR5e of URSim.
+    speedl: the twist changes along a straight line, as recorded on a UR5e in URSim.
 
-    :param acceleration: the most for the tool's speed [m/s^2].
-    :param acceleration_rot: the most for its rotation [rad/s^2].
+    :param acceleration: bound on the linear acceleration of the tool [m/s^2].
+    :param acceleration_rot: bound on the angular acceleration of the tool [rad/s^2].
     :param duration: [s] after which the call returns; None = when the speed is reached.
     """
 
@@ -183,7 +184,7 @@ class ToolSpeedMotion(_ToolMotion):
 
     @property
     def is_over(self) -> bool:
-        """Whether the call may return."""
+        """Whether the call can return."""
         return _speed_call_is_over(self.duration, self.elapsed, self.twist == self.target)
 
 
@@ -203,7 +204,7 @@ class ToolStopMotion(_ToolMotion):
 
     @property
     def is_over(self) -> bool:
-        """Whether the arm stands."""
+        """Whether the arm stands still."""
         return self.twist == STILL
 
 
@@ -213,7 +214,7 @@ ServoLikeMotion: TypeAlias = SetpointMotion | StopMotion
 
 
 def _speed_call_is_over(duration: float | None, elapsed: float, reached: bool) -> bool:
-    """Tell whether a speed call may return; at its speed already, it holds it for a cycle."""
+    """Return whether a speed call can return; it takes a cycle even if its speed is reached."""
     if duration is None:
         return elapsed > 0.0 and reached
     return elapsed >= duration - _ROUNDING
@@ -223,7 +224,7 @@ def _approach_twist(
     twist: Vector6, target: Vector6, acceleration: float, acceleration_rot: float, h: float
 ) -> Vector6:
     """
-    Return the twist ``h`` seconds nearer to the target, or the target.
+    Return the twist after a change towards the target for ``h`` seconds.
 
     It changes along a straight line, so translation and rotation arrive together.
     """
@@ -233,7 +234,7 @@ def _approach_twist(
 
 
 def _integrated_pose(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
-    """Move a pose for ``h`` seconds at the mean of two twists."""
+    """Return a pose after a motion of ``h`` seconds at the mean of two twists."""
     half = 0.5 * h
     vx, vy, vz, wx, wy, wz = (half * (a + b) for a, b in zip(before, after, strict=True))
     turn = quaternion_from_rotation_vector((wx, wy, wz))

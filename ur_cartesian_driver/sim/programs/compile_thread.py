@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compiles programs beside the controller's cycle.
+Compiles programs in parallel with the controller's cycles.
 
-Compiling takes some 7 us a byte, so a large program would keep the controller from its cycles for
-seconds. A thread does it, one program after the other. Compiled programs are
-used in the event loop, between two cycles.
+Compiling takes about 7 us per byte, so a large program would delay the cycles by seconds. A thread
+therefore compiles the programs, one after the other. The event loop uses the compiled programs
+between two cycles.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import TypeVar
 
 T = TypeVar('T')
 
-#: How long a compiling thread may keep the interpreter lock when the cycle wants it [s]; Python's
-#: own 5 ms are longer than a cycle.
+#: Longest time for which a compiling thread keeps the interpreter lock when a cycle needs it [s];
+#: Python's default of 5 ms is longer than a cycle.
 SWITCH_INTERVAL = 1e-4
-#: A program of more objects is never looked through by the garbage collector, which would keep the
-#: controller from its cycles for a second; what remains of it when it ends stays in memory.
+#: Programs with more objects are exempt from garbage collection, which would delay the cycles by a
+#: second; objects that remain when such a program ends stay in memory.
 MAX_NEW_OBJECTS = 100_000
 
 
 class CompileThread:
-    """Runs work in a thread, and what follows from it in an event loop; in the order of calls."""
+    """Does work in a thread and passes its results to an event loop, in the order of the calls."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         """Start the thread."""
@@ -40,14 +40,14 @@ class CompileThread:
         self._closed = False
         self._idle = asyncio.Event()
         self._idle.set()
-        # A daemon: the process may end while it compiles.
+        # A daemon, so that the process can end while the thread compiles.
         threading.Thread(target=self._run, name='ur-sim compiler', daemon=True).start()
 
     def compile(self, work: Callable[[], T], then: Callable[[T], None]) -> None:
         """
-        Compile something.
+        Do some work in the thread.
 
-        :param then: called in the event loop, with the result.
+        :param then: called in the event loop, with the result of the work.
         """
 
         def finish(result: T) -> None:
@@ -73,7 +73,7 @@ class CompileThread:
 
     def close(self) -> None:
         """
-        End the thread after the program that it compiles, without waiting.
+        End the thread after the program that it is compiling, without waiting for it.
 
         To be called in the event loop.
         """
@@ -90,10 +90,10 @@ class CompileThread:
 
 class _InterpreterForCycles:
     """
-    While something compiles: switches between threads in time for a cycle, and collects nothing.
+    The settings of Python during compiling: fast thread switches and no garbage collection.
 
-    Simulators in one process may compile at once: the first one to begin changes the interpreter,
-    the last one to end changes it back.
+    Several simulators in one process can compile at the same time: the first one to begin changes
+    the settings, the last one to end restores them.
     """
 
     def __init__(self) -> None:

@@ -3,13 +3,13 @@
 """
 Interpreter mode: a program executes the statements that clients send, in order.
 
-A statement is compiled and numbered as it arrives and answered by `ack: <number>: <statement>`, or
-by `discard: <reason>: <statement>`, and is executed after those before it. While no program is in
-interpreter mode statements wait, without an answer; they also wait behind one that clears or ends
-it, because they could name a variable that is about to be deleted. Commands are executed at once,
-before statements that wait.
+A statement is compiled and numbered when it arrives, answered with `ack: <number>: <statement>` or
+`discard: <reason>: <statement>`, and executed after the previous statements. While no program is
+in interpreter mode, statements wait without an answer. They also wait after a statement that
+clears or ends the mode, because they could name a variable that is about to be deleted. Commands
+are executed at once, before waiting statements.
 
-Decided where nothing is documented: statements while no program runs are discarded, and `abort`
+Assumed, because it is not documented: while no program runs, statements are discarded, and `abort`
 and `skipbuffer` are acknowledged with the number of the last statement.
 """
 
@@ -27,23 +27,23 @@ from ur_cartesian_driver.urscript import (
     ScriptInterpreter,
 )
 
-#: Bound on statements that wait to be compiled or executed; a robot takes about as many.
+#: Bound on statements that wait to be compiled or executed; a robot accepts about as many.
 MAX_QUEUED_STATEMENTS = 500
-#: A statement that calls one of these is executed before the next one is compiled.
+#: A statement that calls one of these functions is executed before the next one is compiled.
 _CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
 
 
 class InterpreterMode:
-    """The statements of all clients, and which of them are compiled and executed."""
+    """The statements of all clients, and their compilation and execution."""
 
     def __init__(self, programs: ProgramRunner, ownership: MotionOwnership) -> None:
         """
         Begin with no statements.
 
-        :param programs: its interpreter compiles and runs the statements.
-        :param ownership: of the motion, which `abort` stops.
+        :param programs: the runner whose interpreter compiles and runs the statements.
+        :param ownership: the ownership of the motion, which `abort` stops.
         """
         self._programs = programs
         self._ownership = ownership
@@ -60,7 +60,7 @@ class InterpreterMode:
         self.end_of_program()
 
     def end_of_program(self) -> None:
-        """Drop all statements and count from 1 again."""
+        """Discard all statements, and number the next ones from 1 again."""
         self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
@@ -121,11 +121,11 @@ class InterpreterMode:
 
     def run(self, clear_queue: bool, clear_on_end: bool) -> Steps:
         """
-        Execute statements until one, or another thread, ends the mode.
+        Execute statements until a statement, or another thread, ends the mode.
 
-        :param clear_queue: discard the statements that have been waiting.
-        :param clear_on_end: delete the statements' definitions when the mode ends.
-        :raises RuntimeException: not in the main thread, or inside a statement.
+        :param clear_queue: whether to discard the statements that have been waiting.
+        :param clear_on_end: whether to delete the statements' definitions when the mode ends.
+        :raises RuntimeException: the call is not in the main thread, or inside a statement.
         """
         interpreter = self._programs.interpreter
         if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:
@@ -150,7 +150,7 @@ class InterpreterMode:
         self._interpreter = None
 
     def end(self) -> None:
-        """Let the mode end after the statement that is being executed."""
+        """End the mode after the statement that is being executed."""
         self._end_wanted = True
 
     def clear(self) -> None:
@@ -158,7 +158,7 @@ class InterpreterMode:
         self._clear_wanted = True
 
     def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:
-        """Delete what statements have defined, and end the threads that they have started."""
+        """Delete the definitions of all statements, and end the threads that they have started."""
         interpreter.kill_since(first_thread)
         interpreter.lines.forget()
         self._queue.clear()

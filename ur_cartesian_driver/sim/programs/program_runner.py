@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Programs from start to end: one primary program, and secondary ones beside it.
+Programs from start to end: one primary program, and secondary programs in parallel with it.
 
 ::
 
@@ -10,9 +10,9 @@ Programs from start to end: one primary program, and secondary ones beside it.
                        +------------- RESUMING <-------play---------+
     any of these --end, halt, exception, stop, new program--> STOPPING --arm stands--> STOPPED
 
-When a program is stopped while the arm moves, the controller stops it on its path; the next
-program starts when the arm stands. A program that does not compile is refused with line and
-column; the running one goes on.
+If a program is stopped while the arm moves, the controller stops the arm on its path; the next
+program starts when the arm stands still. A program that does not compile is refused with line and
+column; the running program goes on.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 T = TypeVar('T')
 
-#: Clients send the same program again and again; its tree is immutable.
+#: A cache, because clients send the same program again and again; its tree is immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
 
 #: States of a program that has not ended.
@@ -56,10 +56,10 @@ class CompiledProgram(NamedTuple):
 
 
 class CompileAside(Protocol):
-    """Does work, and then something with its result, sooner or later."""
+    """Does work and passes its result on, at once or later."""
 
     def __call__(self, work: Callable[[], T], then: Callable[[T], None]) -> None:
-        """Do the work and what follows."""
+        """Do the work, and call ``then`` with its result."""
 
 
 def _compile_at_once(work: Callable[[], T], then: Callable[[T], None]) -> None:
@@ -71,20 +71,20 @@ class ProgramArm(Protocol):
 
     @property
     def at_rest(self) -> bool:
-        """Whether the arm stands, at the end of a motion or paused on its path."""
+        """Whether the arm stands still, at the end of a motion or paused on its path."""
 
     @property
     def on_path(self) -> bool:
-        """Whether a move is running or slows down, and not a stream of set-points."""
+        """Whether a path move is running or slowing down, rather than a stream of set-points."""
 
     def brake(self) -> None:
-        """Stop as hard as the controller does on its own."""
+        """Stop the arm because the program has ended."""
 
     def begin_program(self) -> None:
         """Get ready for the first motion of a program."""
 
     def end_modes(self) -> None:
-        """End what a program has switched on: force mode, freedrive, watchdogs."""
+        """End the modes that a program has switched on: force mode, freedrive, watchdogs."""
 
     def end_of_frame(self) -> None:
         """Brake if no thread continues the motion."""
@@ -93,7 +93,7 @@ class ProgramArm(Protocol):
         """Take the motion from a thread that has ended."""
 
     def start_refusal(self) -> str:
-        """Return why no program can run now, or an empty string."""
+        """Return the reason why no program can run now; empty = a program can run."""
 
 
 class ProgramRunner:
@@ -125,20 +125,20 @@ class ProgramRunner:
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
         self._loaded: ScriptProgram | None = None
-        #: Of the program that was compiled last: the same one often follows.
+        #: Names of the program that was compiled last, because the same program often follows.
         self._newest_scope: Scope | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
         self.state = RuntimeState.STOPPED
-        #: The state at the end of the cycle before, which clients have read.
+        #: The state at the end of the previous cycle, which clients have read.
         self._reported_state = self.state
         #: Name of the running program, or of the last one.
         self.name = ''
-        #: Called when a program has ended or before another starts: sockets are closed here.
+        #: Called when a program has ended, to close its sockets.
         self.on_end: Callable[[], None] | None = None
-        #: How often programs were stopped: what was sent before a stop does not start after it.
+        #: Number of stops: a program that was sent before a stop does not start after it.
         self._stops = 0
-        #: Compiles, and passes the result on: at once, unless cycles go on meanwhile.
+        #: Compiles and passes the result on: at once, or in a thread while the cycles go on.
         self.compile_aside: CompileAside = _compile_at_once
 
     @property
@@ -159,7 +159,7 @@ class ProgramRunner:
 
     def submit(self, text: str, line_offset: int = 0) -> None:
         """
-        Compile a program and start it, or run it beside the primary one if it is a `sec`.
+        Compile a program and start it; a `sec` runs in parallel with the primary program.
 
         :param line_offset: number of lines put before the text of the client.
         """
@@ -178,7 +178,7 @@ class ProgramRunner:
         self.compile_aside(lambda: self._compile_text(text), start)
 
     def _compile_text(self, text: str) -> CompiledProgram | CompileError:
-        """Compile a program; called in another thread, perhaps."""
+        """Compile a program, possibly in another thread."""
         try:
             program = _parse_cached(text)
             if program.kind == 'sec':
@@ -198,10 +198,10 @@ class ProgramRunner:
 
     def load(self, name: str, text: str) -> str:
         """
-        Make a program the one that `play` starts; return why not, or an empty string.
+        Load the program that `play` starts; return the reason of a refusal, else an empty string.
 
-        A script that a client has sent is not loaded: once stopped it cannot be played, as on the
-        robot.
+        A script that a client has sent is not loaded, so once stopped it cannot be played, as on
+        the robot.
         """
         if self.running:
             return 'a program is running'
@@ -220,7 +220,7 @@ class ProgramRunner:
             self._builtins,
             thread_delay=self._thread_delay,
             interleaving=self._interleaving,
-            # In a thread of its own all of it can be done at once, and no cycle waits later.
+            # A separate thread compiles the whole program at once, so no cycle has to wait later.
             lazily=self.compile_aside is _compile_at_once,
             scope=known if known is not None and known.owner is program else None,
         )
@@ -235,10 +235,10 @@ class ProgramRunner:
 
     def _start_waiting(self) -> None:
         """
-        Start the program that waits, once the arm stands.
+        Start the waiting program, once the arm stands still.
 
-        One that comes during or after a stream of set-points starts at once and may go on with
-        it: clients stream `speedj` and `speedl`, each a program of its own.
+        A program that comes during or after a stream of set-points starts at once and can continue
+        the stream: clients stream `speedj` and `speedl`, each as a program of its own.
         """
         taken_over = self.state is RuntimeState.STOPPING and not self._arm.on_path
         if self._queued is None or not (taken_over or self.state is RuntimeState.STOPPED):
@@ -249,11 +249,11 @@ class ProgramRunner:
         interpreter.on_thread_end = lambda number: self._arm.release((id(interpreter), number))
         self.state = RuntimeState.PLAYING
         self._arm.begin_program()
-        # XXX is what a controller writes; the name of the program follows as the text.
+        # A real controller writes XXX, too; the text of the message is the name of the program.
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
     def play(self) -> str:
-        """Resume, or start the loaded program; return why not, or an empty string."""
+        """Resume, or start the loaded program; return the reason of a refusal, or ''."""
         reason = self._arm.start_refusal()
         if reason:
             return reason
@@ -268,30 +268,30 @@ class ProgramRunner:
         return ''
 
     def pause(self) -> str:
-        """Pause on the path; return why not, or an empty string."""
+        """Pause on the path; return the reason of a refusal, else an empty string."""
         if self.state not in (RuntimeState.PLAYING, RuntimeState.RESUMING):
             return 'no program is playing'
         self.state = RuntimeState.PAUSING
         return ''
 
     def stop(self) -> None:
-        """End the program, also one that is being compiled; the arm brakes."""
+        """End the program, even if it is still being compiled; the arm brakes."""
         self._stops += 1
         self._queued = None
         self._end()
 
     def _end(self) -> None:
-        """End the program that runs; the arm brakes."""
+        """End the running program; the arm brakes."""
         if not self.running:
             return
         self.state = RuntimeState.STOPPING
         if self._stepping is not None and self._stepping is self._interpreter:
-            self._stepping.stop()  # called by one of its own functions: it ends when that returns
+            self._stepping.stop()  # called by its own function; ends when this returns
         else:
             self._finish()
 
     def _finish(self) -> None:
-        """Stop the interpreter and end what belongs to the program."""
+        """Stop the interpreter, end the program's modes and motion, and close its sockets."""
         interpreter, self._interpreter = self._interpreter, None
         if interpreter is not None:
             interpreter.stop()
@@ -303,7 +303,7 @@ class ProgramRunner:
         self._messages.key('PROGRAM_XXX_STOPPED', self.name)
 
     def step(self) -> None:
-        """Run one frame."""
+        """Run the programs for one frame."""
         self._change_state()
         if self.state is RuntimeState.PLAYING and self._interpreter is not None:
             self._run(self._interpreter)

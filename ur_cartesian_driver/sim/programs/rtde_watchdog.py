@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Watches that RTDE inputs are written as often as a program demands."""
+"""Checks that RTDE inputs are written as often as a program demands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Watchdogs:
     """The watches that `rtde_set_watchdog` has set; they end with the program."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin without watches."""
         self._watches: dict[str, _InputWatch] = {}
 
     def watch(self, variable: str, frequency: float, action: str, now: float) -> None:
@@ -45,5 +45,5 @@ class Watchdogs:
         return late
 
     def clear(self) -> None:
-        """Watch nothing."""
+        """End all watches."""
         self._watches.clear()

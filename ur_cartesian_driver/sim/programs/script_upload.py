@@ -3,10 +3,10 @@
 """
 Cuts the stream of a script port into programs and single lines.
 
-A program begins with `def` or `sec` in column 1 and may come in any number of pieces. If all of it
-is indented, it ends with `end` in column 1, as the robot's manual demands. A program without
-indentation ends where all its blocks have ended. (Counting blocks in indented programs, too, would
-leave one that lacks an `end` without an answer.) Any other line is a command or a statement.
+A program begins with `def` or `sec` in column 1 and can come in any number of pieces. If its whole
+body is indented, it ends with `end` in column 1, as the robot's manual demands. A program without
+indentation ends when all its blocks have ended. (If blocks were counted in indented programs, too,
+a program that lacks an `end` would never be answered.) Any other line is a command or a statement.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from typing import TypeAlias
 from ur_cartesian_driver.urscript.parsing.scanner import scan, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Longest program [bytes]; it takes some ten seconds to compile. The manufacturer publishes no
+#: Longest program [bytes]; compiling it takes about ten seconds. The manufacturer publishes no
 #: such bound.
 MAX_UPLOAD_SIZE = 1024 * 1024
 
 _BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})
-#: What a line without blocks has not; most lines are such.
+#: A word that opens or closes a block; most lines have none.
 _BLOCK_WORD = re.compile(rf'\b(?:end|{"|".join(sorted(_BLOCKS))})\b')
 
 
@@ -44,7 +44,7 @@ class UploadedLine:
 
 @dataclass(frozen=True, slots=True)
 class UploadTooLong:
-    """A line or program that exceeds the bound; what follows of it is skipped."""
+    """A line or program that exceeds the bound; the rest of it is skipped."""
 
     text: str = (
         f'The program is longer than {MAX_UPLOAD_SIZE >> 20} MiB, which this controller does not '
@@ -69,7 +69,7 @@ class UploadDecoder:
         self._skipping = False
 
     def feed(self, data: bytes) -> list[UploadedItem]:
-        """Return complete programs; report one that is too long once."""
+        """Return complete programs and lines; a program that is too long is reported once."""
         *lines, self._rest = (self._rest + data).split(b'\n')
         found = [item for line in lines if (item := self._line(line)) is not None]
         if self._size + len(self._rest) > MAX_UPLOAD_SIZE:
@@ -79,7 +79,7 @@ class UploadDecoder:
         return found
 
     def _skip(self) -> UploadTooLong:
-        """Forget the program, and what follows of it up to its `end` in column 1."""
+        """Discard the program, and skip the rest of it up to its `end` in column 1."""
         self._program, self._size, self._skipping = [], 0, True
         return UploadTooLong()
 
@@ -109,7 +109,7 @@ class UploadDecoder:
 
 @lru_cache(maxsize=4096)  # clients send the same program again and again
 def _block_balance(line: str) -> int:
-    """Return how many more blocks a line opens than it closes."""
+    """Return the number of blocks that a line opens, minus the number that it closes."""
     if not _BLOCK_WORD.search(line):
         return 0
     try:

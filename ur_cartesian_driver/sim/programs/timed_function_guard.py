@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The functions of a secondary program, which runs beside the primary one and takes no time."""
+"""The functions of a secondary program, which takes no time while the primary program runs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 Builtins = Mapping[str, Any]
 
 
-#: Functions that act at once and take time only afterwards: a secondary program does not wait.
+#: Functions that act at once and only then take time, for which a secondary program does not wait.
 ACT_AT_ONCE = frozenset({'protective_stop'})
 
 
 def refuse_timed_functions(builtins: Builtins) -> Builtins:
-    """Return the functions of a secondary program: what takes time raises."""
+    """Return the functions of a secondary program, where those that take time raise an error."""
     return {
         name: _without_time(name, function) if inspect.isgeneratorfunction(function) else function
         for name, function in builtins.items()
@@ -34,7 +34,7 @@ def _without_time(name: str, function: Any) -> Any:
             raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
         next(function(*arguments, **named))
 
-    # The function's signature stays; its mark as a generator must not.
+    # Keep the function's signature, but not its mark as a generator.
     act_or_refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
         function
     )

@@ -3,8 +3,8 @@
 """
 The sockets that programs open, as the builtins see them.
 
-No method waits: a builtin asks once per cycle and yields in between. `tcp_script_sockets` has real
-TCP; the sockets in memory are for programs on the virtual clock.
+No method waits: a builtin asks once per cycle and yields in between. `tcp_script_sockets` uses
+real TCP; the sockets in memory are for programs on the virtual clock.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ScriptSockets(Protocol):
         """Return the unread bytes; the reader deletes those it takes."""
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send without waiting; tell whether the socket took it."""
+        """Send without waiting; return whether the socket accepted the data."""
 
     def close(self, name: str) -> None:
         """Close; an unknown name is no error."""
@@ -44,7 +44,7 @@ class ScriptSockets(Protocol):
         """Close every socket, as the end of a program does."""
 
     def poll(self) -> None:
-        """Go on with connecting and sending; called once per cycle."""
+        """Continue connecting and sending; called once per cycle."""
 
 
 class MemorySocket:
@@ -67,7 +67,7 @@ class MemorySocket:
         return data
 
     def hang_up(self) -> None:
-        """Close the peer's side; what was sent can still be read."""
+        """Close the peer's side; bytes sent before can still be read."""
         self.state = SocketState.CLOSED
 
 
@@ -86,14 +86,14 @@ class MemorySockets:
         return accepted
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Connect at once, or not at all."""
+        """Connect at once, if the port has a listener."""
         self.close(name)
         if port in self.listeners:
             self._sockets[name] = MemorySocket()
             self.listeners[port](self._sockets[name])
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a name."""
+        """Return the state of a socket."""
         return self._sockets[name].state if name in self._sockets else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
@@ -108,14 +108,14 @@ class MemorySockets:
         return True
 
     def close(self, name: str) -> None:
-        """Close one."""
+        """Close a socket."""
         if socket := self._sockets.pop(name, None):
             socket.hang_up()
 
     def close_all(self) -> None:
-        """Close all."""
+        """Close all sockets."""
         for name in list(self._sockets):
             self.close(name)
 
     def poll(self) -> None:
-        """Do nothing: everything has happened already."""
+        """Do nothing, because connecting and sending take effect at once."""

@@ -3,8 +3,9 @@
 """
 The sockets of programs over real TCP, polled by the controller's cycle.
 
-The event loop does not serve them, because a program reads only in its own cycle: unread bytes
-stay in the kernel, and a paused program stops its peer by TCP's flow control, as on the robot.
+The event loop does not serve these sockets, because a program reads only in its own cycle: unread
+bytes stay in the kernel, and while a program is paused, TCP's flow control stops its peer, as on
+the robot.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
 
-#: Of IPv4, of IPv6, and what a Python without IPv6 gives, which connecting refuses.
+#: Addresses of IPv4, of IPv6, and of a Python without IPv6; connecting to the last kind fails.
 _Address = tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]
 _Resolved = Sequence[tuple[int, int, int, str, _Address]]
 
@@ -52,7 +53,7 @@ class _ScriptConnection:
         self._continue_connecting()
 
     def poll(self) -> None:
-        """Go on with resolving, connecting or sending."""
+        """Continue resolving, connecting or sending."""
         if self.resolving is not None and self.resolving.done():
             resolving, self.resolving = self.resolving, None
             try:
@@ -91,7 +92,7 @@ class _ScriptConnection:
                 self._on_data(self._port, data)
 
     def send(self, data: bytes) -> bool:
-        """Send; keep bytes that the kernel does not take. False if too many are kept already."""
+        """Send data and keep bytes that the kernel does not accept; False = too many are kept."""
         if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
             return False
         self._outgoing += data
@@ -132,11 +133,11 @@ class TcpScriptSockets:
         self, on_data: Callable[[int, bytes], None] | None = None, host: str = ''
     ) -> None:
         """
-        Begin with none.
+        Begin without connections.
 
-        :param on_data: called with the peer's port and the bytes that are received from it.
-        :param host: the robot's address. On loopback, connections come from it, so that a peer can
-            tell several robots of one computer apart.
+        :param on_data: called with the peer's port and the bytes that are received from the peer.
+        :param host: the robot's address. On loopback, connections come from this address, so that
+            a peer can distinguish several robots on one computer.
         """
         self.on_data, self._host = on_data, host
         self._connections: dict[str, _ScriptConnection] = {}
@@ -166,12 +167,12 @@ class TcpScriptSockets:
         return self._resolver.submit(socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)
 
     def state(self, name: str) -> SocketState:
-        """Return the state of a name."""
+        """Return the state of a socket."""
         connection = self._connections.get(name)
         return connection.state if connection else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
-        """Return what has arrived on a name."""
+        """Return the unread bytes of a socket."""
         connection = self._connections.get(name)
         if connection is None:
             return bytearray()
@@ -179,17 +180,17 @@ class TcpScriptSockets:
         return connection.incoming
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send on a name."""
+        """Send on a socket."""
         connection = self._connections.get(name)
         return connection is not None and connection.send(data)
 
     def close(self, name: str) -> None:
-        """Close one."""
+        """Close a socket."""
         if connection := self._connections.pop(name, None):
             connection.close()
 
     def close_all(self) -> None:
-        """Close all, and end the look-ups."""
+        """Close all sockets, and end the look-ups."""
         for name in list(self._connections):
             self.close(name)
         if self._resolver is not None:
@@ -197,6 +198,6 @@ class TcpScriptSockets:
             self._resolver = None
 
     def poll(self) -> None:
-        """Go on with connecting and sending."""
+        """Continue connecting and sending."""
         for connection in self._connections.values():
             connection.poll()

@@ -3,8 +3,8 @@
 """
 Inputs, outputs and registers of the simulated controller.
 
-RTDE clients and programs write them, and both read them. Registers are plain lists, indexed as in
-the robot's manual: bit 0-127, integer and float 0-47.
+RTDE clients and programs read and write them. Registers are plain lists, indexed as in the robot's
+manual: bit 0-127, integer and float 0-47.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 
 REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
-#: Port addresses, which Modbus clients of a real robot share with its programs.
+#: Number of port addresses, which Modbus clients of a real robot share with its programs.
 PORTS = 256
 
 
-#: Registers that RTDE transfers one by one: their type there, their list, their numbers. It
-#: packs the bits before them into integers.
+#: Registers that RTDE transfers one by one: type in RTDE, list in :class:`Registers`, numbers.
+#: RTDE packs the bits before number 64 into integers.
 _SINGLE_REGISTERS = (
     ('bit', 'bits', range(64, REGISTER_BITS)),
     ('int', 'integers', range(REGISTER_INTEGERS)),
@@ -84,10 +84,10 @@ class ControllerIo:
 
     digital_in: DigitalPort = field(default_factory=DigitalPort)
     digital_out: DigitalPort = field(default_factory=DigitalPort)
-    #: [V] or [A] by the domain; True = voltage.
+    #: Values in [V] or [A], and their domains; True = voltage.
     analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     analog_in_voltage: list[bool] = field(default_factory=lambda: [True, True])
-    #: Outputs are 4 mA at first, as recorded in URSim and set by the programs of a pendant.
+    #: Outputs are 4 mA at first, as recorded in URSim and as set by programs from the pendant.
     analog_out: list[float] = field(default_factory=lambda: [0.004, 0.004])
     analog_out_voltage: list[bool] = field(default_factory=lambda: [False, False])
     tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
@@ -96,7 +96,7 @@ class ControllerIo:
     external_force: Vector6 = (0.0,) * 6
     inputs: Registers = field(default_factory=Registers)
     outputs: Registers = field(default_factory=Registers)
-    #: ``set_flag`` / ``get_flag``; they survive programs.
+    #: Flags of ``set_flag`` and ``get_flag``, which outlive programs.
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
     port_bits: list[bool] = field(default_factory=lambda: [False] * PORTS)
     port_registers: list[int] = field(default_factory=lambda: [0] * PORTS)

@@ -60,11 +60,11 @@ class ControllerMessages:
         self.pending.append(TextMessage(timestamp=self._stamp(), text=_cut(text)))
 
     def key(self, title: str, text: str) -> None:
-        """Send that a program has started, stopped or failed."""
+        """Report that a program has started, stopped or failed."""
         self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
     def exception(self, line: int, column: int, text: str) -> None:
-        """Send why a program does not start, or has ended; line and column from 1."""
+        """Report the error at which a program does not start or ends; line and column from 1."""
         self.log.append(f'{line}:{column}: {text}')
         self.pending.append(
             RuntimeExceptionMessage(
@@ -73,7 +73,7 @@ class ControllerMessages:
         )
 
     def error(self, code: int, argument: int, text: str) -> None:
-        """Send an error code; to the controller even a protective stop is a warning."""
+        """Send an error code; the controller reports even a protective stop as a warning."""
         message = ErrorCodeMessage(
             timestamp=self._stamp(),
             code=code,
@@ -92,7 +92,7 @@ class ControllerMessages:
 
     def popup(self, popup: Popup) -> None:
         """
-        Send that a window is shown.
+        Report that a window is shown.
 
         Body: u32 request, u8 type of the request, flags warning, error, blocking, u8 length of
         the title, title, text.
@@ -116,7 +116,7 @@ class ControllerMessages:
 
 
 def _cut(text: str) -> str:
-    """Return the text, cut to what fits into a message."""
+    """Return the text, shortened to fit into a message."""
     return (
         text
         if len(text) < _MAX_TEXT_LENGTH // 4

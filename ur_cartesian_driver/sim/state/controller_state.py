@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""State of the controller that programs set."""
+"""State of the controller that programs and dashboard clients set."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ class Popup:
 
 @dataclass(slots=True, kw_only=True)
 class Pendant:
-    """Settings of the pendant by dashboard clients, for all of them."""
+    """Settings of the pendant, shared by all dashboard clients."""
 
     user_role: str = 'PROGRAMMER'
-    #: NONE: no client controls it.
+    #: NONE: no client controls the operational mode.
     operational_mode: str = 'NONE'
 
 
 @dataclass(slots=True, kw_only=True)
 class ProcessState:
-    """Process settings of a program; they end with it."""
+    """Process settings of a program; they end with the program."""
 
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
     def has_pause_on(self, code: int, argument: int) -> bool:
-        """Tell whether an error shall pause the program."""
+        """Return whether an error pauses the program."""
         return bool(self.pause_on & {(code, argument), (code, None)})

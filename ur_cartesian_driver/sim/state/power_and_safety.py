@@ -24,9 +24,9 @@ class SafetyEvent(Enum):
     """An event that the safety system reacts to."""
 
     PROTECTIVE_STOP = 'protective stop'
-    #: By pendant or dashboard, which both make a person wait.
+    #: Unlock by pendant or dashboard, refused until the unlock delay has passed.
     UNLOCK = 'unlock protective stop'
-    #: By a line on the primary interface, which does not.
+    #: Unlock by a line on the primary interface or by the Robot API, without the unlock delay.
     UNLOCK_BY_LINE = 'set unlock protective stop'
     EMERGENCY_STOP = 'emergency stop'
     RELEASE = 'release the emergency stop'
@@ -69,7 +69,7 @@ SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = Mapp
     }
 )
 
-#: The bits that RTDE reports beside the mode.
+#: The bits that RTDE reports in addition to the mode.
 STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType(
     {
         SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
@@ -87,7 +87,7 @@ STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType(
     }
 )
 
-#: Modes in which the arm may be powered and may move.
+#: Modes in which the arm can be powered and can move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 #: Modes in which the brakes hold and the motors are off.
 POWERLESS = frozenset(
@@ -109,7 +109,7 @@ class SafetySystem:
         """
         Begin in NORMAL.
 
-        :param unlock_delay: [s] during which an unlock is refused.
+        :param unlock_delay: time after a protective stop during which an unlock is refused [s].
         """
         self.mode = SafetyMode.NORMAL
         self._unlock_delay = unlock_delay
@@ -117,7 +117,7 @@ class SafetySystem:
 
     def step(self, event: SafetyEvent, now: float) -> str:
         """
-        Take an event; return why it is refused, or an empty string.
+        Process an event; return the reason of a refusal, else an empty string.
 
         :param now: the controller's clock [s].
         """
@@ -166,6 +166,6 @@ class ArmPower:
         self._goal = max(self._goal, goal)
 
     def step(self, now: float) -> None:
-        """Go to the next mode when the time of this one is over."""
+        """Go to the next mode when the time of the present mode is over."""
         if self.mode < self._goal and now - self._since >= self._times[self.mode]:
             self.mode, self._since = _POWER_SEQUENCE[_POWER_SEQUENCE.index(self.mode) + 1], now

@@ -18,9 +18,9 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     ZERO3,
 )
 
-#: Below this speed along a surface friction grows with the speed [m/s].
+#: Below this speed along a surface, friction is proportional to the speed [m/s].
 STICKING_SPEED = 1e-3
-#: Stiffer [N/m] and more damped [N s/m] ones would not be stable at the controller's cycle.
+#: Bodies of higher stiffness [N/m] or damping [N s/m] would be unstable at the controller's cycle.
 MAX_STIFFNESS, MAX_DAMPING = 1e5, 500.0
 _SHAPES = {'plane': 'x y z nx ny nz', 'box': 'x y z dx dy dz'}
 _PROPERTIES = ('stiffness', 'damping', 'friction')
@@ -31,7 +31,7 @@ class ContactBody:
     """
     A body that stands still in the robot's base.
 
-    :param shape: 'plane': everything behind it is solid; 'box': along the axes of the base.
+    :param shape: 'plane': the space behind it is solid; 'box': edges along the axes of the base.
     :param place: a point on the plane, or the centre of the box [m].
     :param extent: the normal of the plane, away from the solid; or the edges of the box [m].
     :param stiffness: force per depth [N/m].
@@ -49,7 +49,7 @@ class ContactBody:
     @classmethod
     def parse(cls, text: str) -> ContactBody:
         """
-        Read ``plane x y z nx ny nz`` or ``box x y z dx dy dz``, then properties: ``friction=0.1``.
+        Read ``plane x y z nx ny nz`` or ``box x y z dx dy dz``, and properties: ``friction=0.1``.
 
         :raises ValueError: the text has another form, or a number is not possible.
         """
@@ -87,7 +87,7 @@ class ContactBody:
         return replace(self, extent=scale(self.extent, 1.0 / length))
 
     def force(self, point: Vector3, velocity: Vector3) -> Vector3:
-        """Return the force on a tool that is at a point, with a velocity [N]."""
+        """Return the force [N] on a tool at a point [m] with a velocity [m/s]."""
         depth, normal = self._depth(point)
         if depth <= 0.0:
             return ZERO3
@@ -98,7 +98,7 @@ class ContactBody:
         return add(scale(normal, pressure), scale(sliding, -drag))
 
     def _depth(self, point: Vector3) -> tuple[float, Vector3]:
-        """Return how deep a point is inside [m], and the normal of the face that it has passed."""
+        """Return the depth of a point in the body [m], and the normal of the nearest face."""
         if self.shape == 'plane':
             return dot(subtract(self.place, point), self.extent), self.extent
         found: tuple[float, Vector3] = (float('inf'), ZERO3)

@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The compliance of an arm: to bodies that its tool touches, and in force mode.
+The compliance of an arm, in contact with bodies and in force mode.
 
-Neither law is published; these are ours, and simple. Where an axis is not compliant, the arm is a
-spring between its target and the tool. In force mode the tool moves along each compliant axis at a
-speed in proportion to the force that is missing, up to the limit. The controller adds that to the
-target of the program; the program goes on from there when force mode has ended and the arm stands.
+The laws of the robot are not published; these simple ones are ours. Along axes that are not
+compliant, the arm is a spring between its target and the tool. In force mode the tool moves along
+each compliant axis at a speed proportional to the missing force, up to the limit. The controller
+adds this motion to the target of the program. When force mode has ended and the arm stands still,
+the program continues from the displaced target.
 """
 
 from __future__ import annotations
@@ -40,14 +41,14 @@ from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 
-#: How stiff an arm is behind its tool [N/m, Nm/rad], and how fast it bends [s]. Assumed.
+#: Stiffness of an arm at its tool [N/m, Nm/rad], and time constant of its bending [s]. Assumed.
 ARM_STIFFNESS: Vector6 = (20e3, 20e3, 20e3, 2e3, 2e3, 2e3)
 BENDING_TIME = 0.02
 #: Speed along a compliant axis per missing force [m/s per N, rad/s per Nm]. Assumed.
 COMPLIANCE: Vector6 = (1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1)
-#: More force than this on the tool stops the arm [N]; the force limit of a robot as it comes.
+#: A greater force on the tool stops the arm [N]; it is the default force limit of a robot.
 MAX_FORCE = 150.0
-#: From this force on the controller says that there is contact [N]. Assumed.
+#: Smallest force on the tool that the controller reports as contact [N]. Assumed.
 CONTACT_FORCE = 5.0
 _SMALL = 1e-9
 
@@ -56,17 +57,17 @@ _SMALL = 1e-9
 class ForceMode:
     """The arguments of ``force_mode``."""
 
-    #: Axes of the task frame.
+    #: Orientation of the task frame in the base.
     q_base_task: Quaternion
     compliant: tuple[bool, ...]
-    #: Forces of the tool along compliant axes [N, Nm].
+    #: Forces that the tool has to apply along compliant axes [N, Nm].
     wrench: Vector6
-    #: Speed of compliant axes [m/s, rad/s], deviation of the others [m, rad].
+    #: Bounds: speed on compliant axes [m/s, rad/s], deviation on the others [m, rad].
     limits: Vector6
 
 
 class ArmState(NamedTuple):
-    """Place and motion of an arm."""
+    """Position and motion of an arm."""
 
     q: Vector6
     qd: Vector6
@@ -76,31 +77,31 @@ class ArmState(NamedTuple):
 
 class ContactMotion:
     """
-    The deviation of the tool from its target, and the force on it; `step` once per cycle.
+    The deviation of the tool from its target, and the force on it; call `step` once per cycle.
 
-    :param bodies: the bodies that it can touch.
+    :param bodies: the bodies that the tool can touch.
     """
 
     def __init__(self, motion: MotionGenerator, bodies: Sequence[ContactBody]) -> None:
         """Begin without contact and without force mode."""
         self._motion, self.bodies = motion, tuple(bodies)
-        #: How much of a bend is done in a cycle.
+        #: Share of the remaining bend that happens in a cycle.
         self._share = motion.cycle / (motion.cycle + BENDING_TIME)
         self.force_mode: ForceMode | None = None
-        #: Scale of the compliance, as a program sets it.
+        #: Scale of the compliance, set by programs.
         self.gain_scaling = 1.0
         #: Forces of the environment on the TCP, in base axes [N, Nm].
         self.wrench: Vector6 = ZERO6
         #: Deviation from the target and its rate, in base axes [m, rad]; None = none.
         self.deviation: Vector6 | None = None
         self.twist: Vector6 | None = None
-        #: The target with what force mode adds to it: joints [rad], their speeds [rad/s], the TCP
-        #: and its twist; None = the program's.
+        #: The target displaced by force mode: joints [rad], their speeds [rad/s], the TCP and its
+        #: twist; None = the target of the program.
         self.target: ArmState | None = None
         #: Why the arm has to stop.
         self.fault: MotionFault | None = None
         self._zero: Vector6 = ZERO6
-        #: What force mode has added to the path, and how the arm is bent, in base axes.
+        #: Displacement by force mode and its rate, and the bend of the arm, in base axes.
         self._yielded: Vector6 = ZERO6
         self._yield_rate: Vector6 = ZERO6
         self._bent: Vector6 = ZERO6
@@ -108,18 +109,18 @@ class ContactMotion:
 
     @property
     def measured(self) -> Vector6:
-        """The wrench as the sensor shows it, since it was zeroed."""
+        """The wrench that the sensor measures, relative to the wrench at its last zeroing."""
         return subtract6(self.wrench, self._zero)
 
     def zero(self) -> None:
-        """Let the sensor show nothing as it is."""
+        """Zero the sensor at its present wrench."""
         self._zero = self.wrench
 
     def steps_back(self, direction: Vector3) -> int:
         """
-        Return how many cycles ago the tool was not in contact; 0 = it is in none.
+        Return the number of cycles since the tool was last free of contact; 0 = no contact.
 
-        :param direction: in which it would move on; zeros = any.
+        :param direction: direction of motion that the contact has to oppose; zeros = any contact.
         """
         force = self.wrench[:3]
         if hypot(*force) < CONTACT_FORCE or (any(direction) and dot(direction, force) >= 0.0):
@@ -130,7 +131,7 @@ class ContactMotion:
         """
         Do one cycle.
 
-        :param may_move: force mode moves the arm: it is on, and no pause or stop holds it.
+        :param may_move: force mode can move the arm: it has power, and no pause or stop holds it.
         """
         self.fault = None
         mode = self.force_mode
@@ -173,7 +174,7 @@ class ContactMotion:
         return (*force, 0.0, 0.0, 0.0)
 
     def _bend(self, wrench: Vector6, free: Sequence[bool] = (False,) * 6) -> None:
-        """Let the arm bend along all axes of a frame but the free ones; all in that frame."""
+        """Bend the arm along all axes of a frame but the free ones; all values in that frame."""
         self._bent = vector6(
             0.0 if is_free else bent + self._share * (force / stiffness - bent)
             for is_free, bent, force, stiffness in zip(
@@ -185,8 +186,8 @@ class ContactMotion:
         to_task, to_base = conjugate(mode.q_base_task), mode.q_base_task
         yielded, bent = turned(to_task, self._yielded), turned(to_task, self._bent)
         applied = turned(to_task, self.measured)
-        # A deflection along a compliant axis when force mode begins stays as it is.
-        # Along the others the tool comes back to the path of the program, if the frame turns.
+        # A bend along a compliant axis at the start of force mode stays as a displacement.
+        # Along the other axes the displacement decays: the tool returns if the frame has turned.
         kept = 1.0 - self._share
         yielded = vector6(
             y + b if free else kept * y
@@ -216,7 +217,7 @@ class ContactMotion:
         self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
 
     def _yielding_target(self, rate: float) -> ArmState | None:
-        """Return the target displaced by compliance; None where the arm cannot be."""
+        """Return the target displaced by compliance; the last one if the arm cannot reach it."""
         motion, before = self._motion, self.target
         target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
         pose = Pose(
@@ -235,12 +236,12 @@ class ContactMotion:
         )
 
     def _take_over(self) -> None:
-        """Let the program go on from where force mode has brought the target."""
+        """Make the program continue from the target that force mode has displaced."""
         if self.target is not None:
             self._motion.teleport(self.target.q)
             self._yielded, self.target = ZERO6, None
 
 
 def turned(q: Quaternion, vector: Vector6) -> Vector6:
-    """Return both halves of a vector turned."""
+    """Return a vector with both halves rotated."""
     return (*rotate(q, vector[:3]), *rotate(q, vector[3:]))

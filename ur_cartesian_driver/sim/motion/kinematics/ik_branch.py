@@ -3,9 +3,9 @@
 """
 Select the IK branch that is reached continuously from the current joints.
 
-Beside a singularity the solution on the other branch is the nearer one after a long step, while an
-arm that passes there swings round and stays on its branch. So a step that changes the branch is
-solved in shorter ones.
+Near a singularity, the solution on the other branch is the nearer one after a long step, while an
+arm that passes the singularity swings round and stays on its branch. A step that changes the
+branch is therefore solved in shorter steps.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
-# The rest of a path is solved in so many steps, or in shorter ones down to this part of it, so
-# that no step turns a joint by more [rad].
+# The rest of a path is solved in this many steps, or in shorter ones down to this fraction of the
+# rest, so that no step turns a joint by more than this angle [rad].
 _WALK_STEPS = 8
 _MIN_WALK_STEP = 1e-4
 _MAX_JOINT_STEP = 0.3
@@ -33,7 +33,7 @@ _FINE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class IkBranchTracker:
-    """The joints of an arm, and the joints that it reaches from there."""
+    """The joints of an arm, and the joints that it reaches from them."""
 
     kinematics: JointKinematics
     q: Vector6
@@ -63,7 +63,7 @@ class IkBranchTracker:
         return self._joints_after_steps(step, self.q, 0.0, h, ceil(log2(max(travel / _FINE, 1.0))))
 
     def joints_at_end_of(self, move_path: MovePath) -> Vector6 | None:
-        """Return the joints that the arm will have at the end of a path; None = a jump."""
+        """Return the joints of the arm at the end of a path; None = they would have to jump."""
         if isinstance(move_path, JointMovePath):
             return move_path.end
         here, there = self.T_base_tcp, move_path.pose(move_path.length)
@@ -87,9 +87,9 @@ class IkBranchTracker:
         halvings: int,
     ) -> Vector6 | None:
         """
-        Return the joints at the end of a step; small steps where the branch changes.
+        Return the joints at the end of a step, which is halved while it changes the branch.
 
-        :param q: the joints at ``begin``; ``begin`` and ``end`` count from now [s].
+        :param q: the joints at ``begin``; ``begin`` and ``end`` are times from now [s].
         """
         setpoint = step(end)
         after = self._nearest(setpoint, q)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The abilities of the joints: inverse kinematics, speed and position limits, singularities."""
+"""The capabilities of the joints: inverse kinematics, speed and position limits, singularities."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
-# Assumptions; the robot's numbers are not published:
+# Assumptions, because the robot's numbers are not published:
 #: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.
 MAX_JOINT_ACCELERATION = 40.0
 MAX_JOINT_JERK = 400.0
-#: The highest limit of the tool speed that safety settings allow [m/s].
+#: The highest limit of the tool speed in the safety settings [m/s].
 MAX_TOOL_SPEED = 5.0
 #: Deceleration of a joint before the end of its range [rad/s^2].
 LIMIT_DECELERATION = 10.0
-#: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
+#: Joint travel per tool travel [rad/m, rad/rad] above which the arm is considered singular.
 SINGULAR_RATE = 1000.0
 
 #: The speed of an arm at rest.
 STILL = ZERO6
 #: Joint changes below this are rounding [rad].
 NO_CHANGE = 1e-9
-# A joint this near to its limit is the reason why there is no solution [rad].
+# A joint this close to its limit is reported as the reason for a missing solution [rad].
 _AT_LIMIT = 0.02
 _SAMPLES = 8
 
-#: Farther than any arm reaches [m].
+#: A distance beyond the reach of any arm [m].
 _MAX_DISTANCE = 1e3
 
 
 class JointKinematics:
     """
-    The joints of one arm, and what they can do in one cycle.
+    The joints of one arm, and their limits in one cycle.
 
-    :param cycle: [s].
+    :param cycle: duration of a cycle [s].
     """
 
     def __init__(self, arm: Arm, cycle: float) -> None:
@@ -69,7 +69,7 @@ class JointKinematics:
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
         """Return the nearest solution within the limits."""
         if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
-            return None  # absurd speeds lead there; squares of such numbers overflow
+            return None  # absurd speeds lead to such numbers, whose squares overflow
         return nearest(self._arm, T_base_flange, q_near)
 
     def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
@@ -83,8 +83,8 @@ class JointKinematics:
         """
         Return three numbers whose signs name the branch.
 
-        The distance of the wrist centre in front of the shoulder [m], for the nominal arm (its
-        sign is the same); the sines of elbow and wrist 2.
+        They are the distance of the wrist centre in front of the shoulder [m], for the nominal arm
+        (a calibrated arm has the same sign), and the sines of elbow and wrist 2.
         """
         upper_arm, forearm, wrist = self._lengths
         angle = q[1] + q[2]
@@ -96,10 +96,10 @@ class JointKinematics:
 
     def overspeed_factor(self, q: Vector6, q_before: Vector6) -> float:
         """
-        Return by which factor the step to ``q`` is too long for one cycle; inf = impossible.
+        Return the factor by which the step to ``q`` is too long for one cycle; inf = impossible.
 
-        A joint may not exceed its speed limit, nor the speed from which it can brake before the
-        end of its range: v^2 = 2 a x.
+        A joint must not exceed its speed limit or the speed from which it can brake before the end
+        of its range: v^2 = 2 a x.
         """
         worst = 0.0
         for new, old, max_speed, (low, high) in zip(
@@ -121,11 +121,12 @@ class JointKinematics:
 
     def kept_rows(self, q: Floats, on_branch: bool) -> Flags:
         """
-        Return which steps between rows of joint positions the arm can make in a cycle each (n,).
+        Return for each step between rows whether the arm can make it in one cycle (n,).
 
-        The first row is where it stands. It is :meth:`overspeed_factor` of many.
+        This is :meth:`overspeed_factor` for many steps.
 
-        :param on_branch: whether the branch must not change either.
+        :param q: joint positions (n + 1, 6) [rad]; the first row is the arm's present position.
+        :param on_branch: whether the steps must keep the branch, too.
         """
         travel, q_before = np.abs(np.diff(q, axis=0)), q[:-1]
         low, high = np.array(self._limits).T
@@ -140,7 +141,7 @@ class JointKinematics:
         return kept
 
     def _branch_sign_rows(self, q: Floats) -> Floats:
-        """Return :meth:`_branch_signs` of many (n, 3)."""
+        """Return :meth:`_branch_signs` for rows of joint positions (n, 3)."""
         upper_arm, forearm, wrist = self._lengths
         angle = q[:, 1] + q[:, 2]
         shoulder = (
@@ -149,7 +150,7 @@ class JointKinematics:
         return np.stack((shoulder, np.sin(q[:, 2]), np.sin(q[:, 4])), axis=1)
 
     def motion_fault(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
-        """Return why the step from ``q`` to ``q_next`` (None = no solution) is impossible."""
+        """Return the fault of an impossible step from ``q`` to ``q_next`` (None = no solution)."""
         for i, (position, (low, high)) in enumerate(zip(q, self._limits, strict=True)):
             if position - low < _AT_LIMIT or high - position < _AT_LIMIT:
                 return MotionFault(
@@ -183,9 +184,9 @@ class JointKinematics:
         self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
     ) -> ProfileParameters:
         """
-        Return the fastest parameters of a path within the joint limits, times fractions of them.
+        Return fractions ``a``, ``v`` of the fastest parameters of a path within the joint limits.
 
-        Joint travel per path length comes from a few samples, from ``q`` on.
+        The joint travel per path length is found at a few samples, starting from ``q``.
         """
         step = move_path.length / _SAMPLES or 1.0
         speed = acceleration = inf
@@ -202,19 +203,19 @@ class JointKinematics:
                 acceleration = min(acceleration, MAX_JOINT_ACCELERATION / rate)
             q = after
         if speed == inf:
-            speed = acceleration = 1.0  # The move will fail where it begins.
+            speed = acceleration = 1.0  # The move will fail at its beginning.
         jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
         return ProfileParameters(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
 
 
 def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool:
-    """Return whether joints turn too much for the travel of the tool."""
+    """Return whether the joints turn too far for the travel of the tool."""
     travel = before.distance_to(pose) + before.angle_to(pose)
     return max_joint_difference(q, q_before) > SINGULAR_RATE * travel
 
 
 def max_joint_difference(a: Vector6, b: Vector6) -> float:
-    """Return the largest difference of a joint."""
+    """Return the largest difference between positions of the same joint."""
     return max(map(abs, subtract6(a, b)))
 
 
@@ -224,7 +225,7 @@ def difference_rate(after: Vector6, before: Vector6, rate: float) -> Vector6:
 
 
 def twist_between(before: Pose, after: Pose, rate: float) -> Vector6:
-    """Return the mean twist between two poses, base axes."""
+    """Return the mean twist between two poses, in base axes."""
     rotation = rotation_vector_from_quaternion(
         multiply(after.quaternion, conjugate(before.quaternion))
     )

@@ -3,8 +3,8 @@
 """
 The motion of points of the arm, from joint speeds and accelerations.
 
-The controller reports some (elbow, tool accelerometer, moments) besides the joints, and they have
-to agree with the joints. All vectors are in base axes, [m], [rad] and [s].
+The controller reports values of some points (elbow, tool accelerometer, moments), which have to
+agree with the reported joints. All vectors are in base axes, in [m], [rad] and [s].
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def point_motion(
     frames: ChainFrames, qd: Vector6, qdd: Vector6, point: Vector3, joints: int = 6
 ) -> PointMotion:
     """
-    Return the motion of a point on the link behind the first joints.
+    Return the motion of a point on the link after the first ``joints`` joints.
 
     Computed from link to link, as in the outward half of the Newton-Euler recursion (Craig,
     Introduction to Robotics, section 6.5).
 
-    :param point: its position [m].
+    :param point: the position of the point [m].
     :param joints: number of joints between the base and the link.
     """
     omega = alpha = velocity = acceleration = ZERO3
@@ -71,9 +71,9 @@ def point_motion(
 
 def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
     """
-    Return the joint moments [Nm] that make a force [N] at a point of the last link.
+    Return the joint moments [Nm] that produce a force [N] at a point of the last link.
 
-    The principle of virtual work: moment times speed of the joints is force times velocity.
+    By the principle of virtual work, joint moments times joint speeds are force times velocity.
     """
     return vector6(
         dot(axis, cross(subtract(point, origin), force))
@@ -91,7 +91,7 @@ def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
 def _shifted_motion(
     velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, lever_arm: Vector3
 ) -> tuple[Vector3, Vector3]:
-    """Return velocity and acceleration of another point of the link, a lever arm farther out."""
+    """Return velocity and acceleration of the point of the link at the end of a lever arm."""
     round_ = cross(omega, lever_arm)
     return (
         add(velocity, round_),

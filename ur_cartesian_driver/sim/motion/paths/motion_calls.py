@@ -16,7 +16,7 @@ from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
 
 class PathStart(NamedTuple):
-    """The begin of a path: joint positions [rad], and T_base_tcp."""
+    """The beginning of a path: joint positions [rad], and T_base_tcp."""
 
     q: Vector6
     pose: Pose
@@ -26,7 +26,7 @@ ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters
 
 
 class MotionCall(NamedTuple):
-    """A call of a path move; its path is resolved where it begins."""
+    """A call of a path move; its path is resolved when the move begins."""
 
     name: str
     move_path: Callable[[PathStart], MovePath]
@@ -41,7 +41,7 @@ class MotionCall(NamedTuple):
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
-    """Return the parameters of movep: from full speed to rest at the waypoint, v^2 = 2 b r."""
+    """Return the parameters of movep, which can brake within its blend radius: v^2 = 2 b r."""
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
     return ProfileParameters(acceleration=a, speed=v, braking=braking)
 

@@ -3,9 +3,9 @@
 """
 Path parameter over time: trapezoids, timed moves, ramps and S-curves.
 
-A profile is a chain of phases of constant jerk (zero for all but the S-curve). Its parameter has
-whatever unit the path has: metres, radians of the leading axis, or none. All profiles end at
-rest, except :func:`ramp`.
+A profile is a chain of phases of constant jerk (zero except in the S-curve). Its path parameter is
+in the unit of the path: metres, radians of the leading axis, or none. All profiles end at rest,
+except :func:`ramp`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 _BISECTIONS = 80
-#: A timed move without speed and acceleration accelerates and brakes for this part of its time.
+#: A timed move without speed and acceleration accelerates for this fraction of its time; it brakes
+#: for the same fraction.
 TIMED_RAMP = 1.0 / 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Phase:
-    """Constant jerk from ``time`` on: position, speed and acceleration hold at its beginning."""
+    """A phase of constant jerk, with time, position, speed and acceleration at its beginning."""
 
     time: float
     position: float
@@ -47,7 +48,7 @@ class MotionProfile:
     """
     Progress ``s(t)`` from 0 at time 0 to ``length`` at ``duration`` [s], never backwards.
 
-    :param phases: in the order of time; the first one begins at 0.
+    :param phases: ordered by time; the first phase begins at 0.
     """
 
     length: float
@@ -62,7 +63,7 @@ class MotionProfile:
         return min(max(phase.position_after(max(time, 0.0) - phase.time), 0.0), self.length)
 
     def rows(self, times: Floats) -> Floats:
-        """Return :meth:`at` of many times (n,)."""
+        """Return :meth:`at` for many times (n,)."""
         phases = np.array(
             [(p.time, p.position, p.speed, p.acceleration, p.jerk) for p in self.phases]
         )
@@ -133,10 +134,10 @@ def trapezoid(
     Accelerate, cruise, brake to rest.
 
     From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). In general the
-    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. A start that is too fast to stop in time
-    brakes as hard as it takes.
+    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. If the start is too fast to stop within the
+    length, the profile brakes as hard as necessary.
 
-    :param braking: b, when it differs from the acceleration.
+    :param braking: b, if it differs from the acceleration.
     """
     b = braking or acceleration
     if length <= 0.0:
@@ -161,9 +162,9 @@ def trapezoid(
 
 def timed_ramp(length: float, acceleration: float, speed: float) -> float:
     """
-    Return the part of its time that a trapezoid from rest to rest accelerates, and brakes.
+    Return the fraction of the time of a trapezoid in which it speeds up, and in which it brakes.
 
-    T = d/v + v/a, so it is v/aT = 1 / (1 + d a/v^2), and a half where it is a triangle.
+    From rest to rest T = d/v + v/a, so this is v/aT = 1 / (1 + d a/v^2); for a triangle, a half.
     """
     if min(acceleration, speed) <= 0.0:
         return TIMED_RAMP
@@ -176,14 +177,14 @@ def timed(
     """
     Arrive at rest after exactly ``duration`` [s].
 
-    From rest it is the trapezoid of speed and acceleration, stretched evenly to the duration, as
-    five recordings of a UR3 (3.5) show: the speeds of both are lost, the shape remains.
+    From rest this is the trapezoid of speed and acceleration, stretched evenly to the duration, as
+    five recordings of a UR3 (3.5) show: only the shape of that trapezoid remains.
 
-    With ramps of x and y seconds, d = v0 x/2 + c (T - x/2 - y/2). y is the part of T; x too, or
-    less where a fast start would otherwise use up the length.
+    With ramps of x and y seconds and a cruising speed c, d = v0 x/2 + c (T - x/2 - y/2). y is
+    ``part`` of T; so is x, or less if a fast start would otherwise use up the length.
 
-    :param part: of the time for speeding up, and for braking, see :func:`timed_ramp`. A third:
-        c = 1.5 d/T, a = 4.5 d/T^2.
+    :param part: fraction of the time for speeding up, and for braking, see :func:`timed_ramp`. If
+        it is a third, c = 1.5 d/T, a = 4.5 d/T^2.
     """
     if length <= 0.0:
         return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
@@ -250,7 +251,7 @@ def s_curve(
 
 
 def _s_curve_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
-    """Return the times of rising (and of falling), and of constant acceleration."""
+    """Return the times of rising (and of falling) acceleration, and of constant acceleration."""
     if change >= acceleration * acceleration / jerk:
         rise = acceleration / jerk
         return rise, change / acceleration - rise

@@ -4,10 +4,10 @@
 The geometry of motion: the set-point at a path parameter, without time.
 
 A move path runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and
-arcs of the tool in metres (by their rotation where that takes longer). A blend path runs
-from 0 to 1 and replaces the end of one move path and the beginning of the next. A set-point is six
-joint positions or a pose of the TCP in the base; rows of set-points are (n, 6) or (n, 7), x y z
-[m] and the unit quaternion x y z w.
+arcs of the tool in metres (or by their rotation if that takes longer). A blend path runs from 0
+to 1 and replaces the end of one move path and the beginning of the next. A set-point is six joint
+positions or a pose of the TCP in the base. Rows of set-points are (n, 6), or (n, 7) with x y z [m]
+and the unit quaternion x y z w.
 """
 
 from __future__ import annotations
@@ -51,16 +51,17 @@ from ur_cartesian_driver.sim.motion.motion_values import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose
 
-# Paths shorter than this count as empty: their ends differ by rounding [m, rad].
+# Shorter paths are treated as empty, because their ends differ only by rounding [m, rad].
 _MIN_LENGTH = 1e-9
-# Three points of an arc nearer than this [m], or in line within this sine, make no circle.
+# Three points that are nearer together than this [m], or in line within this sine, have no circle.
 _COINCIDENT = 1e-6
 _COLLINEAR = 1e-6
-# To find where a path leaves a sphere: samples until it is outside, then steps to the border.
+# To find the point at which a path leaves a sphere: samples until the path is outside, then
+# refinements, until the distance to the border is this small [m].
 _SAMPLES = 24
 _REFINEMENTS = 50
 _ON_BORDER = 1e-12
-# Paths that go straight on, or straight back, have no circular fillet [rad].
+# Two lines that go straight on, or straight back, within this angle have no circular fillet [rad].
 _STRAIGHT = 1e-6
 
 
@@ -101,7 +102,7 @@ class JointMovePath:
     """
     A straight line in joint space [rad]; all joints share the path parameter.
 
-    :param forward: joint positions to T_base_tcp.
+    :param forward: returns T_base_tcp at joint positions.
     """
 
     def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
@@ -131,10 +132,10 @@ class LinearMovePath:
     """
     A straight line of the tool with the shortest rotation.
 
-    Its length is the distance [m] or the angle over the turn ratio [rad], whichever number is
-    larger: the robot has one speed for both.
+    Its length is the distance [m] or the angle [rad] divided by the turn ratio, whichever number
+    is larger, because the robot has one speed for both.
 
-    :param turn_ratio: turn that counts as much as a metre [rad].
+    :param turn_ratio: rotation that is equivalent to a metre [rad].
     """
 
     def __init__(self, start: Pose, end: Pose, turn_ratio: float = 1.0) -> None:
@@ -160,9 +161,9 @@ class CircularMovePath:
     """
     A circle through three points.
 
-    Unconstrained, the orientation takes the shortest rotation from start to end, whatever it is
-    at ``via``, and counts in the length as on a line. Fixed, it stays as it is relative to the
-    tangent, and the end's orientation is ignored; the length is the arc's.
+    An unconstrained orientation takes the shortest rotation from start to end (that of ``via`` is
+    ignored), and a long rotation determines the length, as on a line. A fixed orientation is
+    constant relative to the tangent (that of the end is ignored), and the length is the arc's.
 
     :raises MotionError: the three points do not lie on a circle.
     """
@@ -205,7 +206,7 @@ class CircularMovePath:
         return rows
 
     def _angle_of(self, point: Vector3) -> float:
-        # The normal is such that start, via, end come in this order with growing angle.
+        # The direction of the normal makes the angle grow from start through via to end.
         r = subtract(point, self.centre)
         return atan2(dot(r, self._y), dot(r, self._x)) % (2.0 * pi)
 
@@ -220,7 +221,7 @@ class CircularMovePath:
 
 class JointBlendPath:
     """
-    Two joint lines at once: one brakes to the waypoint while the next one sets out.
+    Two joint lines at once: one brakes to the waypoint while the next one starts.
 
     q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: a
     parabola that is tangent to both lines.
@@ -250,7 +251,7 @@ class JointBlendPath:
 
 class ToolBlendPath:
     """
-    The same for poses: positions add, rotations are composed.
+    The blend of :class:`JointBlendPath` for poses: positions add, rotations are composed.
 
     p = p1 + p2 - p_waypoint, R = R1 R_waypoint^-1 R2. Between straight lines the position runs on
     the parabola with the waypoint as its control point.
@@ -291,7 +292,7 @@ class FilletBlendPath:
     """
     A circular arc tangent to two lines at equal distances d from the waypoint.
 
-    Where the direction turns by phi its radius is d / tan(phi/2): d itself in a right angle.
+    If the direction turns by phi, the radius is d / tan(phi/2), which is d for a right angle.
     The orientation changes as in :class:`ToolBlendPath`, the position has a constant speed.
     """
 
@@ -342,10 +343,10 @@ def make_blend(
     before: MovePath, tail: float, after: MovePath, head: float, circular: bool
 ) -> BlendPath:
     """
-    Blend two paths: joint lines in joint space, all others in the tool's space.
+    Blend two paths: two joint lines in joint space, all others in the tool's space.
 
-    :param circular: by an arc, where both are lines that meet at an angle.
-    :raises MotionError: it is to be an arc, and the second line leads straight back.
+    :param circular: whether to blend two lines that meet at an angle by an arc.
+    :raises MotionError: the blend is to be an arc, but the second line leads straight back.
     """
     if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
         return JointBlendPath(before, tail, after, head)
@@ -362,7 +363,7 @@ def make_blend(
 
 
 def start_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the parameter at which the tool is ``radius`` [m] from the start of the path."""
+    """Return the parameter at which the tool is ``radius`` [m] from the start; None = nowhere."""
     if isinstance(move_path, LinearMovePath):
         return (
             move_path.length * radius / move_path.distance if move_path.distance > radius else None
@@ -371,7 +372,7 @@ def start_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def end_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return how much before the end (as parameter) the tool is ``radius`` [m] from the end."""
+    """Return the parameter left to the end when the tool is ``radius`` [m] from it, or None."""
     if isinstance(move_path, LinearMovePath):
         return start_within_radius(move_path, radius)
     return _exit_parameter(
@@ -380,7 +381,7 @@ def end_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
-    """Return the first parameter at which the pose is ``radius`` [m] from its origin."""
+    """Return the first parameter at which the pose is ``radius`` [m] from its start, or None."""
     origin = pose(0.0).position
     low, f_low = 0.0, -radius
     for i in range(1, _SAMPLES + 1):
@@ -391,7 +392,7 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
         low, f_low = high, f_high
     else:
         return None
-    # Regula falsi with the Illinois correction: the stale end counts half.
+    # Regula falsi with the Illinois correction: the value at the stale end is halved.
     side = 0
     for _ in range(_REFINEMENTS):
         middle = (low * f_high - high * f_low) / (f_high - f_low)
@@ -408,7 +409,7 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
 
 
 def _on_circle(centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: float) -> Vector3:
-    """Return a point of a circle; the angle counts from x towards y."""
+    """Return a point of a circle; the angle is measured from x towards y."""
     offset = add(scale(x, radius * cos(angle)), scale(y, radius * sin(angle)))
     return add(centre, offset)
 

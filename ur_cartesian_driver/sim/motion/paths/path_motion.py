@@ -3,9 +3,9 @@
 """
 The sequence of move paths and blends that the arm follows, each with its profile.
 
-The robot knows one move ahead at most: the next call comes when the arm enters the blend. So each
-move is planned to end at rest at its waypoint; a call that comes in time cuts the path at the
-border of the blend, and blend and next path replace its rest.
+The robot knows at most one move ahead: the next call comes when the arm enters the blend. Each
+move is therefore planned to end at rest at its waypoint; a call that comes in time cuts the path
+where the blend begins, and the blend and the next path replace the remainder.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
 
 # A section is over when less than this is left [s]: sums of cycles are rounded.
 _ROUNDING = 1e-9
-# Speeds and lengths below this count as zero, in the units of any path.
+# Speeds and lengths below this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# To be in time, the rest behind a blend is driven at most this much faster than the mean.
+# To keep its time, a move after a blend runs at most this many times faster than the mean speed.
 _MAX_CATCH_UP = 2.0
 
 
@@ -46,9 +46,9 @@ class ProfileParameters:
     """
     Speed and acceleration along a path, in its unit (rad or m) per second.
 
-    :param time: [s]; unless 0, speed and acceleration only say how it is divided.
-    :param jerk: bound, for an S-curve; None = trapezoid.
-    :param braking: at the end, where it differs from the acceleration.
+    :param time: [s]; unless it is 0, speed and acceleration only determine the share of the ramps.
+    :param jerk: bound on the jerk, for an S-curve; None = trapezoid.
+    :param braking: deceleration at the end, if it differs from the acceleration.
     """
 
     acceleration: float
@@ -58,7 +58,7 @@ class ProfileParameters:
     braking: float | None = None
 
     def profile(self, length: float, start_speed: float = 0.0) -> MotionProfile:
-        """Return the profile over a length, to rest."""
+        """Return the profile that covers a length and ends at rest."""
         if self.time > 0.0:
             return timed(length, self.time, start_speed, self.ramp_part(length))
         if self.jerk is not None:
@@ -66,11 +66,11 @@ class ProfileParameters:
         return trapezoid(length, self.acceleration, self.speed, start_speed, self.braking)
 
     def ramp_part(self, length: float) -> float:
-        """Return the part of its time in which a timed move of a length speeds up, and brakes."""
+        """Return the fraction of the time of a timed move for speeding up, and for braking."""
         return timed_ramp(length, self.acceleration, self.speed)
 
     def strongest(self, length: float) -> float:
-        """Return the acceleration over a length, from rest to rest where it has a time."""
+        """Return the highest acceleration over a length; of a timed move, from rest to rest."""
         if self.time > 0.0:
             part = self.ramp_part(length)
             return length / (part * (1.0 - part) * self.time**2)
@@ -80,7 +80,7 @@ class ProfileParameters:
 @dataclass(frozen=True, slots=True)
 class PathSection:
     """
-    One path under one profile.
+    One path with one profile.
 
     :param offset: path parameter at which the profile begins.
     :param stop: time of the profile at which the next section takes over.
@@ -103,7 +103,7 @@ class LastMove:
     """
     The last move, and the values needed to blend the next one into it.
 
-    :param entry: time of its profile at which its blend begins; its end without a blend.
+    :param entry: time in the move's profile at which its blend begins; without a blend, the end.
     """
 
     move_path: MovePath
@@ -118,8 +118,8 @@ class PathMotion:
     """
     Sections to follow and the progress of the arm: time [s] in the profile of section ``index``.
 
-    The last section always belongs to ``last_move``. ``spare`` is what its end has left of the
-    last cycle [s].
+    The last section always belongs to ``last_move``. ``spare`` is the time of the last cycle that
+    was left when that section ended [s].
     """
 
     sections: tuple[PathSection, ...]
@@ -130,7 +130,7 @@ class PathMotion:
     real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, tuple[int, float, float]]:
-        """Return the set-point after ``h`` more seconds of the profile."""
+        """Return the set-point and the state after ``h`` more seconds of the profile."""
         i, t = self.index, self.time
         while True:
             section = self.sections[i]
@@ -156,7 +156,7 @@ class PathMotion:
 
     @property
     def next_change(self) -> float:
-        """The time in the present section up to which no other one can take its place [s]."""
+        """The time in the present section up to which no other section can replace it [s]."""
         entry = self.last_move.entry
         in_last = self.index + 1 == len(self.sections)
         if in_last and self.last_move.radius > 0.0 and self.time < entry:
@@ -182,7 +182,7 @@ def start_from_rest(
     """
     Return the motion along one path, from rest to rest.
 
-    :param spare: time of the last cycle that the move before has left [s].
+    :param spare: time of the last cycle that the previous move did not use [s].
     """
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
@@ -201,10 +201,10 @@ def append_move_path(
     """
     Return the motion with one more path, and whether it is blended.
 
-    The blend begins at the blend radius, or where the arm is if the call comes late, and ends as
-    far behind the waypoint. There is no blend if the arm already stands, or if the new path does
-    not leave the blend radius: then the arm stops at the waypoint. (Both moves share the speed
-    through the blend, and a short one would be driven at the other's speed.)
+    The blend begins at the blend radius, or at the arm's position if the call comes late, and ends
+    at the same distance after the waypoint. If the arm already stands still, or the new path does
+    not leave the blend radius, there is no blend and the arm stops at the waypoint. (Both moves
+    share the speed in the blend, and a short move would be driven at the speed of the other.)
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -238,9 +238,10 @@ def _blend_head(
     last_move: LastMove, tail: float, speed: float, move_path: MovePath
 ) -> float | None:
     """
-    Return how much of the new path the blend covers; None = no blend.
+    Return the length of the new path that the blend covers; None = no blend.
 
-    :param tail: the rest of the last path at the entry; ``speed``: there.
+    :param tail: the rest of the last path at the entry of the blend.
+    :param speed: the speed at this entry.
     """
     if speed <= _MIN_SPEED or tail <= _MIN_SPEED:
         return None
@@ -269,22 +270,24 @@ def _blend_profiles(
     rest: float,
 ) -> tuple[MotionProfile, MotionProfile]:
     """
-    Return the profiles of the blend (0 to 1) and of the rest of the path behind it.
+    Return the profiles of the blend (0 to 1) and of the rest of the new path.
 
     The rate of the blend changes evenly from its value at the entry to the value for the next
-    cruising speed, within three bounds: it does not grow beyond what keeps both parts within
-    their accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must
-    suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway. A
-    move with a time has no acceleration of its own: in its blend it accelerates as from rest to
-    rest, or as the next move does in proportion to their lengths.
+    cruising speed, within three bounds: it does not grow so far that one of the two moves exceeds
+    its acceleration (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must be
+    long enough to brake. A trapezoid enters with v <= sqrt(2 a r), so it keeps the first bound
+    anyway. A timed move has no acceleration of its own: in its blend the bound is its acceleration
+    from rest to rest or, if greater, that of the next move in proportion to their lengths.
 
-    The sum of times is kept: the time that the move before had left until its waypoint is added
-    to the time of the next one.
+    The sum of times is kept: the time that the previous move had left until its waypoint is added
+    to the time of the next move.
 
     :param rates: path units per unit of the blend's parameter, at entry and exit.
-    :param speed: at the entry; ``remaining`` [s]: until rest at the waypoint.
+    :param speed: speed at the entry.
+    :param remaining: time from the entry until rest at the waypoint [s].
     :param after: the parameters of the new move.
-    :param head: length of the new path within the blend; ``rest``: behind it.
+    :param head: length of the new path within the blend.
+    :param rest: length of the new path after the blend.
     """
     (entry_rate, exit_rate), before = rates, last_move.parameters
     u0 = speed / entry_rate
@@ -295,7 +298,7 @@ def _blend_profiles(
     if before.time > 0.0:
         strongest = max(strongest, acceleration * length / whole)
     if after.time > 0.0:
-        # Evenly, but for the braking at its end.
+        # At an even speed, except for the braking at the end.
         cruise = (whole + head) / (time * (1.0 - 0.5 * after.ramp_part(whole)))
     else:
         stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Path moves: begun from rest or in the blend of the one before, or after the arm has braked.
+Path moves: they begin from rest, in the blend of the previous move, or after the arm has braked.
 
-A move that a program calls while the blend of the one before is about to begin is blended into it.
-A move that cannot begin yet waits until the arm stands.
+A move that a program calls when the blend of the previous move is about to begin is blended with
+that move. A move that cannot begin yet waits until the arm stands still.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ur_cartesian_driver.sim.motion.paths.path_motion import (
 )
 from ur_cartesian_driver.sim.motion.running_motion import RunningMotion, UNATTENDED_DECELERATION
 
-# Blends that touch do not overlap [m].
+# Tolerance [m], because blends that only touch do not overlap.
 _TOUCHING = 1e-9
 
 
@@ -43,33 +43,33 @@ class _Overlap(NamedTuple):
 
 
 class PathQueue:
-    """The path moves of one arm: the running one and the one that waits for rest."""
+    """The path moves of one arm: the running move, and the move that waits until the arm rests."""
 
     def __init__(self, target: ArmTarget, active: RunningMotion, reports: MotionReports) -> None:
-        """Begin with none."""
+        """Begin without moves."""
         self._target, self._active, self._reports = target, active, reports
-        #: What waits until the arm stands.
+        #: The call that waits until the arm stands still.
         self._waiting: MotionCall | None = None
         #: Whether the last path move is a movep.
         self._after_movep = False
         self._overlap: _Overlap | None = None
-        #: Time that the last move left of its cycle [s]: a move that follows at once
-        #: begins that much earlier, so that moves are not rounded to cycles.
+        #: Time of its last cycle that the last move did not use [s]: a move that follows at once
+        #: begins this much earlier, so that moves are not rounded to cycles.
         self._spare = 0.0
 
     def clear(self) -> None:
-        """Forget the move that waits."""
+        """Discard the waiting move."""
         self._waiting = self._overlap = None
 
     def end_of_frame(self) -> None:
-        """Keep an overlapping waypoint, and no spare time: no other move has followed at once."""
+        """Keep an overlapping waypoint, but no spare time: no other move has followed at once."""
         self._overlap, self._spare = None, 0.0
 
     def begin(self, call: MotionCall) -> None:
         """
-        Begin a move, or let it wait until the arm stands.
+        Begin a move, or keep it waiting until the arm stands still.
 
-        :raises MotionError: there is no such path from where it begins.
+        :raises MotionError: there is no such path from the start of the move.
         """
         self._skip_overlapping()
         active = self._active
@@ -78,12 +78,12 @@ class PathQueue:
             if self._target.tcp_is_active:
                 self._begin_in_blend(motion, call)
             else:
-                # A blend joins two moves of the same TCP: first to the waypoint.
+                # A blend joins two moves of the same TCP: first finish the running one.
                 self._wait(call)
         elif motion is None:
             self._begin_from_rest(call)
         else:
-            # A path begins at rest or in a blend, nowhere else: brake first.
+            # A path can only begin at rest or in a blend: brake first.
             stop = active.joint_stop(UNATTENDED_DECELERATION)
             active.replace(stop)
             self._wait(call)
@@ -104,7 +104,7 @@ class PathQueue:
             self._reports.fault = MotionFault(code=171, argument=0, text=str(error))
 
     def after_step(self, motion: PathMotion) -> None:
-        """Let the call return when it may; warn of a movep that is too fast."""
+        """Make the call return as soon as it can; warn of a movep that is too fast."""
         if self._after_movep:
             self._check_movep_speed(motion)
         if motion.may_return(self._target.cycle):
@@ -127,12 +127,12 @@ class PathQueue:
         self._follow(None, path_motion, call, margin)
 
     def _begin_in_blend(self, path_motion: PathMotion, call: MotionCall) -> None:
-        """Go on from a move whose blend is about to begin or has begun."""
+        """Continue from a move whose blend is about to begin or has begun."""
         last = path_motion.last_move
         pose = last.move_path.pose(last.move_path.length)
         q = self._target.ik_branch().joints_at_end_of(last.move_path)
         if q is None and call.name.endswith('j'):
-            # No joint line begins where the arm cannot get to: let it fail on its path there.
+            # The arm cannot reach the start of the joint line: it will fail on its path there.
             self._wait(call)
             return
         start = PathStart(q or self._target.q, pose)
@@ -157,8 +157,8 @@ class PathQueue:
         """
         Follow a path.
 
-        A waypoint whose blend reaches into the one before (``margin`` [m] is negative) is skipped
-        if the program goes on at once; if no move follows, the arm goes there.
+        A waypoint whose blend reaches into the previous blend (``margin`` [m] is negative) is
+        skipped if another move follows at once; otherwise the arm goes to the waypoint.
         """
         overlaps = call.radius > 0.0 and margin < -_TOUCHING
         self._overlap = _Overlap(before, self._after_movep, call.name) if overlaps else None
@@ -169,14 +169,14 @@ class PathQueue:
             self._active.motion, call.move.returned = None, True
 
     def _skip_overlapping(self) -> None:
-        """Forget a waypoint that overlaps, now that another move follows at once."""
+        """Discard an overlapping waypoint, now that another move follows at once."""
         if self._overlap is not None:
             self._active.motion, self._after_movep, name = self._overlap
             self._overlap = None
             self._reports.blend_skipped(name)
 
     def _check_movep_speed(self, motion: PathMotion) -> None:
-        """Warn of a movep that is too fast: slowed down, or too hard on a joint in a blend."""
+        """Warn of a movep that is too fast for the arm, or for a joint in a blend."""
         call = motion.last_move.call
         if self._active.rate < self._active.scale / ROUNDING:
             self._reports.movep_too_fast(call, 'the arm cannot keep it here.')
@@ -190,5 +190,5 @@ class PathQueue:
 
 
 def _distance_to_waypoint(start: Pose, move_path: MovePath) -> float:
-    """Return how far the waypoint is from the start [m]."""
+    """Return the distance of the waypoint from the start [m]."""
     return start.distance_to(move_path.pose(move_path.length))
