@@ -4,9 +4,9 @@
 File formats by name and suffix: ours, and formats that other packages declare.
 
 Another package declares its formats as entry points, so their names are known without importing
-it. A format is imported only when a file needs it: a broken package affects only users of its
-format, who get an error that names the package. Our own formats are in a table, because a checkout
-on PYTHONPATH has no metadata and so no entry points.
+the package. A format is imported only when a file needs it: a broken package affects only users of
+its format, who get an error that names the package. Our own formats are in a table, because a
+checkout on PYTHONPATH has no metadata and so no entry points.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _LOG = logging.getLogger(__name__)
 
 
 class FileFormats(Generic[_Format]):
-    """The formats that are read, or those that are written."""
+    """All formats of one group: those that are read, or those that are written."""
 
     def __init__(
         self, group: str, built_in: Mapping[str, str], refusals: tuple[type[Exception], ...]
     ) -> None:
         """
-        Take our formats.
+        Take our own formats.
 
         :param group: the group of the entry points of other packages.
         :param built_in: for each ``module:object``, its names and suffixes, separated by spaces.
-        :param refusals: exceptions that explain the fault of a file; all others are faults of the
-            package.
+        :param refusals: exceptions with which a format refuses a file; all other exceptions are
+            faults of the format's package.
         """
         self.built_in = {
             name: EntryPoint(name, value, group)
@@ -77,7 +77,7 @@ class FileFormats(Generic[_Format]):
     @contextmanager
     def using(self, name: str) -> Iterator[_Format]:
         """
-        Yield the format of a name or suffix; report errors of the block as its package's fault.
+        Yield the format of a name or suffix; blame errors in the block on its package.
 
         :raises ImportError: the package is broken, or two packages declare this name.
         """

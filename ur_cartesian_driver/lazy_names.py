@@ -3,9 +3,9 @@
 """
 Names of a package that are imported when they are used.
 
-Importing a module runs the ``__init__`` of each package around it. If that imported everything
-that the package offers, a command would wait for a simulator that it does not use, and the robot
-process would wait for a planner.
+Importing a module runs the ``__init__`` of each package around it. If an ``__init__`` imported
+everything that its package offers, a command would wait for a simulator that it does not use, and
+the robot process would wait for a planner.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 def lazy_names(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
     """
-    Return the ``__getattr__`` of a package.
+    Return a function that serves as the ``__getattr__`` of a package.
 
     :param modules: for each module, the names that it defines and the package offers, separated by
         spaces.

@@ -15,7 +15,7 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
     isolates the nodes of a test run from all others; ``cartesian_driver`` uses it. A test fails
     if rclpy runs in another domain, because its goals could reach a real robot.
 
-pytest imports this module in every project of the environment. So that it loads fast, heavy
+pytest imports this module in every project that uses the environment. To keep that fast, heavy
 imports are in the fixtures.
 """
 
@@ -46,7 +46,7 @@ READY_TIMEOUT = 10.0
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers, and ignore a warning that ROS 2 itself causes."""
-    # lark 0.12, which generated messages load by way of rosidl_parser
+    # The warning comes from lark 0.12, which generated messages load by way of rosidl_parser.
     config.addinivalue_line(
         'filterwarnings',
         "ignore:module 'sre_(parse|constants)' is deprecated:DeprecationWarning",
@@ -130,7 +130,7 @@ def _check_domain(domain: int) -> None:
 def cartesian_driver(
     request: pytest.FixtureRequest, private_ros_graph: int, ur_sim: SimulatedRobot
 ) -> Iterator[CartesianDriverNode]:
-    """Yield the driver's node, ready for goals of ``ur_sim``; destroyed afterwards."""
+    """Yield the driver's node, connected to ``ur_sim`` and ready; destroy it afterwards."""
     import rclpy
     from rclpy.utilities import get_default_context
 

@@ -31,7 +31,7 @@ def share_path() -> Path:
 
 
 def installed_share(package: str) -> Path | None:
-    """Return share/PACKAGE of the ROS installation or of the pip environment, if it is there."""
+    """Return share/PACKAGE of the ROS installation or pip environment; None if there is none."""
     # The wheels of ROS 2 do not set AMENT_PREFIX_PATH, so there may be no ament index.
     for prefix in [
         *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),

@@ -3,8 +3,8 @@
 """
 The common part of two fixtures of a simulated robot: ours, and the stand-alone simulator's.
 
-pytest plugins import this module in every project of the environment, so it imports the simulator
-only when one is started.
+pytest plugins import this module in every project that uses the environment, so the simulator is
+imported only when a test starts one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def simulated_robot(request: pytest.FixtureRequest, marker: str) -> Iterator[Sim
     """
     Yield a simulated robot that listens on free ports, in a thread of this process.
 
-    :param marker: the marker whose arguments are fields of its configuration.
+    :param marker: the marker whose arguments are fields of the robot's :class:`SimulatorConfig`.
     """
     from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 

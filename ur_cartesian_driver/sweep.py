@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan one goal in many variants: other places, other robots, arms with the tolerances of real ones.
+Plan one goal in many variants: at other places, on other models, on arms that deviate at random.
 
 ::
 
@@ -58,10 +58,10 @@ from ur_cartesian_driver.preview import sample
 from ur_cartesian_driver.sim.calibration import random_calibration
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-#: Number of times at which the margins of a plan are measured, and their least distance [s].
+#: Number of instants at which the margins of a plan are measured; least time between them [s].
 SAMPLES, MIN_PERIOD = 400, 0.008
 
-#: A quantity in which variants differ: a number [m], [rad], or a name.
+#: The value of a quantity in which variants differ: a number [m] or [rad], or a name.
 Coordinate: TypeAlias = float | str
 
 
@@ -72,13 +72,14 @@ class Variant:
     #: A goal, or a path whose frames the sweep resolves with ``frames``.
     goal: Goal | Path
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
-    #: Joint positions in which the arm rests at the start [rad], and its active TCP.
+    #: Joint positions in which the arm rests at the start [rad].
     start: Vector6 = HOME
+    #: The active TCP of the arm.
     T_flange_tcp: Pose = IDENTITY
     options: PlanningOptions = field(default_factory=PlanningOptions)
     frames: Frames = field(default_factory=Frames)
-    #: Displacement of the goal's frame: along the axes of the base [m], and about the base's z
-    #: through the origin of the frame [rad].
+    #: Displacement of the goal's frame: x, y, z along the axes of the base [m], and the turn about
+    #: an axis through the frame's origin, parallel to the base's z [rad].
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     #: The quantities in which the variant differs from the others, by name.
     coordinates: Mapping[str, Coordinate] = field(default_factory=dict)
@@ -86,17 +87,17 @@ class Variant:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
-    """The smallest distances from a refusal on a planned motion; NaN = not known."""
+    """How close a planned motion comes to limits at which goals are refused; NaN = not known."""
 
     #: Smallest distance of any joint from its limits [rad].
     joint_limit: float = nan
-    #: Smallest distance from a singularity, except on joint motions [rad]; for the shoulder, 0.3 m
-    #: correspond to 1 rad.
+    #: Smallest distance from a singularity [rad]; for the shoulder, 0.3 m correspond to 1 rad.
+    #: Joint motions are left out; infinite = there are no other motions.
     singularity: float = nan
     #: Unused fraction of the speed limit, for the joint that comes closest to its limit, 0 to 1.
     speed: float = nan
-    #: Smallest distance of the arm and its tool from themselves and from planes [m]; infinite =
-    #: nothing is checked.
+    #: Smallest distance between parts of the arm and its tool, and between these and workspace
+    #: planes [m]; infinite = nothing is checked.
     clearance: float = nan
 
 
@@ -130,7 +131,7 @@ def at_places(
     Return each variant at all places of a grid.
 
     :param x: offsets of the goal's frame along the base's x [m]; ``y`` and ``z`` likewise.
-    :param rz: turns about the base's z through the frame's origin [rad].
+    :param rz: turns about an axis through the frame's origin, parallel to the base's z [rad].
     """
     axes = {'x': x, 'y': y, 'z': z, 'rz': rz}
     named = [name for name, values in axes.items() if len(values) > 1]
@@ -185,7 +186,8 @@ def sweep(
     """
     Plan goals in parallel, and return their results in the order of the goals.
 
-    A goal that is refused, fails, or ends its process does not affect the others.
+    A goal that is refused, or whose planning fails, does not affect the others. Neither does one
+    that ends its process, unless ``executor`` is given: if that breaks, the goals left fail, too.
 
     :param goals: variants, or goals and paths for a UR5e in its home position.
     :param executor: runs the planning, and is not shut down; None = a process for each core.
@@ -219,7 +221,7 @@ def _processes(count: int) -> ProcessPoolExecutor:
 def _gather(
     executor: Executor, variants: Sequence[Variant], on_result: Callable[[], object]
 ) -> list[SweepResult | Exception]:
-    """Return the results in the order of the variants; an exception for each one that failed."""
+    """Return results in the order of the variants; for a variant that failed, its exception."""
     futures: list[Future[SweepResult] | Exception] = []
     for variant in variants:
         try:
@@ -271,7 +273,7 @@ def plan_variant(variant: Variant) -> SweepResult:
 
 
 def margins_of(made: Plan, variant: Variant) -> Margins:
-    """Return the smallest margins on the whole motion, at SAMPLES times."""
+    """Return the smallest margins on the whole motion, measured at about SAMPLES instants."""
     arm = variant.arm
     period = max(MIN_PERIOD, made.duration / SAMPLES)
     preview = sample(made, arm, variant.T_flange_tcp, period)
@@ -281,7 +283,7 @@ def margins_of(made: Plan, variant: Variant) -> Margins:
         return Margins()
     scales = np.array([measure.scale for measure in SINGULARITY_MEASURES])
     singularity = (singularity_distance_rows(arm, q) / scales).min(axis=1)
-    # Joint motions may pass through singularities.
+    # Joint motions are left out, because they can pass through singularities.
     led = ~np.isin(_points_at(made, time), _joint_moves(made))
     rates = np.abs(np.diff(q, axis=0)) / np.diff(time)[:, None]
     T_flange_tcp = variant.T_flange_tcp if made.T_flange_tcp is None else made.T_flange_tcp
@@ -295,7 +297,7 @@ def margins_of(made: Plan, variant: Variant) -> Margins:
 
 
 def _points_at(made: Plan, time: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
-    """Return the indices of the points to which the tool is moving at some times."""
+    """Return, for each time, the index of the point to which the tool is moving."""
     row = np.searchsorted(made.reference.time, time, side='left')
     return made.reference.point[np.minimum(row, len(made.reference.point) - 1)]
 
@@ -310,7 +312,7 @@ def _joint_moves(made: Plan) -> list[int]:
 
 # ---- tables, maps and pictures -----------------------------------------------------------------
 
-#: The columns of numbers in a table, with their units.
+#: The titles, with units, of the columns of numbers in a table.
 COLUMNS = {
     'joint_limit': 'joint limit [rad]',
     'singularity': 'singularity [rad]',
@@ -388,7 +390,7 @@ def _grid(
     """
     Return the axes of a map, their values, and the worst margin of each cell.
 
-    -inf = a variant of the cell is refused, NaN = the cell has no variant.
+    A margin of -inf means that a variant of the cell is refused; NaN, that the cell has none.
     """
     names = _axes(results)
     values: list[list[Coordinate]] = [

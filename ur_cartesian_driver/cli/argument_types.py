@@ -25,7 +25,7 @@ MAX_VARIANTS = 100_000
 
 
 def length(text: str) -> float:
-    """Return a length that is given with its unit, in metres."""
+    """Return the length [m] that a text gives with a unit, for example ``1mm``."""
     from ur_cartesian_driver.importing import parse_length
 
     return parsed(parse_length, text)
@@ -64,7 +64,7 @@ def count(text: str) -> int:
 
 
 def point_index(text: str) -> int:
-    """Return the index of a point; the number of points in a goal may be unlimited."""
+    """Return the index of a point, any number that fits into uint32."""
     number = int(text)
     if not 0 <= number < 2**32:
         raise argparse.ArgumentTypeError(f'{text} is not an index from 0')

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``check-robot``: observe a robot, and run experiments to which a person agrees."""
+"""The command ``check-robot``: observe a robot, and run the experiments that a person allows."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def experiment_findings(
     recordings: dict[str, MotionSamples],
 ) -> list[Finding]:
     """
-    Carry out the experiments to which a person agrees.
+    Carry out the experiments that a person allows.
 
     :param agrees: asks the person about a motion, and returns whether the person agrees.
     :param recordings: receives the samples of each experiment.
@@ -137,7 +137,7 @@ def exit_status(findings: list[Finding]) -> int:
 
 
 def report(findings: list[Finding], recordings: dict[str, MotionSamples]) -> dict[str, Any]:
-    """Return the report to send in, without address, serial number and names of programs."""
+    """Return the report for the maintainers, without address, serial number and program names."""
     return {
         'format': 1,
         'driver': ElementTree.parse(share_path() / 'package.xml').findtext('version'),

@@ -27,13 +27,13 @@ class CommandParser(argparse.ArgumentParser):
     The parser of one command.
 
     Its arguments are added when the command is used, because adding them imports the module of the
-    command. So `where` starts without a planner, `sim` without ROS, and every command fast.
+    command. So `where` starts without a planner, `sim` without ROS, and every command quickly.
     """
 
     def __init__(
         self, *args: Any, add_arguments: Callable[[CommandParser], None], **fields: Any
     ) -> None:
-        """Take the function that adds the arguments and sets the action."""
+        """Take the function that adds the arguments and sets the function to run."""
         super().__init__(*args, **fields)
         self._add_arguments: Callable[[CommandParser], None] | None = add_arguments
 
@@ -221,7 +221,7 @@ def _add_send(command: CommandParser) -> None:
 
 
 def _add_planning(command: CommandParser, optional: bool = False) -> None:
-    """Add the goal, and the options for what a driver would read from its robot."""
+    """Add the goal, and the options that give what a driver would read from its robot."""
     _add_goal(command, optional)
     command.add_argument(
         '--ur-type',

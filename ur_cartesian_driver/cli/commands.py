@@ -103,7 +103,7 @@ def append(arguments: argparse.Namespace) -> int:
 
 
 def recover(arguments: argparse.Namespace) -> int:
-    """Bring a stopped robot back until it accepts goals, and say what a person has to do."""
+    """Make a stopped robot accept goals again, and print what a person still has to do."""
     from ur_cartesian_driver.ros import client
 
     with client.GoalClient(arguments.driver) as caller:
@@ -169,13 +169,13 @@ def read_goal(arguments: argparse.Namespace) -> Any:
 
 
 def code_text(number: int) -> str:
-    """Return name and number of an error code, ``INVALID_GOAL (-1)``."""
+    """Return name and number of an error code, for example ``INVALID_GOAL (-1)``."""
     code = ErrorCode(number)
     return f'{code.name} ({code.value})'
 
 
 def clear_line() -> None:
-    """Clear the line of progress on a terminal."""
+    """Clear the line that shows the progress on a terminal."""
     if sys.stdout.isatty():
         print('\r\033[K', end='')
 

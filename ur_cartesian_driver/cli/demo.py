@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``ur-cartesian demo``: simulated controller, driver node and client, a process each.
+``ur-cartesian demo``: simulated controller, driver node and client, each in its own process.
 
 The processes are the commands that a user would start by hand, but on free ports, so that the demo
 disturbs no other program. With two arms, each driver has a namespace and a ``tf_prefix``.
@@ -23,7 +23,7 @@ import threading
 
 from ur_cartesian_driver.cli.plots import feedback_plot
 
-#: How long a process may take to end [s].
+#: How long a process may take to end after its signal [s].
 END_TIMEOUT = 10.0
 _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
 
@@ -33,7 +33,7 @@ class DemoArm:
     """
     One arm of the demo.
 
-    :param name: its namespace; empty for a single arm.
+    :param name: the namespace of the arm's driver; empty for a single arm.
     """
 
     name: str = ''
@@ -43,17 +43,17 @@ class DemoArm:
 
     @property
     def driver(self) -> str:
-        """The name of its driver node."""
+        """The name of the arm's driver node."""
         return f'{self.name}/ur_cartesian_driver'.lstrip('/')
 
     @property
     def tf_prefix(self) -> str:
-        """The prefix of its frames and joints."""
+        """The prefix of the arm's frames and joints."""
         return f'{self.name}_' if self.name else ''
 
     @property
     def label(self) -> str:
-        """The prefix of its lines of output."""
+        """The prefix of the arm's lines of output."""
         return f'{self.name}: ' if self.name else ''
 
 
@@ -179,7 +179,7 @@ def _draw(arm: DemoArm, record: Path) -> None:
 def _show(arm: DemoArm, environment: dict[str, str]) -> None:
     """Write the page with the arm on its planned path."""
     options = ['--ur-type', arm.model]
-    if arm.name:  # for the names in the goal, and for the parameters of the planning
+    if arm.name:  # the first option is for the names in the goal, the second for the planning
         options += ['--tf-prefix', arm.tf_prefix, '-p', f'tf_prefix:={arm.tf_prefix}']
     page = str(arm.drawing.with_suffix('.html'))
     with process('show', str(arm.goal), *options, '-o', page, environment=environment) as running:
@@ -238,7 +238,7 @@ def _free_port_options(*names: str) -> Sequence[str]:
 
 
 def _environment() -> dict[str, str]:
-    """Return an environment in which the processes discover only each other."""
+    """Return an environment in which processes find only each other; set variables are kept."""
     return {
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),

@@ -26,7 +26,7 @@ EXPORTERS: FileFormats[Exporter] = FileFormats(
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a recording in the format of the suffix; no incomplete file is left behind."""
+    """Write a recording in the format of the output's suffix; leave no incomplete file."""
     source = newest_recording(Path(arguments.file))
     target = Path(arguments.output or source.with_suffix('.mcap'))
     suffix = target.suffix.lower()

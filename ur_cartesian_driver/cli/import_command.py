@@ -29,7 +29,7 @@ MANY_POINTS = 200
 
 
 def import_goal(arguments: argparse.Namespace) -> int:
-    """Write the goal, and say what was left out."""
+    """Write the goal of a file, and print what was left out of the file."""
     try:
         with timed('importing'):
             imported = import_file(arguments.file, options_of(arguments), arguments.format)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``ur-cartesian validate`` and ``show``: check and plan a goal without driver and robot.
+``ur-cartesian validate`` and ``show``: check and plan a goal without a driver.
 
 The command line gives what a driver would read from its robot: model, calibration, joint positions
-and TCP. tf2 frames are not available.
+and TCP. Only ``show --live`` reads joint positions and TCP from a robot. There are no tf2 frames.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Default address on which pages are served.
 LOOPBACK = '127.0.0.1'
-#: Packets per second, and the wait before a new connection to a lost robot [s].
+#: Packets per second; pause before a new attempt to connect to a lost robot [s].
 LIVE_RATE, RECONNECT_PERIOD = 20.0, 1.0
 
 
@@ -108,7 +108,7 @@ def show(arguments: argparse.Namespace) -> int:
 
 
 def _show_live(arguments: argparse.Namespace) -> int:
-    """Serve a page that follows a robot, until a signal comes."""
+    """Serve a page that follows a robot, until a signal ends the command."""
     from ur_cartesian_driver.preview import live_page
 
     state = asyncio.run(read_state(arguments.live, arguments.rtde_port))
@@ -161,7 +161,7 @@ class GoalPlanning:
         """
         Read the parameters and the goal.
 
-        :param robot: the state of the robot; None = as the arguments say.
+        :param robot: the state of the robot; None = the state that the arguments give.
         """
         from ur_cartesian_driver.planning.preflight.clearance import self_collision_remark
         from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
@@ -178,7 +178,7 @@ class GoalPlanning:
             q, tcp = robot.actual_q, robot.T_flange_tcp
         self.state = state_at_rest(self.arm, q, tcp)
         self._message = read_goal(arguments) if arguments.file else None
-        #: None until its frames are known.
+        #: The goal; None before :meth:`plan` has resolved its frames.
         self.goal: Goal | None = None
 
     @property
@@ -195,7 +195,7 @@ class GoalPlanning:
         """
         Return the plan of the goal.
 
-        :raises GoalRefused: the text says why.
+        :raises GoalRefused: the goal is refused; the text says why.
         """
         from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot
         from ur_cartesian_driver.planning import plan

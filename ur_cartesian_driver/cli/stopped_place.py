@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place where a file's goal was stopped, kept next to it for ``ur-cartesian send --resume``.
+The note of the place where a goal was stopped, for ``ur-cartesian send --resume``.
 
-``seam.yaml.stopped`` holds the place, and a hash of the goal in ``seam.yaml``. The file is written
-to the working directory if the goal is an example of the package, or its folder is read-only.
+The note for ``seam.yaml`` is the file ``seam.yaml.stopped`` in the same folder. It holds the place
+and a hash of ``seam.yaml``. If the goal is an example of the package, or its folder is read-only,
+the note is in the working directory instead.
 """
 
 from __future__ import annotations
@@ -23,9 +24,11 @@ _SUFFIX = '.stopped'
 
 def write_place(goal_file: Path, place: PathPlace | None) -> Path | None:
     """
-    Note the place where a goal was stopped; None = remove the note, nothing is left to resume.
+    Note the place where a goal was stopped.
 
-    :returns: the written file, or None.
+    :param place: the place; None = nothing is left to resume, so an earlier note is removed.
+
+    :returns: the written file; None if no file was written.
     :raises OSError: the file cannot be written.
     """
     file = _file(goal_file)
@@ -41,7 +44,7 @@ def read_place(goal_file: Path) -> PathPlace:
     """
     Return the place where a goal was stopped.
 
-    :raises ValueError: the place is not known, or the goal has changed since.
+    :raises ValueError: no place is noted, or the goal file has changed since the stop.
     """
     file = _file(goal_file)
     try:

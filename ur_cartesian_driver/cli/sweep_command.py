@@ -69,7 +69,7 @@ def variants_of(arguments: argparse.Namespace) -> list[Variant]:
     """
     Return the variants of a command line.
 
-    :raises ValueError: there are too many.
+    :raises ValueError: there are too many variants, or one calibration for several models.
     """
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
 

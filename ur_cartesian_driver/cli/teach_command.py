@@ -54,7 +54,7 @@ def guide(
     driver: Driver, lesson: Lesson, keys: Iterable[str], say: Callable[[str], object]
 ) -> None:
     """
-    Keep freedrive on while keys are read; in any case the robot holds the arm again at the end.
+    Keep freedrive on while keys are read, and end it afterwards, even after an error.
 
     :raises RobotNotReady: freedrive does not begin, or ends by itself.
     """
@@ -84,7 +84,7 @@ class Lesson:
     """The points taken so far."""
 
     def __init__(self, beginning: Path) -> None:
-        """Begin with a path without points, which may set speeds."""
+        """Begin with a path that has no points, but may set speeds."""
         self._paths = [beginning]
         self._kind, self._via = 'l', None  # type: str, Pose | None
 
@@ -134,7 +134,7 @@ class Lesson:
 
 
 def _keys() -> Iterator[str]:
-    """Yield the typed lines; the end of the input means q."""
+    """Yield the typed lines until the end of the input, which means the same as q."""
     for line in sys.stdin:
         yield line.strip().lower()
 

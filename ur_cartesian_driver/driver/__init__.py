@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ['ConnectionState', 'ConnectionStatus', 'Driver', 'DriverConfig', 'MotionHandle']
 
-# The robot process imports packages from here, too, and needs no planner.
+# Names are imported lazily: the robot process also imports modules from this package, but needs
+# no planner.
 __getattr__ = lazy_names(
     __name__,
     {

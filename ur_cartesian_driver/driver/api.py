@@ -83,13 +83,13 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, Serv
 NO_STATE = 'The robot does not report its state.'
 LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
 
-#: How long a cancelled motion may take to get its outcome [s], whatever the robot does.
+#: Longest time from the cancel of a motion to its outcome [s], whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
 
 
 class Driver(RobotServices, InteractiveMotions):
     """
-    One robot. Thread-safe; open it, or use it as a context manager.
+    The driver of one robot; thread-safe. Open it, or use it as a context manager.
 
     ::
 
@@ -112,11 +112,11 @@ class Driver(RobotServices, InteractiveMotions):
         auto_heartbeat: bool = True,
     ) -> None:
         """
-        Prepare a driver; nothing is connected before :meth:`open`.
+        Keep the settings; nothing is connected before :meth:`open`.
 
         :param frames: the frames that paths can name; None = the standard frames.
-        :param auto_heartbeat: send heartbeats from a thread; an owner that can hang (a ROS
-            executor) calls :meth:`heartbeat` itself.
+        :param auto_heartbeat: whether a thread of the driver sends the heartbeats. An owner that
+            can hang (a ROS executor) sets False and calls :meth:`heartbeat` itself.
         :raises ValueError: ``ur_type`` is unknown.
         """
         self.config = config
@@ -162,24 +162,24 @@ class Driver(RobotServices, InteractiveMotions):
         """Stop a running motion and end the robot loop and all threads. May be called twice."""
         if not self._loop.close():
             return
-        # The status first: it refuses new motions, which would never end.
+        # The status is set first, so that new motions, which would never end, are refused.
         self._robot.set_status(ConnectionStatus(message='The driver is closed; open it.'))
         self._running.abort('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Tell the robot loop that the owner is alive; needed within every ``node_timeout``."""
+        """Tell the robot loop that the owner is alive, at least once every ``node_timeout``."""
         self._send(OwnerHeartbeat())
 
     # ---- state and status ---------------------------------------------------------------------
 
     @property
     def status(self) -> ConnectionStatus:
-        """The state of the connection, and the next step towards a goal."""
+        """The state of the connection, and what to do next to get the robot ready."""
         return self._robot.status
 
     @property
     def state(self) -> RobotState | None:
-        """The newest robot state; None before the first and when the robot is lost."""
+        """The newest robot state; None before the first and while the robot is disconnected."""
         return self._loop.state
 
     @property
@@ -187,8 +187,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         The state from which the next motion starts; None as for :attr:`state`.
 
-        While a motion runs: the predicted state after a stop that begins now, with the TCP from
-        before that motion.
+        While a motion runs, this is the predicted state after a stop that begins now, with the TCP
+        that the robot had before the motion.
         """
         state = self.state
         if state is None:
@@ -207,17 +207,17 @@ class Driver(RobotServices, InteractiveMotions):
 
     @property
     def signals(self) -> Signals | None:
-        """Inputs, outputs and tool; None before the first report and when the robot is lost."""
+        """Inputs, outputs and tool; None before the first report and while disconnected."""
         return self._robot.signals
 
     @property
     def gaps(self) -> LinkGaps:
-        """The longest recent pauses of the connection."""
+        """The longest recent gaps between messages of the connection."""
         return self._robot.gaps
 
     @property
     def arm(self) -> Arm:
-        """The arm's kinematics: calibrated once the robot has reported them, else nominal."""
+        """The kinematics of the arm: nominal until the robot has reported its calibration."""
         return self._robot.arm
 
     def add_status_listener(self, callback: Callable[[ConnectionStatus], None]) -> None:
@@ -233,8 +233,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Wait until a goal can run; the driver connects, and reconnects, by itself.
 
-        :raises RobotNotReady: no goal can run in time (``timeout`` [s]); the text names the next
-            step.
+        :raises RobotNotReady: the robot is not ready after ``timeout`` [s]; the text says what to
+            do.
         """
         if not self._robot.ready.wait(timeout):
             raise RobotNotReady(self.status.not_ready())
@@ -248,8 +248,10 @@ class Driver(RobotServices, InteractiveMotions):
         ``plan(goal).show()`` opens a page with the arm on its path.
 
         :param goal: a goal, in Cartesian or joint space, or a path. The frames of a path are
-            resolved now; the arm has to be at its start unless it begins with a joint motion.
-        :raises GoalRefused: the text says why; :exc:`RobotNotReady` without a robot state.
+            resolved now; unless the path begins with a joint motion, the arm has to be at the
+            start of the path.
+        :raises GoalRefused: the goal fails a check; the text says which.
+        :raises RobotNotReady: the robot does not report its state.
         """
         state = self._require(self.rest_state)
         if isinstance(goal, Path):
@@ -267,7 +269,7 @@ class Driver(RobotServices, InteractiveMotions):
         Execute a plan and return at once.
 
         :raises RobotNotReady: the robot program is not connected, a motion is running, or the plan
-            was made for another program.
+            was made for another robot program.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.older_program != self.config.dialect.older_program:
@@ -293,10 +295,11 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Plan and run a goal or path, and wait for its outcome; a refusal is an outcome too.
 
-        :param preempt: stop a running motion for this goal, once the goal has passed all checks
-            from where the arm would come to rest; False = refuse the goal while a motion runs.
-        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
-            arm is at rest.
+        :param preempt: whether to stop a running motion for this goal, after the goal has passed
+            all checks from where the arm would come to rest; False = refuse the goal while a
+            motion runs.
+        :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion was cancelled, and
+            its end was awaited for at most :data:`CANCEL_TIMEOUT`.
         """
         try:
             planned = self.plan(goal)
@@ -317,9 +320,10 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Stop the running motion for another one, and wait until it ends as PREEMPTED.
 
-        :param by: the other motion, as part of the sentence of the outcome.
+        :param by: a noun phrase for the other motion, which the text of the outcome contains.
         :returns: whether a motion ran; if so, plans made before its end have to be made again.
-        :raises RobotNotReady: the motion cannot be preempted now and goes on, or it did not end.
+        :raises RobotNotReady: the running motion cannot be preempted now and goes on, or it did
+            not end in time.
         """
         motions = self._running.handles
         if motions:
@@ -484,7 +488,7 @@ class Driver(RobotServices, InteractiveMotions):
     # ---- from the robot loop ------------------------------------------------------------------
 
     def _on_loop_lost(self) -> None:
-        # If somebody has stopped the program, it stays stopped.
+        # A robot program that somebody has stopped is not uploaded again.
         self._may_upload = self.status.program_running
         self._robot.set_status(
             ConnectionStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST))

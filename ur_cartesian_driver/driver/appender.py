@@ -46,10 +46,11 @@ MESSAGES_AHEAD = 2
 class AppendResult:
     """The result of an append."""
 
-    #: How many points the goal has now, and the number of the first new point.
+    #: How many points the goal has now.
     points: int
+    #: The number of the first new point.
     first: int
-    #: A sentence for people.
+    #: The result as a sentence.
     text: str
 
 
@@ -57,7 +58,7 @@ Offers: TypeAlias = Generator[AppendToMotion, AnswerAppend, AppendResult]
 
 
 def encode_part(part: AppendPlan) -> tuple[bytes, MotionJob]:
-    """Return the records of an append plan, encoded, and its job."""
+    """Return the encoded records of an append plan, and the job of the plan."""
     plan = part.plan
     job = job_from_plan(
         plan,
@@ -65,7 +66,7 @@ def encode_part(part: AppendPlan) -> tuple[bytes, MotionJob]:
         ending_records=part.ending_records,
         spline=part.spline,
     )
-    # Set-points are made by the robot loop: no records go to the robot.
+    # If the robot loop makes set-points of the plan, no records go to the robot.
     points = b'' if plan.execution.traits.streams_setpoints else encode_plan(plan)
     return points, replace(job, due=part.end_time)
 
@@ -84,10 +85,11 @@ class Appender:
         timeout: float = ANSWER_TIMEOUT,
     ) -> None:
         """
-        Prepare.
+        Begin with the first points of a goal.
 
-        :param planning_inputs: returns the present arm and options.
-        :param progress: returns the newest report of the motion.
+        :param opened: the plan of the first points.
+        :param planning_inputs: returns the present arm and planning options.
+        :param progress: returns the newest progress report of the motion.
         :param timeout: how long to wait for an answer [s].
         """
         self._timeout = timeout
@@ -95,7 +97,7 @@ class Appender:
         self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
         self._goal: AppendableGoal = opened.next_goal
         self._is_open = True
-        # One request after the other: each begins where the previous one ends.
+        # Requests run one after the other, because each begins where the previous one ends.
         self._append_lock = threading.Lock()
         # Guards the attributes below.
         self._lock = threading.Lock()
@@ -111,7 +113,7 @@ class Appender:
 
     def append(self, new_points: AppendedPoints) -> AppendResult:
         """
-        Plan points and have all or none of them accepted; takes as long as planning does.
+        Plan points, and have all or none of them accepted; blocks until the answer has come.
 
         :raises GoalRefused: the points are not accepted, and the goal stays as it was.
         """
@@ -189,13 +191,13 @@ class Appender:
         if progress is not None:
             self._goal = without_passed(self._goal, progress.time)
             if cut_time(self._goal, new_points) < progress.time:
-                # Motion that was already sent towards the arm is final too.
+                # Motion that was sent to the robot and not carried out yet is final too.
                 ahead = progress.buffered if isnan(progress.lag) else progress.lag
                 raise AlreadySent(*first_replaceable(self._goal, progress.time + ahead))
         return self._goal
 
     def _is_at_rest(self) -> bool:
-        """Return whether the arm surely rests after all points of the goal."""
+        """Return whether the newest report has the arm at rest after all points of the goal."""
         progress = self._progress()
         return (
             progress is not None
@@ -243,7 +245,7 @@ class Appender:
             self._send(offer)
             return future.result(self._timeout)
         except TimeoutError:
-            # The loop may have accepted the points, so it is unknown where more would begin.
+            # The loop may have accepted the points: it is unknown where further ones would begin.
             self._ended = 'The robot loop did not answer: nothing can be appended any more.'
             return AnswerAppend(number=number, refusal=self._ended)
         finally:
@@ -260,7 +262,7 @@ class Appender:
             future.set_result(answer)
 
     def end(self) -> None:
-        """End, because the motion has ended; pending appends are refused."""
+        """Refuse pending and further appends, because the motion has ended."""
         with self._lock:
             self._ended = 'The goal has ended.'
             pending, self._pending_answers = self._pending_answers, {}

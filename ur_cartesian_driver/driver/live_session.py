@@ -3,8 +3,8 @@
 """
 Live sessions and freedrive, as methods of a driver.
 
-Both are motions like those of goals: only one runs at a time, it is cancelled in the same way, and
-it has one outcome. Only its path is decided while it runs.
+Both are motions like those of goals: only one motion runs at a time, each can be cancelled in the
+same way, and each has one outcome. But their paths are not planned before they run.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class LiveSession:
     """A running live session."""
 
     def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
-        """Wrap a motion; :meth:`~.api.Driver.start_live_session` returns sessions."""
+        """Wrap a running motion; :meth:`~.api.Driver.start_live_session` makes sessions."""
         #: The session's motion, to wait for its end or to cancel it.
         self.motion = motion
         self._send = send
@@ -86,7 +86,7 @@ class InteractiveMotions(ABC):
         live: LiveSetup | None = None,
         freedrive: bool = False,
     ) -> MotionHandle:
-        """Start a motion without a path of its own."""
+        """Start a motion without a planned path."""
 
     @abstractmethod
     def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
@@ -157,7 +157,7 @@ class InteractiveMotions(ABC):
         """
         Return the newest state.
 
-        :raises RobotNotReady: there is no state, or the robot program lacks the function.
+        :raises RobotNotReady: the robot reports no state, or its program lacks the function.
         """
         if not self.config.runs_own_program:
             raise RobotNotReady(
@@ -245,7 +245,8 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
         ),
         workspace=LiveWorkspace(
             planes=parse_planes(options.workspace_planes),
-            # The cylinders are thicker than the arm: they stop it only if they also refuse goals.
+            # The cylinders around the links are thicker than the arm, so their clearance is
+            # checked only if it also leads to the refusal of goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
         ),
@@ -261,7 +262,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
 
 
 def stationary_plan(state: RobotState, safe_outputs: tuple[SafeOutput, ...] = ()) -> Plan:
-    """Return the plan of a motion without a path of its own."""
+    """Return the plan of a motion without a planned path."""
     here = state.target_tcp_pose
     return Plan(
         goal=Goal(
@@ -280,7 +281,7 @@ def stationary_plan(state: RobotState, safe_outputs: tuple[SafeOutput, ...] = ()
 
 
 def stationary_job(plan: Plan) -> MotionJob:
-    """Return the job of a motion without a path of its own; the job has no wire records."""
+    """Return the job of a motion without a planned path, which sends no wire records."""
     return MotionJob(
         points=1,
         reference=plan.reference,

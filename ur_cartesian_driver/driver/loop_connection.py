@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop import loop_host as host
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: Pause before a robot loop that died is replaced [s]: what ended it may end the next one too.
+#: Pause before a lost robot loop is replaced [s]: what ended it may end the next loop too.
 RESTART_PAUSE = 0.5
 
 
@@ -38,7 +38,7 @@ class LoopConnection:
         reconfigure: Callable[[], Configure],
     ) -> None:
         """
-        Prepare; :meth:`open` starts the loop.
+        Keep the callbacks; :meth:`open` starts the loop.
 
         :param on_lost: called when the loop has died or hangs.
         :param reconfigure: called before another loop starts; returns that loop's configuration.
@@ -60,7 +60,7 @@ class LoopConnection:
 
     @property
     def state(self) -> RobotState | None:
-        """The newest robot state; None before the first and when the robot is lost."""
+        """The newest robot state; None before the first and while the robot is disconnected."""
         running = self.host
         if running is None or self._closed.is_set():
             return None
@@ -100,7 +100,7 @@ class LoopConnection:
         """
         Send a request; if the loop is gone, the reader thread notices.
 
-        :raises LocalProtocolError: the request cannot be sent to another process.
+        :raises LocalProtocolError: the request cannot be pickled.
         """
         self.send_packed(channel.pack(request))
 
@@ -121,12 +121,12 @@ class LoopConnection:
 
     def _read(self) -> None:
         heard: host.LoopHost | None = None
-        while (running := self.host) is not None:  # None: a callback of ours has closed it
+        while (running := self.host) is not None:  # None: a callback has closed the connection
             notification = channel.receive(running.pipe)
             if notification is not None:
                 if heard is not running:
                     heard = running
-                    with contextlib.suppress(OSError):  # closed meanwhile
+                    with contextlib.suppress(OSError):  # the pipe was closed meanwhile
                         running.pipe.settimeout(host.SILENCE_TIMEOUT)
                 self._handle(notification)
             elif self._closed.is_set():
@@ -145,7 +145,7 @@ class LoopConnection:
         """
         Replace a robot loop that died or hangs.
 
-        The robot program stops the arm, because its sockets are closed or silent for too long.
+        The robot program stops the arm, because its sockets were closed or silent for too long.
         """
         LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
         self._on_lost()

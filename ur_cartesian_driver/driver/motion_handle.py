@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A running motion: the handle for its user, and the driver's side of it."""
+"""A running motion: the handle that a user holds, and the object that the driver holds."""
 
 from __future__ import annotations
 
@@ -39,14 +39,15 @@ class MotionHandle:
         send: Callable[[Request], None],
         make_report: Callable[[], object],
     ) -> None:
-        """Wrap a motion; :meth:`~.api.Driver.start` returns handles."""
+        """Wrap a running motion; :meth:`~.api.Driver.start` makes handles."""
         self.number = number
         self._outcome, self._send, self._make_report = outcome, send, make_report
         #: Appends points; None = the goal was sent without keep_open. Set by the driver.
         self.appender: Appender | None = None
-        #: How old path offsets may be [s]; None = the goal permits none. Set by the driver.
+        #: The largest age of path offsets [s]; None = the goal permits no offsets. Set by the
+        #: driver.
         self.offset_timeout: float | None = None
-        #: The newest report, None before the first.
+        #: The newest progress report; None before the first report.
         self.progress: Progress | None = None
 
     def cancel(self) -> None:
@@ -57,7 +58,7 @@ class MotionHandle:
         """
         Stop the arm, as :meth:`cancel` does, because another motion follows.
 
-        :param by: the other motion, as part of the sentence of the outcome.
+        :param by: a noun phrase for the other motion, which the text of the outcome contains.
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
 
@@ -79,16 +80,19 @@ class MotionHandle:
 
         :param waypoints: the points, with times from the start of the goal, in the goal's frame.
         :param segments: none, or one for each point.
-        :param io_commands: their waypoints are numbered from the start of the goal.
-        :param last: no more points follow: the arm comes to rest at the last point. Without points
-            the arm comes to rest at the planned ending: for a spline, after its last point.
+        :param io_commands: outputs to switch; their waypoints count from the start of the goal.
+        :param last: whether no more points follow, so that the arm comes to rest at the last one.
+            If ``waypoints`` is empty, the arm comes to rest at the planned ending, which for a
+            spline is after its last point.
         :param replace_from_point: the first point that the new points replace, together with all
             points after it (SPLINE and SERVO).
-        :param replace_from_time: or the time from which the new points replace the old ones [s],
-            from the start of the goal; the motion goes on from there to the first new point.
+        :param replace_from_time: an alternative to ``replace_from_point``: the time [s], since the
+            start of the goal, from which the new points replace the old ones. The motion goes on
+            from its place at that time to the first new point.
         :raises AlreadySent: the tail to replace is final; the error gives the first point and time
             that can still be replaced.
-        :raises GoalRefused: no point was accepted, and the goal goes on; the text says why.
+        :raises GoalRefused: a check or the robot loop refused the points, as the text explains; no
+            point was accepted, and the goal goes on.
         """
         if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
@@ -147,7 +151,7 @@ class MotionHandle:
         :raises TimeoutError: no outcome came within ``timeout`` [s]; the motion goes on.
         """
         if timeout is None:
-            self._make_report()  # while the arm moves
+            self._make_report()  # makes use of the time in which the arm moves
         return self._outcome.result(timeout)
 
     def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
@@ -166,7 +170,7 @@ class ActiveMotion:
         send: Callable[[Request], None],
     ) -> None:
         """
-        Prepare.
+        Begin with no progress and no outcome.
 
         :param send: sends requests to the robot loop.
         """
@@ -174,15 +178,17 @@ class ActiveMotion:
         self._on_progress = on_progress
         #: Guards the attributes below.
         self._lock = threading.Lock()
-        #: The plan, dropped when its report is being made; the report; the outcome.
+        #: The plan; None once a thread makes its report.
         self._plan: Plan | None = plan
+        #: The report of the plan; None before it is made.
         self._plan_report: tuple[str, ...] | None = None
+        #: The outcome of the motion; None before the motion has ended.
         self._ended: Outcome | None = None
         #: The handle that the owner holds.
         self.motion = MotionHandle(number, self._outcome, send, self.make_report)
         if plan.offset_band is not None:
             self.motion.offset_timeout = plan.offset_band.timeout
-        #: The TCP that the robot has while this motion runs; None = its own.
+        #: The TCP that the robot has while this motion runs; None = the TCP is not changed.
         self.temporary_tcp = (
             None
             if plan.T_flange_tcp is None
@@ -193,10 +199,10 @@ class ActiveMotion:
 
     def make_report(self) -> None:
         """
-        Make the report of the plan, unless another thread makes it.
+        Make the report of the plan, unless it is made or another thread is making it.
 
-        This takes longer than sending the plan. If the motion has ended meanwhile, the thread that
-        made the report delivers the outcome.
+        The report takes longer than sending the plan. If the motion has ended meanwhile, the
+        thread that made the report delivers the outcome.
         """
         with self._lock:
             plan, self._plan = self._plan, None
@@ -215,7 +221,7 @@ class ActiveMotion:
             run_callback(self._on_progress, progress)
 
     def end(self, outcome: Outcome) -> None:
-        """Deliver the outcome; all but the first one are ignored."""
+        """Deliver the outcome; any further outcome is ignored."""
         if self.motion.appender is not None:
             self.motion.appender.end()
         with self._lock:

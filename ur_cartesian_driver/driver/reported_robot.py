@@ -38,7 +38,7 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 class ReportedRobot:
     """
-    The newest reports of a robot loop; written by the driver's reader thread, read by all.
+    The newest reports of a robot loop; the driver's reader thread writes them, all threads read.
 
     :raises ValueError: ``ur_type`` is unknown.
     """
@@ -50,7 +50,7 @@ class ReportedRobot:
         self.arm = Arm(robot_model(config.ur_type))
         self.status = ConnectionStatus()
         self.ready = threading.Event()
-        #: Inputs and outputs; None before the first report and when the robot is lost.
+        #: Inputs and outputs; None before the first report and while the robot is disconnected.
         self.signals: Signals | None = None
         self.gaps = LinkGaps()
         self.status_listeners: list[Callable[[ConnectionStatus], None]] = []
@@ -96,7 +96,7 @@ class ReportedRobot:
             run_callback(listener, status)
 
     def _update_limits(self, limits: JointLimits) -> None:
-        """Plan within the reported limits, if they are tighter, from now on."""
+        """From now on, plan within those reported limits that are tighter than the model's."""
         model = robot_model(self._config.ur_type).limited_to(limits)
         self.arm = Arm(model, self.arm.geometry)
         for k in sorted(model.reported_ranges):
@@ -106,7 +106,7 @@ class ReportedRobot:
             LOG.info('%s turns at up to %.3f rad/s%s', JOINT_NAMES[k], speed, source)
 
     def _update_geometry(self, geometry: DhTable) -> None:
-        """Plan with the calibrated kinematics from now on; warn if they are far off nominal."""
+        """From now on, plan with the calibrated arm; warn if it differs much from the nominal."""
         model = self.arm.model
         self.arm = Arm(model, geometry)
         deviation = self.arm.max_flange_distance(Arm(model))

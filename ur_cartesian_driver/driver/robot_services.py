@@ -30,10 +30,10 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 class RobotServices(ABC):
     """
-    Each method waits for its answer: at most 40 s, for a recovery 120 s.
+    Service calls; each method waits for the answer: at most 40 s, for a recovery 120 s.
 
-    A script may take its own timeout in addition. A refusal is an answer too. A value that cannot
-    be sent raises :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
+    For a script, its ``timeout`` is added to the 40 s. A refusal is an answer too. A value that
+    cannot be sent raises :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
     @abstractmethod
@@ -41,7 +41,7 @@ class RobotServices(ABC):
         """Start a call and return at once; the answer always comes."""
 
     def dashboard(self, command: str, argument: str = '') -> ServiceAnswer:
-        """Give a command to the dashboard: ``power on``, ``load`` with the name of a file ..."""
+        """Give a command to the dashboard, for example ``power on``, or ``load`` with a file."""
         return self.call(DashboardCall(command=command, argument=argument)).result()
 
     def dashboard_line(self, line: str) -> ServiceAnswer:
@@ -57,11 +57,11 @@ class RobotServices(ABC):
         return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
 
     def zero_ftsensor(self) -> ServiceAnswer:
-        """Make the force and torque that are measured now the new zero."""
+        """Zero the force-torque sensor at the force and torque that it measures now."""
         return self.call(ZeroFtSensorCall()).result()
 
     def hand_back_control(self) -> ServiceAnswer:
-        """Make the program of the pendant go on after its External Control node."""
+        """Make the pendant's program continue after its External Control node."""
         return self.call(HandBackCall()).result()
 
     def run_script(self, script: str, timeout: float = SCRIPT_TIMEOUT) -> ServiceAnswer:
@@ -92,7 +92,7 @@ class RobotServices(ABC):
         """
         Bring a stopped robot back to READY, as far as software is allowed to.
 
-        :param unlock_protective_stop: a person has looked at the cause of a protective stop and
-            removed it; otherwise the stop is left to a person.
+        :param unlock_protective_stop: whether a person has looked at the cause of a protective
+            stop and removed it; if False, unlocking the stop is left to a person.
         """
         return self.call(RecoverCall(unlock_protective_stop=unlock_protective_stop)).result()

@@ -29,7 +29,7 @@ class RunningMotions:
     """
     Motions and calls by their numbers; thread-safe.
 
-    There is one motion at a time. Each motion ends with one outcome and each call with one
+    At most one motion runs at a time. Each motion ends with one outcome and each call with one
     answer, whatever happens to the loop.
     """
 
@@ -54,8 +54,8 @@ class RunningMotions:
             if not_ready:
                 raise RobotNotReady(not_ready)
             self._motions[active.motion.number] = active
-            # Sent under the lock: another thread may find the motion and cancel it, and the
-            # cancel has to arrive after the start.
+            # The request is sent under the lock: another thread may find the motion and cancel
+            # it, and the cancel has to arrive after the start.
             self._loop.send_packed(request)
 
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
@@ -84,9 +84,9 @@ class RunningMotions:
 
     def temporary_tcp(self, unrestored: TemporaryTcpSet | None) -> TemporaryTcpSet | None:
         """
-        Return the TCP of the running motion.
+        Return the temporary TCP of the running motion; None = it sets no TCP.
 
-        :param unrestored: returned if no motion runs.
+        :param unrestored: the temporary TCP to return if no motion runs.
         """
         with self._loop.lock:
             active = next(iter(self._motions.values()), None)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals as files: the YAML of the action, read and written without ROS.
+Goals as files: reads and writes the action's goals as YAML, without ROS.
 
 The fields are named as in the messages, so the same code reads files and messages.
 """

@@ -12,11 +12,11 @@ import gc
 @contextmanager
 def uncollected() -> Iterator[None]:
     """
-    Pause the garbage collector; also a decorator.
+    Pause the garbage collector, in a `with` block or, as a decorator, during a call.
 
     The collector would visit all new objects again and again: without it, files of 10,000 lines
-    are read and written in half the time. Objects dropped meanwhile are freed at once, unless they
-    are part of a cycle.
+    are read and written in half the time. Objects that are dropped during the pause are freed at
+    once, except those in reference cycles.
     """
     was_enabled = gc.isenabled()
     gc.disable()

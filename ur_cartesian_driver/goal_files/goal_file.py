@@ -14,14 +14,14 @@ import yaml
 from ur_cartesian_driver.goal_files.garbage import uncollected
 from ur_cartesian_driver.goal_files.goal_schema import FieldError, Message, with_defaults
 
-#: No goal nests as deeply. If a text nests a thousand times as deeply, the loaders crash, raise an
-#: exception or refuse it, depending on the loader.
+#: No goal is nested this deeply. At a thousand times this depth a loader crashes, raises an
+#: exception or refuses the text, depending on which loader it is.
 _MAX_DEPTH = 100
-_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # ten times as fast, if built with libyaml
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # the C loader is ten times as fast
 
 
 class GoalFileError(ValueError):
-    """A text is not a goal; the message names the key."""
+    """A text is not a goal; the message names the key or the line at fault, if there is one."""
 
 
 @uncollected()
@@ -43,7 +43,7 @@ def read_goal_file(source: str | os.PathLike[str]) -> Message:
         raise GoalFileError(f'{name}this is not YAML: {" ".join(str(error).split())}.') from None
     except FieldError as error:
         raise GoalFileError(f'{name}{error}') from None
-    except ValueError as error:  # from Python, such as that of an impossible date
+    except ValueError as error:  # from Python, for example for an impossible date
         raise GoalFileError(
             f'{name}a value cannot be read: {str(error).rstrip(".")}; correct it, or put it in '
             'quotes.'
@@ -61,7 +61,7 @@ def goal_text(fields: Mapping[str, Any]) -> str:
 
 def _check_depth(text: str) -> None:
     """
-    Refuse a text that nests more than any goal.
+    Refuse a text that is nested more deeply than any goal.
 
     :raises FieldError: the text is nested too deeply.
     """
@@ -77,7 +77,7 @@ def _check_depth(text: str) -> None:
 
 
 class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]  # chosen at run time
-    """Writes equal parts out in full; ten times as fast if PyYAML was built with libyaml."""
+    """Writes equal parts in full, not as aliases; ten times as fast if PyYAML has libyaml."""
 
     def ignore_aliases(self, data: object) -> bool:
         return True

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Points and segments in flat arrays: from rows to the fields of a ``PackedPoints``.
+Packs points and segments: from rows to the flat arrays of a ``PackedPoints``.
 
-:mod:`~ur_cartesian_driver.goal_files.goal_reading` does the reverse.
+:mod:`~ur_cartesian_driver.goal_files.goal_reading` unpacks them.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from ur_cartesian_driver.motion.goal.goal_table import SegmentRows, WaypointRows
 
 def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any] | None:
     """
-    Return points and segments as the fields of a message: arrays, and names of joints.
+    Return points and segments as the fields of a ``PackedPoints``: arrays, and joint names.
 
-    :returns: None if the message cannot hold them: a jerk, a posture whose names and values do not
-        match, or a type number that does not fit into a byte.
+    :returns: the fields; None = the message cannot hold a value: a jerk, a malformed posture, or a
+        number of an enumeration that does not fit into a byte.
     """
     names = _joint_names([*points.postures.values(), *segments.via_postures.values()])
     if names is None:
@@ -56,14 +56,14 @@ def packed_fields(points: WaypointRows, segments: SegmentRows) -> dict[str, Any]
 
 
 def _joint_names(postures: Sequence[Posture]) -> tuple[str, ...] | None:
-    """Return the joints that postures name; None = a posture is malformed."""
+    """Return the names of the joints in postures; None = a posture is malformed."""
     names: dict[str, None] = {}
     for posture in postures:
         if len(posture.names) != len(posture.values) or len(set(posture.names)) != len(
             posture.names
         ):
             return None
-        if any(value != value for value in posture.values):  # NaN means no preference in arrays
+        if any(value != value for value in posture.values):  # in arrays NaN means no preference
             return None
         names.update(dict.fromkeys(posture.names))
     return tuple(names)

@@ -1,11 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal message, or an object with its fields, to the goal itself.
+Turns a goal message, or an object with the fields of one, into the goal itself.
 
-The table of goal fields determines what is read. Only errors of the message itself are refused
-here: invalid enumerations, and both forms of points together. Points of either form become rows of
-arrays directly; with the plain form, attribute lookups take most of the time.
+The table of goal fields determines which fields are read. A message has its points in one of two
+forms: as a list of messages, or in the flat arrays of a ``PackedPoints``. Either form is read
+directly into the arrays of the goal; for lists, looking up attributes takes most of the time. Only
+messages that cannot be read are refused here: a number that is not in its enumeration, points in
+both forms, or an array of the wrong length.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ def goal_from_fields(message: Message) -> GoalTable:
     """
     Return the goal of a ``FollowCartesianTrajectory.Goal``; its frames are names, not yet poses.
 
-    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    :raises InvalidGoal: a number is not in its enumeration, or :func:`rows_of_points`
+        refuses the points; the error names the field.
     """
     waypoints, segments = rows_of_points(message, message.trajectory.points, 'trajectory.points')
     rest = _values(Goal, message, without=('waypoints', 'segments'))
@@ -57,7 +60,7 @@ def io_commands(message: Message) -> tuple[IOCommand, ...]:
 def _values(
     kind: type, message: Message, where: str = '', without: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Return the values of a dataclass of the table, by field; ``where`` is the message's name."""
+    """Return the field values of a goal dataclass, by name; errors put ``where`` before names."""
     return {
         each.name: _value(each, attrgetter(each.message_name)(message), where + each.message_name)
         for each in goal_fields(kind)
@@ -92,7 +95,7 @@ def _value(each: GoalField, value: Any, where: str) -> Any:
 
 
 def enum_member(enum: type[_Enum], value: int, field: str) -> _Enum:
-    """Return the member of a value, or refuse the value and list the members."""
+    """Return the member with this value, or refuse a value without one and list the members."""
     try:
         return enum(value)
     except ValueError:
@@ -106,12 +109,12 @@ def nanoseconds(time: Message) -> int:
 
 
 def seconds(time: Message) -> float:
-    """Return a ``Duration`` or ``Time`` in seconds, rounded once, so nanoseconds survive."""
+    """Return a ``Duration`` or ``Time`` in seconds; a single rounding keeps the nanoseconds."""
     return nanoseconds(time) / 1_000_000_000
 
 
 def pose_from_message(pose: Message) -> Pose:
-    """Return a ``geometry_msgs/Pose`` unchanged: not normalized, not checked."""
+    """Return a ``geometry_msgs/Pose`` as a pose, without normalizing or checking it."""
     p, q = pose.position, pose.orientation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
@@ -121,7 +124,7 @@ def _three(vector: Message) -> Vector3:
 
 
 def _six(twist: Message) -> Vector6:
-    """Return a ``Twist`` or ``Accel``."""
+    """Return the six numbers of a ``Twist`` or ``Accel``, the linear ones first."""
     u, v = twist.linear, twist.angular
     return (u.x, u.y, u.z, v.x, v.y, v.z)
 
@@ -138,10 +141,12 @@ def rows_of_points(
     message: Message, points: Sequence[Message], field: str
 ) -> tuple[WaypointRows, SegmentRows]:
     """
-    Return the points and segments of a message, in either form.
+    Return the points and segments of a message, in whichever form it has them.
 
-    :raises InvalidGoal: the message has both forms, an array does not fit the number of points, or
-        an enumeration has no such value; the text names the field.
+    :param points: the list of points in the message; may be empty.
+    :param field: the name of that list, for errors.
+    :raises InvalidGoal: points are given in both forms, the length of an array does not suit the
+        number of points, or a number is not in its enumeration; the error names the field.
     """
     if not is_packed(message.packed):
         return point_rows(points), segment_rows(message.segments)
@@ -159,7 +164,7 @@ def segment_rows(segments: Sequence[Message]) -> SegmentRows:
     """
     Return ``MotionSegment`` messages as rows.
 
-    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    :raises InvalidGoal: a number is not in its enumeration; the error names the field.
     """
     columns = _columns(SegmentRows, segments)
     for each in SegmentRows.columns():
@@ -168,7 +173,7 @@ def segment_rows(segments: Sequence[Message]) -> SegmentRows:
 
 
 def _columns(kind: type[GoalRows[Any]], messages: Sequence[Message]) -> dict[str, Any]:
-    """Return the columns of messages; each is None if there are no messages."""
+    """Return the columns of a list of messages; if the list is empty, each column is None."""
     if not messages:
         return {each.name: None for each in kind.columns()}
     return {
@@ -186,7 +191,7 @@ def _column(each: GoalField, values: Sequence[Any]) -> Any:
             return np.array([nanoseconds(time) for time in values]) / 1_000_000_000
         case Form.POSE:
             return np.array([_seven(pose) for pose in values])
-        case Form.RATES:  # most goals have only zeros, which take no memory
+        case Form.RATES:  # most goals have only zeros: None saves their memory
             rows = np.array([_six(rates) for rates in values])
             return rows if rows.any() else None
         case _:
@@ -204,7 +209,7 @@ def _posture(posture: Message) -> Posture:
 
 
 def _check_numbers(each: GoalColumn, column: Any, where: str) -> None:
-    """Refuse a column with a number that is no member of its enumeration."""
+    """Refuse a column with a number that is not in the column's enumeration."""
     if each.field.form is Form.CHOICE and column is not None:
         for i in rows_where(~np.isin(column, list(each.field.type)))[:1]:
             enum_member(each.field.type, int(column[i]), where.format(i))
@@ -212,10 +217,11 @@ def _check_numbers(each: GoalColumn, column: Any, where: str) -> None:
 
 def _with_vias(n: int, columns: Mapping[str, Any]) -> SegmentRows:
     """
-    Return segments made of columns; a message without a pose on the arc has the identity there.
+    Return segments made of columns, and choose the segments that have a via pose.
 
-    An arc is given its pose even if that is the identity. Another segment is given a pose that is
-    not the identity, so that the pose is refused and not ignored.
+    In a message, a via pose that is not set is the identity. An arc always has a via pose, even
+    the identity. Any other segment has one if it is not the identity, so that the check of the
+    goal can refuse this pose instead of ignoring it.
     """
     types, vias = columns['types'], columns['vias']
     has_via = np.zeros(n, dtype=np.bool_)
@@ -230,7 +236,7 @@ def _with_vias(n: int, columns: Mapping[str, Any]) -> SegmentRows:
 
 
 def is_packed(packed: Message) -> bool:
-    """Return whether a ``PackedPoints`` holds anything."""
+    """Return whether any array of a ``PackedPoints`` has items."""
     return any(len(getattr(packed, name)) for name in PACKED)
 
 
@@ -253,7 +259,7 @@ def _unpacked(packed: Message) -> tuple[WaypointRows, SegmentRows]:
 
 
 def _unpacked_columns(kind: type[GoalRows[Any]], packed: Message, n: int) -> dict[str, Any]:
-    """Return the columns of flat arrays; None = the array is empty."""
+    """Return the columns of flat arrays; a column is None if its array is empty."""
     columns = {}
     for each in kind.columns():
         values = [] if each.packed is None else getattr(packed, each.packed)
@@ -270,7 +276,7 @@ def _unpacked_columns(kind: type[GoalRows[Any]], packed: Message, n: int) -> dic
 
 
 def _matrix(packed: Message, name: str, n: int, columns: int) -> Floats:
-    """Return an array of n rows."""
+    """Return an array as a matrix of n rows; refuse an array of another length."""
     values = getattr(packed, name)
     if len(values) != n * columns:
         raise InvalidGoal(
@@ -288,7 +294,7 @@ def _postures(packed: Message, name: str, n: int, names: tuple[str, ...]) -> Map
         )
     values = _matrix(packed, name, n, len(names))
     given = ~np.isnan(values)
-    if given.all():  # all rows share the names
+    if given.all():  # every row has all joints
         return {
             i: Posture(names=names, values=tuple(row)) for i, row in enumerate(values.tolist())
         }

@@ -3,9 +3,9 @@
 """
 The fields of ``FollowCartesianTrajectory.Goal``, without the generated messages.
 
-The fields follow from the table of goal fields; a test compares them with the messages. In a
-schema, a dict means a message, a list means a sequence of elements like its only one, and every
-other value is the default of its field.
+The schema follows from the table of goal fields; a test compares it with the messages. In a
+schema, a dict means a message, a list means a sequence whose elements are like the list's only
+element, a :class:`Whole` means a whole number, and any other value is the default of its field.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Message: TypeAlias = Any
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A field that is a whole number; its default is 0."""
+    """A field that is a whole number from ``low`` to ``high``; its default is 0."""
 
     low: int
     high: int
@@ -48,7 +48,7 @@ _FORMS: Mapping[Form, Any] = {
 
 
 def _schema(kind: type) -> dict[str, Any]:
-    """Return the schema of the message that holds a dataclass of a goal."""
+    """Return the schema of the message for a goal dataclass."""
     schema: dict[str, Any] = {}
     for each in goal_fields(kind):
         *outer, name = each.message_name.split('.')
@@ -82,7 +82,7 @@ def _packed_schema() -> dict[str, Any]:
 
 
 PACKED = _packed_schema()
-#: The fields of the message that are not in the goal, by the field after which they come.
+#: The fields of the message that a :class:`Goal` lacks, by the field that they follow.
 _BESIDE: Mapping[str, Any] = {
     'execution': {'validate_only': False},
     'safe_outputs': {'packed': PACKED},
@@ -101,14 +101,16 @@ GOAL: Mapping[str, Any] = _goal_schema()
 
 
 class FieldError(ValueError):
-    """A value does not fit its field; the message names the key."""
+    """A key or a value does not fit the action's goal; the message names the key."""
 
 
 def with_defaults(values: object, schema: Any = GOAL, key: str = '') -> Message:
     """
-    Return plain data (as YAML reads it) as an object with all fields of the message.
+    Return an object with all fields of the message, from plain data as YAML reads it.
 
-    :raises FieldError: a key is unknown, or a value is not of its type.
+    :param schema: the schema of the data.
+    :param key: the name of the data in errors; empty = the whole goal.
+    :raises FieldError: a key is unknown, or a value does not have the type of its field.
     """
     if isinstance(schema, dict):
         return _fields(values, schema, key)
@@ -145,7 +147,7 @@ def _fields(values: object, schema: Mapping[str, Any], key: str) -> SimpleNamesp
 
 
 def default(schema: Any) -> Any:
-    """Return the default of a field."""
+    """Return the default of a field with a schema."""
     if isinstance(schema, dict):
         return SimpleNamespace(**{name: default(kind) for name, kind in schema.items()})
     if isinstance(schema, list):
@@ -155,7 +157,7 @@ def default(schema: Any) -> Any:
 
 def message_of(plain: Message, kind: type[Any]) -> Any:
     """
-    Return a generated message with the values of an object that has all its fields.
+    Return a generated message with the values of an object that has all fields of the message.
 
     :param kind: the class of the message.
     """
@@ -177,7 +179,7 @@ def _slot_value(value: Any, slot: Any) -> Any:
 
 
 def _number(value: object, key: str) -> float:
-    # YAML reads 1e-3 as a text; its own form is 1.0e-3.
+    # YAML reads 1e-3 as a text, because its own notation is 1.0e-3.
     with suppress(ValueError):
         if isinstance(value, (int, float, str)) and not isinstance(value, bool):
             return float(value)

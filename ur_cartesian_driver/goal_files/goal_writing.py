@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From a goal to the fields of its message that do not have their default."""
+"""Turns a goal into the fields of its message; most fields at their default are omitted."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _NANOSECONDS = 1_000_000_000
 
 def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
     """
-    Return the fields of a goal, in the form for YAML and for making messages.
+    Return the fields of a goal, as plain data for YAML or for a message.
 
-    Frames are written by their names; a stamp is not written.
+    Frames are written by their names; the stamp of the header is not written.
 
-    :param packed: write points and segments in flat arrays, if these can hold them.
+    :param packed: write points and segments in flat arrays, if the arrays can hold all values.
     """
     table = goal_table(goal)
     arrays = packed_fields(table.waypoints, table.segments) if packed else None
@@ -47,7 +47,7 @@ def fields_of_goal(goal: Goal, *, packed: bool = False) -> Fields:
 
 
 def _record(kind: type, record: Any) -> Fields:
-    """Return the fields of a dataclass of the table."""
+    """Return the fields of an object of a goal dataclass."""
     written: Fields = {}
     for each in in_order_of_files(goal_fields(kind)):
         _write(each, getattr(record, each.name), written)
@@ -65,7 +65,7 @@ def _rows(rows: GoalRows[Any]) -> list[Fields]:
 
 
 def _write(each: GoalField, value: Any, fields: Fields) -> None:
-    """Add a field to others, unless it has its default; NaN is never the default."""
+    """Add a value to ``fields``, unless it is its field's default (NaN never is) and optional."""
     default = each.default if each.has_default else 0
     if value == default and not each.is_always_sent:
         return
@@ -112,6 +112,6 @@ def _vector(values: Iterable[float]) -> Fields:
 
 
 def _duration(time: float) -> Fields:
-    """Return seconds to the nearest nanosecond."""
+    """Return a time [s] as seconds and nanoseconds, rounded to the nearest nanosecond."""
     sec, nanosec = divmod(round(time * _NANOSECONDS), _NANOSECONDS)
     return {name: part for name, part in (('sec', sec), ('nanosec', nanosec)) if part}

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals from foreign files: CSV, G-code, DXF, messages of ROS, recordings, URScript.
+Goals from other files: CSV, G-code, DXF, ROS messages, recordings, URScript.
 
-Each format has a module that collects points; `imported_goal` makes a goal of them, in the same
-way for all formats. Remarks list everything that the goal lacks, with the lines of the file:
-nothing is dropped in silence.
-Other packages add formats: doc/adding_a_format.md.
+Each format has a module that collects points; `imported_goal` makes a goal of the points, in the
+same way for all formats. Nothing is dropped silently: remarks list everything in the file that the
+goal lacks, with its lines.
+Other packages can add formats: doc/adding_a_format.md.
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ def import_file(
     Read a file as a goal.
 
     :param form: one of the names of :data:`FORMATS`; empty = the format of the file's suffix.
-    :raises BrokenFile: the file cannot be read; the message has the line.
-    :raises ImportError: a package for this format is not installed, or broken.
+    :raises BrokenFile: the file has an error or an unknown format; the message names the line.
+    :raises ImportError: a package that the format needs is not installed, or is broken.
     :raises OSError: the file cannot be opened.
     """
     path, options = Path(file), options or ImportOptions()

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A format of files: its reader, and the treatment of each term that it knows.
+A file format: its reader, and the treatment of each term that the reader knows.
 
 The reader and its documentation use the same table of terms, so they cannot contradict each other.
-Nothing is read as something else, and nothing is dropped in silence.
+No term is read as another, and none is dropped silently.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ImportFormat:
 
     #: Reads a file; raises BrokenFile, ImportError if a package is missing, or OSError.
     collect: Callable[[Path, ImportOptions, PathCollector], None]
-    #: For the documentation: the terms that the reader knows, and a sentence on all others.
+    #: For the documentation: the terms that the reader knows; a sentence on all other terms.
     terms: Mapping[str, Term] = field(default_factory=dict)
     others: str = ''
 
@@ -83,5 +83,5 @@ def left_out(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
 
 
 def refused(topic: str, reason: str, *names: str) -> tuple[Term, ...]:
-    """Return terms because of which a file is refused."""
+    """Return terms for which a file is refused."""
     return tuple(Term(name, topic, Treatment.REFUSED, reason) for name in names)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of an import, the same for all formats, and the notation of outputs in them."""
+"""The options of an import, the same for all formats; the notation of the outputs in them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _CODE = re.compile(rf'S|M[0-9]+(\.[0-9]+)?(\s*{_CODE_WORD.pattern})*')
 class ToolOrientation(Enum):
     """The source of the tool's orientation."""
 
-    #: The orientations of the file, else its normals, else down.
+    #: At each point: the file's orientation; without one, against the normal; else down.
     FILE = 'file'
     #: The tool's axis z against the normals of the file.
     NORMALS = 'normals'
@@ -54,7 +54,7 @@ class CodeOutput:
 
     kind: OutputKind
     pin: int
-    #: The value that the output gets, 0 to 1; for S, the number in a program that means 1.
+    #: The value that the output gets, 0 to 1; for S, the S number at which the output gets 1.
     value: float
 
     def command(self, value: float) -> IOCommand:
@@ -97,7 +97,7 @@ def parse_code_output(text: str) -> tuple[str, CodeOutput]:
 
 def parse_length(text: str) -> float:
     """
-    Return a length with its unit, such as ``0.1mm`` [m].
+    Return the length [m] in a text with a unit, such as ``0.1mm``.
 
     :raises ValueError: the text is no length, has no unit, or is not within 0 and 100 m.
     """
@@ -119,26 +119,26 @@ class ImportOptions:
     #: The pose of the file's origin in the frame.
     origin: Pose = IDENTITY
     #: Unit of lengths that have none in the file, and of any DXF drawing; empty = a file that
-    #: lacks a unit is refused, but G-code is in mm.
+    #: lacks a unit is refused, except G-code, which is then in mm.
     unit: str = ''
     #: Factor on all lengths, about the origin of the file.
     scale: float = 1.0
     orientation: ToolOrientation = ToolOrientation.FILE
-    #: Speed of lines and arcs except travel [m/s]; None = the file's, else the driver's parameter.
+    #: Speed [m/s] of lines and arcs except travel; None = the file's, else the driver's parameter.
     speed: float | None = None
-    #: Speed of travel (G0, and between two contours) [m/s]; None = the driver's parameter.
+    #: Speed [m/s] of travel (G0, and between two contours); None = the driver's parameter.
     travel_speed: float | None = None
-    #: Acceleration of lines and arcs [m/s^2]; None = the file's, else the driver's parameter.
+    #: Acceleration [m/s^2] of lines and arcs; None = the file's, else the driver's parameter.
     acceleration: float | None = None
-    #: Time of the motion to the first point [s], for a file that has times; None = the file's.
+    #: Duration [s] of the motion to the first point, if the file has times; None = the first time.
     approach_time: float | None = None
-    #: Blend radius at inner points [m] unless the file has one; smaller where the lines are short.
+    #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
-    #: Largest distance of the simplified path from that of the file [m]; 0 = all points are kept.
+    #: Largest distance [m] of the simplified path from the file's path; 0 = all points are kept.
     simplify: float = 0.0
-    #: Largest distance [m] of lines from the curves that arcs cannot replace.
+    #: Largest distance [m] between a curve that arcs cannot represent and the lines in its place.
     tolerance: float = 5e-5
-    #: Distance by which the tool retracts between two contours [m].
+    #: Distance [m] by which the tool retracts between two contours.
     lift: float = 0.0
     #: Outputs by the code that switches them: S, or an M-code with its values.
     outputs: Mapping[str, CodeOutput] = field(default_factory=dict)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The goal made of the points of a file: scale, orientation, speeds, blends."""
+"""Makes the goal from the points of a file: scale, orientations, speeds, blends."""
 
 from __future__ import annotations
 
@@ -39,25 +39,25 @@ from ur_cartesian_driver.motion.goal.goal_table import (
     WaypointRows,
 )
 
-#: The tool straight down, with its x along y of the frame.
+#: Orientation of a tool that points straight down, with its x along y of the frame.
 _DOWN = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
-#: The largest share of a line that one blend uses.
+#: Largest fraction of a line that one blend uses.
 _BLEND_SHARE = 0.45
-#: Shortest time of a blend [s]: arcs and processes whose blend is passed in one cycle are refused,
-#: and the slowest controller's cycle is 8 ms. Assumed speed of a segment without one [m/s].
+#: Shortest time [s] of a blend of an arc or a process: a blend that is passed within one cycle
+#: would be refused, and the longest cycle is 8 ms. Assumed speed [m/s] of a segment without one.
 _MIN_BLEND_TIME, _UNKNOWN_SPEED = 0.01, 0.25
 _MIN_BLEND = 1e-4
-#: The robot moves in a straight line instead of an arc of a smaller height [m].
+#: Smallest height [m] of an arc: instead of a flatter arc the robot moves in a straight line.
 _MIN_ARC_HEIGHT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedGoal:
-    """A goal, with remarks on everything in the file that the goal lacks."""
+    """A goal, and remarks on everything in the file that the goal lacks."""
 
     goal: GoalTable
     remarks: tuple[ImportNote, ...]
-    #: (n,) lines of the points; 0 = the point was added by an option.
+    #: (n,) lines of the file from which the points come; 0 = an option added the point.
     lines: Int64s
 
 
@@ -65,7 +65,8 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
     """
     Return the goal of a path, with the options applied.
 
-    :raises BrokenFile: a point must be a mistake, such as one that is 3 km away.
+    :raises BrokenFile: a point is too far away to be right, or lacks the normal that the options
+        require, or has a normal of length 0.
     """
     path = _scaled(path, options.scale)
     path = replace(path, quaternions=_orientations(path, options, remarks))
@@ -176,12 +177,12 @@ def _orientations(path: ImportedPath, options: ImportOptions, remarks: ImportNot
 
 
 def _against(normals: Floats, lines: Int64s) -> Floats:
-    """Return orientations with z against the normals, and x along y (or x) of the frame."""
+    """Return orientations with z against the normals, and x nearest to y (or x) of the frame."""
     lengths = np.linalg.norm(normals, axis=1)
     if not (lengths > 1e-6).all():
         raise BrokenFile(int(lines[int(np.argmin(lengths))]), 'the normal is zero')
     ez = -normals / lengths[:, None]
-    # Not along y if z is near it: x would jump with the slightest turn of the surface.
+    # If z is near y of the frame, x would jump at the slightest turn of the surface: use x then.
     reference = np.where((np.abs(ez[:, 1]) > 0.95)[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     ex = reference - np.einsum('ij,ij->i', reference, ez)[:, None] * ez
     ex = ex / np.linalg.norm(ex, axis=1)[:, None]
@@ -190,7 +191,7 @@ def _against(normals: Floats, lines: Int64s) -> Floats:
 
 
 def _quaternions_of_axes(ex: Floats, ey: Floats, ez: Floats) -> Floats:
-    """Return unit quaternions (n, 4) of frames, each computed from its largest component."""
+    """Return the unit quaternions (n, 4) of frames, each computed from its largest component."""
     squares = np.stack(
         (
             1.0 + ex[:, 0] - ey[:, 1] - ez[:, 2],
@@ -214,12 +215,12 @@ def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> tuple[Importe
     """
     Leave out points that repeat the one before: the robot has no motion to them.
 
-    :returns: the path, and the times for which the tool rests at its points (n,) [s].
+    :returns: the path, and the times (n,) [s] for which the tool rests at its points.
     """
     still = (distance_rows(path.positions[1:], path.positions[:-1]) < SAME_POINT) & (
         angle_rows(path.quaternions[1:], path.quaternions[:-1]) < SAME_TURN
     )
-    # Kept are the ends of arcs, and points at which the joints turn or the arm rests.
+    # The ends of arcs are kept, and the points at which the joints turn or the arm rests.
     still &= path.types[1:] != SegmentType.CIRCULAR
     for row in rows_where(still):
         posture = path.postures.get(row + 1)
@@ -228,7 +229,7 @@ def _without_repeated(path: ImportedPath, remarks: ImportNotes) -> tuple[Importe
     rests = np.zeros(len(path))
     if not still.any():
         return path, rests
-    # In a slow drift, all points are near the one before, but some of them have to be kept.
+    # In a slow drift each point is near the previous one, so compare it with the last kept point.
     rows, last = [0], 0
     for row in range(1, len(path)):
         if still[row - 1] and _is_same(path, row, last):
@@ -250,7 +251,7 @@ def _is_same(path: ImportedPath, row: int, other: int) -> bool:
 
 
 def _without_flat_arcs(path: ImportedPath, remarks: ImportNotes) -> ImportedPath:
-    """Turn an arc into a line if it is too flat for the robot, or ends at the first point."""
+    """Turn each arc that is too flat for the robot, or leads to the first point, into a line."""
     arcs = path.types == SegmentType.CIRCULAR
     if not arcs.any():
         return path
@@ -283,7 +284,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
                 int(path.lines[row]), 'a contour begins elsewhere', 'straight to it, without lift'
             )
         return path
-    # Such a row becomes three: up from the row before, across, and down to the row itself.
+    # Such a row becomes three: up from the previous point, across, and down to the row's point.
     count = np.ones(len(path), dtype=np.int64)
     count[rows] = 3
     order = np.repeat(np.arange(len(path)), count)
@@ -291,7 +292,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
     raised = np.zeros(len(order), dtype=bool)
     positions = path.positions[order]
     last = first + count - 1
-    # Outputs at a point are switched after its last copy, and before the tool goes up.
+    # Outputs at a point are switched at its last copy: the tool is down again, or not up yet.
     outputs = tuple(replace(o, waypoint=int(last[o.waypoint])) for o in path.outputs)
     waits = tuple(replace(w, waypoint=int(last[w.waypoint])) for w in path.waits)
     for row in rows:
@@ -323,7 +324,7 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
 
 
 def _speeds(path: ImportedPath, options: ImportOptions) -> Floats:
-    """Return the speeds (n,) [m/s]; 0 = the driver chooses."""
+    """Return the speeds (n,) [m/s]; 0 = the driver chooses the speed."""
     plain = np.isin(path.types, (SegmentType.LINEAR, SegmentType.CIRCULAR, SegmentType.PROCESS))
     found = path.speeds if options.speed is None else np.where(plain, options.speed, path.speeds)
     travel = np.nan if options.travel_speed is None else options.travel_speed
@@ -343,7 +344,7 @@ def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
 def _blends(
     path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: ImportNotes
 ) -> Floats:
-    """Return blend radii (n,) that fit between the points [m]; 0 = none fits, the arm stops."""
+    """Return blend radii (n,) [m] that fit between the points; 0 = the arm stops at the point."""
     radii = np.where(np.isnan(path.blends), options.blend, path.blends)
     radii[path.rests] = 0.0
     radii[-1] = 0.0
@@ -353,7 +354,7 @@ def _blends(
     fits = radii.copy()
     fits[1:] = np.minimum(fits[1:], _BLEND_SHARE * lengths)
     fits[:-1] = np.minimum(fits[:-1], _BLEND_SHARE * lengths)
-    # The first line begins at an unknown place of the arm, so its length does not limit its blend.
+    # The first line begins where the arm is, which is unknown: its length limits no blend.
     special = np.isin(path.types, (SegmentType.CIRCULAR, SegmentType.PROCESS))
     special[:-1] |= special[1:]
     rates = np.where(speeds > 0.0, speeds, _UNKNOWN_SPEED)

@@ -35,21 +35,25 @@ _OPTIONAL = {
     'times': 1,
     'dwells': 1,
 }
-#: No arm reaches a point beyond this distance [m]: millimetres were read as metres, for example.
+#: Largest distance [m] of a point from the origin; no arm reaches farther. A larger one means, for
+#: example, that millimetres were read as metres.
 MAX_DISTANCE = 20.0
 UNKNOWN3: Vector3 = (nan, nan, nan)
-#: Two points at most this far apart [m] and turned by at most this angle [rad] are the same.
+#: Two points are the same if they are less than this distance [m] apart and their orientations
+#: differ by less than this angle [rad].
 SAME_POINT, SAME_TURN = 5e-6, 1e-4
 
 
 class BrokenFile(ValueError):
-    """A file cannot be read; the message has the number of the line."""
+    """A file cannot be read; the message names the line at fault."""
 
     def __init__(self, line: int, text: str, unit: str = 'line') -> None:
         """
-        Put the line before a sentence without a full stop; 0 = no line is to blame.
+        Put the line before the text of the message.
 
-        :param unit: the word for a numbered item, for a file without lines.
+        :param line: the line at fault; 0 = none.
+        :param text: a sentence without a full stop.
+        :param unit: the word for what ``line`` counts, if the file has no lines.
         """
         super().__init__(f'{unit} {line}: {text}.' if line else f'{text}.')
         self.line = line
@@ -57,7 +61,7 @@ class BrokenFile(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportNote:
-    """Something that was left out, or taken in another form."""
+    """A remark: something in a file was left out, or was taken in another form."""
 
     #: 1-based lines, in rising order; empty = the note concerns the whole file.
     lines: tuple[int, ...]
@@ -68,7 +72,7 @@ class ImportNote:
         """
         Return one line of text.
 
-        :param max_ranges: number of ranges of lines that are named; other lines are only counted.
+        :param max_ranges: the number of line ranges to name; the remaining lines are only counted.
         """
         if not self.lines:
             return f'{self.what}: {self.why}'
@@ -101,7 +105,7 @@ class ImportNotes:
         self._lines: dict[tuple[str, str], set[int]] = {}
 
     def add(self, line: int, what: str, why: str) -> None:
-        """Add a remark on a line; 0 = on the whole file."""
+        """Add a remark on a line; line 0 = the remark concerns the whole file."""
         lines = self._lines.setdefault((what, why), set())
         if line:
             lines.add(line)
@@ -127,12 +131,12 @@ class ImportedPath:
     lines: Int64s
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.SegmentType`.
     types: Int64s
-    #: (n,) whether a motion is only travel, and whether the tool has to be lifted for it.
+    #: (n,) whether the motion is only travel; whether the tool has to be lifted for the motion.
     travels: Flags
     lifts: Flags
     #: (n,) numbers of :class:`~ur_cartesian_driver.motion.goal.goal.ArcMode`.
     arc_modes: Int64s
-    #: (n, 3) points on arcs, (n, 4) unit quaternions, (n, 3) normals of the surface.
+    #: (n, 3) points on arcs; (n, 4) unit quaternions of the tool; (n, 3) normals of the surface.
     vias: Floats
     quaternions: Floats
     normals: Floats
@@ -141,7 +145,7 @@ class ImportedPath:
     accelerations: Floats
     blends: Floats
     times: Floats
-    #: (n,) time for which the arm rests at the point.
+    #: (n,) time for which the arm rests at the row's point.
     dwells: Floats
     #: The postures that the file gives, by row.
     postures: Mapping[int, Posture] = field(default_factory=dict)
@@ -161,7 +165,7 @@ class ImportedPath:
         return found
 
     def take(self, rows: Int64s) -> ImportedPath:
-        """Return some rows, in rising order; outputs of others move to the kept row before."""
+        """Return some rows, in rising order; outputs of other rows move to the kept row before."""
         new_row = {int(row): i for i, row in enumerate(rows)}
         return replace(
             self,
@@ -246,7 +250,7 @@ class PathCollector:
     def add_lines(
         self, lines: Sequence[int], positions: Floats, **optional: Floats | None
     ) -> None:
-        """Add points of a table, in columns as in :class:`ImportedPath`; None = unknown."""
+        """Add points joined by lines, in columns as in :class:`ImportedPath`; None = unknown."""
         row = len(self._positions)
         self._positions.extend(positions.tolist())
         plain = (SegmentType.LINEAR, False, False, ArcMode.UNCONSTRAINED)
@@ -256,17 +260,17 @@ class PathCollector:
                 self._optional[name].update(enumerate(values.tolist(), row))
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the newest point, or at the first one if there is none yet."""
+        """Switch an output at the newest point; before any point, at the first one."""
         self._outputs.append(replace(output, waypoint=max(0, len(self) - 1)))
 
     def leave_out(self, rows: range, what: str, why: str) -> None:
-        """Remove points again, with a remark; the tool is lifted before the next point."""
+        """Remove added points, with a remark; the tool is lifted before the next point."""
         self._left_out.update(rows)
         for row in rows:
             self.remarks.add(self._plain[row][0], what, why)
 
     def wait(self, wait: InputWait) -> None:
-        """Wait at the newest point."""
+        """Wait for an input at the newest point."""
         self._waits.append(replace(wait, waypoint=len(self) - 1))
 
     def path(self) -> ImportedPath:

@@ -3,8 +3,9 @@
 """
 Times of the points of a file.
 
-They can come from any clock: seconds since the robot was switched on, or Unix times. In a goal,
-the first time is that of the motion to the first point; it is 0 only if the arm is already there.
+The times of a file can come from any clock: seconds since the robot was switched on, or Unix
+times. The first time of a goal is the duration of the motion to the first point; it is 0 only if
+the arm is already there.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from ur_cartesian_driver.importing.imported_path import ImportedPath, ImportNote
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
-#: Shortest standstill that is a rest [s]; in a shorter one the tool may move slowly within 5 um.
+#: Shortest standstill [s] that becomes a dwell; in a shorter one the tool may be moving slowly, by
+#: less than 5 um.
 _MIN_REST = 0.5
-#: A gap is a step in time that is longer than this [s] and than this multiple of the median step.
+#: A step in time is a gap if it is longer than the first number [s], and longer than the second
+#: number times the median step.
 _MIN_GAP, _GAP = 1.0, 20.0
 
 
@@ -28,9 +31,9 @@ def with_times(
     path: ImportedPath, rests: Floats, options: ImportOptions, remarks: ImportNotes
 ) -> ImportedPath:
     """
-    Return the path with times from the start of the goal, or without if they cannot be kept.
+    Return the path with times from the start of the goal; without times if they cannot be kept.
 
-    :param rests: (n,) times for which the tool stands still at the points [s].
+    :param rests: (n,) times [s] for which the tool stands still at the points.
     """
     if np.isnan(path.times).all():
         return path

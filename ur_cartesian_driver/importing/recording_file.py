@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Our recordings (doc/recordings.md): the measured path of the tool, which may be freedriven."""
+"""The driver's recordings (doc/recordings.md): the measured path of a motion or a freedrive."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes,
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Posture, SegmentType
 
-#: The outputs of the bits in a recording.
+#: The output that each bit of a recording's digital outputs shows, from bit 0.
 _OUTPUTS = (
     *((OutputKind.STANDARD_DIGITAL, pin) for pin in range(8)),
     *((OutputKind.CONFIGURABLE_DIGITAL, pin) for pin in range(8)),
     *((OutputKind.TOOL_DIGITAL, pin) for pin in range(2)),
 )
-#: All poses, angles and times of a recording are smaller than this.
+#: Larger numbers cannot be a pose, an angle or a time of a recording.
 _MAX_NUMBER = 1e9
 
 TERMS = term_table(
@@ -61,7 +61,7 @@ def collect_recording(file: Path, options: ImportOptions, into: PathCollector) -
     """
     Read a recording; the numbers of its packets, from 1, take the place of lines.
 
-    The arm first goes to the beginning by a joint motion, in the posture of the recording.
+    The goal begins with a joint motion to the first point, in the posture of the recording.
 
     :raises BrokenFile: the file is no recording, or is damaged.
     """

@@ -4,12 +4,14 @@
 Fewer points: sequences of short lines become long lines and arcs.
 
 The tolerance holds in both directions: it bounds the distance of each place of the old path from
-the new one, and of each place of the new path from the old one. A line is within it if the points
-between its ends are, because both paths are straight between them. An arc is compared with the
-points, and with the place of each short line that is nearest to the arc's centre. Along the old
-path the angle only grows, so every place of the arc has a place of the old path beside it.
+the new one, and of each place of the new path from the old one. A new line is within the tolerance
+if the left-out points are, because both paths are straight between these. A new arc is compared
+with the left-out points, and with the place of each short line that is nearest to the arc's
+centre. Along the old path the angle about that centre only grows, so every place of the arc has a
+place of the old path beside it.
 
-A point stays if it has an output, a posture or another speed, or if the tool turns unevenly there.
+A point stays if it has an output, a posture or a rest, if the speed or acceleration changes there,
+or if the tool turns unevenly.
 """
 
 from __future__ import annotations
@@ -26,12 +28,13 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.pose_rows import angle_rows, interpolate_rows
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 
-#: Largest angle between the orientations of a point that is left out and of the new path [rad].
+#: Largest angle [rad] between the orientation at a left-out point and that of the new path there.
 MAX_TURN = radians(0.5)
-#: The smallest number of lines that an arc replaces, and the largest angle of an arc [rad].
+#: Smallest number of lines that an arc replaces.
 _MIN_LINES = 4
+#: Largest angle [rad] of an arc.
 _MAX_ARC = 0.9 * pi
-#: Smallest height of an arc [m]: the robot treats flatter arcs as lines.
+#: Smallest height [m] of an arc: the robot treats flatter arcs as lines.
 _MIN_HEIGHT = 2e-5
 #: Factor on the tolerance that allows for rounding errors.
 _ROUNDING = 1.0 - 1e-9
@@ -46,9 +49,9 @@ class _Piece(NamedTuple):
 
 def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> ImportedPath:
     """
-    Return a path with fewer points that is nowhere farther than a tolerance from the old one.
+    Return a path with fewer points that stays within a tolerance of the old path.
 
-    :param tolerance: the largest distance [m].
+    :param tolerance: the largest distance [m] between the two paths.
     :param orientations: (n, 4) orientations of the tool at the points.
     """
     if tolerance <= 0.0 or len(path) < 3:
@@ -74,10 +77,10 @@ def simplify(path: ImportedPath, tolerance: float, orientations: Floats) -> Impo
 
 def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], object]) -> int:
     """
-    Return an end to which a piece is possible, found by doubling the step and then by bisection.
+    Find a far row to which a piece is possible, by doubling the step and then bisecting.
 
-    :param first: the nearest end to try; if it is not possible, return the row after the start.
-    :param holds: returns whether a piece from a start to an end is possible.
+    :param first: the nearest row to try; if it is not possible, return the row after ``start``.
+    :param holds: returns whether a piece from one row to another is possible.
     """
     if not holds(start, first):
         return start + 1
@@ -99,7 +102,7 @@ def farthest_row(start: int, first: int, stop: int, holds: Callable[[int, int], 
 
 
 def _ends_of_runs(path: ImportedPath) -> list[int]:
-    """Return the rows after the first that have to stay; only similar lines are between them."""
+    """Return the rows after the first that must stay; only lines of one kind are between them."""
     stays = path.rests
     stays[-1] = True
     lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
@@ -136,7 +139,7 @@ class _Simplifier:
         return _Piece(end, via)
 
     def _first_test(self) -> Flags:
-        """Return for each row whether the next point could be left out: a quick test of all."""
+        """Return for each row whether the next point could be left out: a quick test for all."""
         a, b, c = self.points[:-2], self.points[1:-1], self.points[2:]
         chord = c - a
         square = np.einsum('ij,ij->i', chord, chord)
@@ -153,7 +156,7 @@ class _Simplifier:
             return False
         along = (between - a) @ chord / length**2
         off = between - a - along[:, None] * chord
-        # If a point is past the ends, the old path goes back and forth there.
+        # If a point lies beyond an end, the old path goes back and forth there.
         if along.min() < 0.0 or along.max() > 1.0:
             return False
         if np.einsum('ij,ij->i', off, off).max() > self.tolerance**2:

@@ -10,10 +10,10 @@ import re
 
 from ur_cartesian_driver.importing.imported_path import BrokenFile
 
-# str.splitlines() also splits at form feeds, 0x85 and U+2028, which end a line in none of the
-# formats: the numbers of all later lines would be wrong.
+# str.splitlines() also splits at form feeds, 0x85 and U+2028. These end a line in no format, so
+# the numbers of all later lines would be wrong.
 _LINE_END = re.compile(r'\r\n|\n|\r')
-# The longer mark first: the UTF-32 mark begins with the UTF-16 mark.
+# The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
 _MARKS = (
     (codecs.BOM_UTF32_LE, 'utf-32'),
     (codecs.BOM_UTF32_BE, 'utf-32'),
@@ -37,7 +37,7 @@ def decoded(data: bytes, code_page: str = 'cp1252') -> str:
     """
     Return the text of a file as :func:`file_text` does.
 
-    :param code_page: the codec if the text is no UTF-8; Windows-1252 replaces an unknown one.
+    :param code_page: the codec if the text is not UTF-8; Windows-1252 replaces an unknown codec.
     :raises BrokenFile: the file is binary.
     """
     encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')
@@ -56,7 +56,7 @@ def _by_code_page(data: bytes, code_page: str) -> str:
     try:
         return data.decode(code_page)
     except (LookupError, UnicodeDecodeError):
-        # Old programs write the code page of their Windows. Windows-1252 lacks five bytes, such as
+        # Old programs name the code page of their Windows. Windows-1252 lacks five bytes, such as
         # 0x81, which Latin-1 has.
         return data.decode('latin-1' if b'\x81' in data else 'cp1252', errors='replace')
 

@@ -9,15 +9,17 @@ UR10e to UR16e, UR20 and UR30: the shapes in the packages ir-support and ir-supp
 which are made for teaching; the base of their UR16e, which is larger than in the data sheet, and
 the place of its wrist 3 are not used. No package has shapes of UR15, UR18 and UR8 Long, so their
 bodies are assumed: those of a UR20, scaled by the footprints in the data sheets (204 and 245 mm),
-with 10 mm more on each side; the links meet as in the ROS 2 description package of Universal
-Robots. Tests check that the bodies contain the meshes of the first two packages.
+with 10 mm more on each side; the places where links meet are those of the ROS 2 description
+package of Universal Robots. Tests check that the bodies contain the meshes of the first two
+packages.
 
-In all of these shapes the connector is at +y of ``base``. The meshes of UR3 and UR5 contain it
-(ir-support draws the UR5's longer); the UR10's ends inside its base. On UR3e and UR5e the
-connector is assumed to fill a cylinder as wide as the ball that represents it in airo-models; the
-cylinder contains the cable of the drawn base above the mounting surface. On the UR10e it consists
-of the socket and the cable of the two shapes, and 15 mm for a plug. The connectors of the larger
-models are derived from it. The cable beyond, which can be laid anywhere, is not part of the arm.
+The connector of the robot cable is at +y of ``base`` in all of these shapes. The meshes of UR3 and
+UR5 contain the connector (ir-support draws a longer one on the UR5); on the UR10 it ends inside
+the base. On UR3e and UR5e the connector is assumed to fill a cylinder as wide as the ball that
+represents it in airo-models; this cylinder contains the drawn cable above the mounting surface. On
+the UR10e the connector consists of the drawn socket and cable, and 15 mm for a plug; from this,
+the connectors of the larger models are derived. The cable beyond the connector, which can be laid
+anywhere, is not part of the arm.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
-#: Begin and end along the joint's axis, from the origin of its nominal DH frame, and radius [mm].
-#: A tube whose begin and end differ is a cylinder about the joint's axis that is swept along the
-#: tube: the hull of two housings.
+#: Begin and end of a body along the joint's axis, from the origin of the nominal DH frame, and its
+#: radius [mm]. A tube whose begin and end differ is a cylinder about the joint's axis that is
+#: swept along the tube: the hull of two housings.
 BodyRow: TypeAlias = tuple[float, float, float]
 
 
@@ -193,7 +195,7 @@ _UR20 = BodySizes(
     ),
 )
 
-#: No shape of these arms is public.
+#: UR15, UR18 and UR8 Long: no shapes of these arms are public.
 _UR15 = BodySizes(
     (0.0, 42.0),
     (

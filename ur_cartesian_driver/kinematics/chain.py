@@ -126,8 +126,8 @@ class Arm:
         """
         Return the largest distance between the two flanges at equal joint positions [m].
 
-        It is taken over a fixed set of random configurations. Comparing the tables would not do:
-        lengths of a calibrated arm may differ by metres that cancel each other.
+        The distance is taken over a fixed set of random configurations. The tables cannot be
+        compared instead: lengths of a calibrated arm may differ by metres that cancel each other.
         """
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_COMPARED_SAMPLES, 6))
         distances = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
@@ -137,7 +137,8 @@ class Arm:
         """
         Return the Jacobian of the TCP in base axes.
 
-        :returns: (6, 6): joint velocities [rad/s] to linear [m/s], then angular velocity [rad/s].
+        :returns: (6, 6), by which joint velocities [rad/s] give linear [m/s] and angular [rad/s]
+            velocity.
         """
         frames = self.frames(q)
         if T_flange_tcp == IDENTITY:
@@ -208,12 +209,12 @@ def pose_error(
     frames: ChainFramesOf[N], position: tuple[N, N, N], rotation: tuple[N, ...]
 ) -> tuple[list[N], N]:
     """
-    Return the error of the flange: translation [m] and sine of the turn, in base axes; 1 + 2 cos.
+    Return translation [m] and sine of the turn from the flange to a pose, and 1 + 2 cos(turn).
 
-    The cosine is that of the turn, too. The last value is positive up to a third of a turn; beyond
-    that the sine is misleading.
+    Translation and sine are vectors in base axes. The last value is positive up to a third of a
+    turn; beyond that the sine is misleading.
 
-    :param rotation: of the pose, nine numbers by rows.
+    :param rotation: rotation matrix of the pose, nine numbers by rows.
     """
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = frames.x, frames.y, frames.z
@@ -289,7 +290,7 @@ def _prepend_link(
     Return Rz(theta + q) Tz(d) Tx(a) Rx(alpha) * pose.
 
     :param s: sine of half the angle theta + q.
-    :param c: its cosine.
+    :param c: cosine of half the angle.
     :returns: position x y z, quaternion x y z w.
     """
     # Rx(alpha): rotate the position; multiply (sin, 0, 0, cos) by the pose's quaternion.

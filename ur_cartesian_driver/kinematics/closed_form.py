@@ -3,10 +3,10 @@
 """
 Closed-form inverse kinematics of an ideal arm.
 
-It exists because axes 2, 3 and 4 are parallel. Seen along them, shoulder, elbow and wrist 1 form a
-plane triangle; seen from above, the wrist centre is at distance d4 from the plane through axis 1
-that is parallel to the arm. This leaves two choices each for shoulder, wrist and elbow: up to
-eight solutions.
+A closed form exists because axes 2, 3 and 4 are parallel. Seen along these axes, shoulder, elbow
+and wrist 1 form a plane triangle; seen from above, the wrist centre is at distance d4 from the
+plane through axis 1 that is parallel to the arm. This leaves two choices each for shoulder, wrist
+and elbow: up to eight solutions.
 
 All square roots are taken of differences of squares, and all angles come from atan2. This keeps
 full precision where two solutions meet (stretched arm, upright arm, wrist centre above the
@@ -23,10 +23,10 @@ from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
 from ur_cartesian_driver.motion.geometry.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.geometry.vectors import Joints, Vector3
 
-# A square this little below zero [m^2] is taken for zero: the flange is a nanometre out of reach,
-# as happens when a robot rounds the pose of its own stretched arm.
+# A square no farther below zero than this [m^2] is taken for zero: the flange is a nanometre out
+# of reach, as happens when a robot rounds the pose of its own stretched arm.
 FLANGE_ROUNDING = 1e-9
-# A square below this [m^2] has a double root: the joints differ by about a microradian.
+# A square below this [m^2] has a double root: the two solutions differ by about a microradian.
 MERGED_ROOTS = 1e-13
 # Sine of wrist 2 below which axes 4 and 6 are parallel: only the sum of their angles matters.
 WRIST_SINGULAR = 2e-10
@@ -94,7 +94,7 @@ def wrist_centre(ideal: IdealArm, T_base_flange: Pose) -> Vector3:
 def wrist_solutions(
     ideal: IdealArm, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
 ) -> Iterator[WristSolution]:
-    """Yield the solutions for two shoulders, each with two wrists; the elbow is left open."""
+    """Yield the solutions for two shoulders, each with two wrists, without the elbow."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
     px, py, pz = wrist_centre(ideal, T_base_flange)
     d4, d5 = ideal.d4, ideal.d5

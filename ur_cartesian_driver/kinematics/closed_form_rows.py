@@ -4,9 +4,9 @@
 Closed-form inverse kinematics of many poses, for one branch at a time.
 
 The formulas come from :mod:`~.closed_form`, which finds all solutions of one pose. Here the
-three choices (shoulder, elbow, wrist) are given as signs, and all poses are solved for them. The
+three choices (shoulder, elbow, wrist) are given as signs, and all poses are solved for these. The
 quantities with these signs are zero where the arm is singular, so :class:`BranchMeasures` both
-identifies a branch and measures its distance from a singularity.
+identify the branch of a configuration and measure its distances from the singularities.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ BRANCHES = tuple(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BranchMeasures:
     """
-    Three signed measures per row: the signs are the branch, zero is a singularity.
+    Three signed measures per row: their signs identify the branch, a zero is a singularity.
 
-    For a calibrated arm they are measured on its ideal arm, exact to the misfit.
+    For a calibrated arm, its ideal arm is measured, so they are exact to the misfit.
     """
 
     #: Distance of the wrist centre in front of the plane of axes 1 and 2 [m]. The centre cannot
@@ -117,7 +117,7 @@ def branch_rows(
     return BranchSolution(
         theta - np.array(ideal.offsets)[:, None],
         pan.exists & exists,
-        # With the same shoulder, the other wrist has theta6 + pi, so it is never the nearest.
+        # With the same shoulder, the other wrist has theta6 + pi, so that branch is never nearest.
         np.minimum(np.minimum(elbow_separation, tau - elbow_separation), pan.separation),
     )
 
@@ -140,7 +140,7 @@ def _pan(ideal: IdealArm, targets: TargetPoses, sign: int) -> _Pan:
     root, exists = _root(px * px + py * py - d4 * d4)
     outward = sign * root
     s1, c1 = d4 * px + outward * py, outward * px - d4 * py
-    length = np.maximum(np.sqrt(s1 * s1 + c1 * c1), 1e-300)  # 0 on the axis, out of reach
+    length = np.maximum(np.sqrt(s1 * s1 + c1 * c1), 1e-300)  # 0 on axis 1, which is out of reach
     return _Pan(
         np.arctan2(s1, c1),
         s1 / length,
@@ -195,5 +195,5 @@ def _lift(ideal: IdealArm, outward: Floats, up: Floats, sign: int) -> tuple[Floa
 
 
 def _root(square: Floats) -> tuple[Floats, Flags]:
-    """Return the non-negative root, and whether it exists."""
+    """Return the non-negative square root, and whether it exists."""
     return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), square >= -FLANGE_ROUNDING

@@ -4,19 +4,18 @@
 Collision bodies of the arm: a few cylinders per link, for many configurations at once.
 
 A preflight checks tens of thousands of configurations for collisions of the arm with itself and
-with planes.
-Cylinders allow this in numpy for every model. They contain the true shape: if they do not collide,
-the arm does not. If they do, the arm may still be free; :mod:`~.collision_meshes` decides exactly
-for the models that have meshes.
+with planes. Cylinders allow this in numpy for every model. They contain the true shape: if the
+cylinders do not collide, the arm does not. If they do, the arm may still be free;
+:mod:`~.collision_meshes` decides exactly for the models that have meshes.
 
 All joint housings are cylinders about their own joint's axis, and all tubes run from axis to axis.
 So each end of a body is a point on an axis, and calibrated arms use the same table. The connector
 of the robot cable lies along y of ``base``, towards +y.
 
-The distance of two cylinders is at least their separation along any direction. Shorten both axes
-by :data:`_CUT` radii at both ends, to skeletons. The direction between the nearest points of the
-skeletons gives a bound in closed form: the distance of these points, less the length by which each
-cylinder reaches beyond its skeleton in this direction.
+The distance of two cylinders is at least their separation along any direction. To choose one, both
+axes are shortened at both ends by :data:`_CUT` radii, to skeletons. The direction between the
+nearest points of the skeletons gives a bound in closed form: the distance of these points, less
+the length by which each cylinder reaches beyond its skeleton in this direction.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ class Link(IntEnum):
 #: or the connector, along y of ``base``.
 _Kind: TypeAlias = Literal['housing', 'tube', 'connector']
 
-#: The bodies of every arm, and the joint that each of them belongs to, from 0.
+#: The bodies of every arm: link, kind, and number of the axis, from 0; the connector has axis 6.
 _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
     (Link.BASE, 'housing', 0),
     (Link.BASE, 'connector', 6),
@@ -78,22 +77,22 @@ _BODIES: tuple[tuple[Link, _Kind, int], ...] = (
     (Link.WRIST_3, 'housing', 5),
 )
 
-# Fraction of the radius by which the axis of a cylinder is shortened: with this one, the bound is
-# tightest on average.
+# Fraction of the radius by which the axis of a cylinder is shortened: with this fraction, the
+# bound is tightest on average.
 _CUT = 0.46
 # Rows per block, so that the intermediate arrays stay in the CPU cache.
 _BLOCK = 2048
-# The middle one of this many rows that lie close together bounds the distances of the others.
-# Calibration makes no arm longer than its model by more than the slack [m].
+# Of this many consecutive rows, the middle one bounds the distances of the others.
 _STRIDE = 16
+# Calibration makes no arm longer than its model by more than this [m].
 _REACH_SLACK = 0.02
-# Below this squared sine of their angle, segments are taken for parallel: an error of 1e-6 of a
-# length.
+# Segments are taken for parallel if the squared sine of the angle between them is below this: the
+# error is 1e-6 of a length.
 _PARALLEL = 1e-12
 _TINY = 1e-300
 
 #: Pairs of links that are checked. Neighbours share a joint that turns freely and are left out, as
-#: are pairs that cannot collide, which the tests show with the meshes: forearm and wrist 2 (wrist
+#: are pairs that cannot collide, as tests with the meshes show: forearm and wrist 2 (wrist
 #: 3 collides first), wrist 1 and wrist 3 (d5 apart), wrist 2 and tool (the tool turns about the
 #: axis of wrist 3, and would have to pass through it). The upper arm turns past the round part of
 #: the base, so it is checked only against the connector of the base.
@@ -159,12 +158,12 @@ class CollisionBodies:
         self.links = tuple(body.link for body in bodies)
         self.radii = np.array([body.radius for body in bodies])
         start, end = self.cylinder_ends(np.zeros((1, 6)))[0].transpose(1, 0, 2)
-        # In columns, with a row for each cylinder: half the length of the swept cylinders [m],
+        # Columns, with a row for each cylinder. Half the length of the swept cylinders [m]:
         across = np.array([[body.across] for body in bodies])
         self._moves = across > 0.0
         self._radii = self.radii[:, None]
         self._lengths = np.linalg.norm(end - start, axis=1, keepdims=True)
-        # and the lengths that are cut from either end of the skeletons of the others [m].
+        # The lengths that are cut from both ends of the other cylinders [m]:
         insets = np.minimum(_CUT * self._radii, 0.5 * self._lengths)
         self._insets = np.where(self._moves, across, insets)
         self._cuts = np.where(self._moves, 0.0, insets)
@@ -182,9 +181,10 @@ class CollisionBodies:
         """
         Return a lower bound of the distance of each pair of links in :attr:`pairs`.
 
-        :param q: (n, 6) [rad]; faster with ``enough`` if rows that follow each other are close.
+        :param q: (n, 6) [rad].
         :param enough: a distance that is neither less than this [m] nor the smallest of all may be
-            replaced by a coarser lower bound, which is no less than either.
+            replaced by a coarser lower bound, which is no less than either. This is faster if
+            consecutive rows are close to each other.
         :returns: (n, pairs) separation of their cylinders [m]; negative where these may overlap.
         """
         every = np.ones(len(self.pairs), dtype=np.bool_)
@@ -272,7 +272,7 @@ class CollisionBodies:
         return result
 
     def cylinder_ends(self, q: Floats) -> Floats:
-        """Return both ends of every cylinder in base [m], (n, k, 2, 3), at joints (n, 6) [rad]."""
+        """Return both ends (n, k, 2, 3) of every cylinder in base [m], at joints (n, 6) [rad]."""
         origins, axes = self._lines(q)
         ends: Floats = np.array(
             [
@@ -284,7 +284,7 @@ class CollisionBodies:
 
     def drawn_cylinders(self) -> Iterator[tuple[Link, Floats, Floats, float]]:
         """
-        Yield link, start and end [m] and radius [m] of cylinders to draw, all joints at 0.
+        Yield link, start [m], end [m] and radius [m] of cylinders to draw, with all joints at 0.
 
         A swept cylinder is drawn at both ends, and as a tube between them.
         """
@@ -298,7 +298,7 @@ class CollisionBodies:
             yield link, start, end, radius
 
     def _lines(self, q: Floats) -> Floats:
-        """Return a point and the direction of all axes (2, 3, axes, n)."""
+        """Return a point on each axis, and its direction (2, 3, axes, n)."""
         frames = self.arm.frames_rows(q)
         (zero, _, one), (x, z) = frames.axes[0], self._connector
         origins = [*frames.origins, (zero + x, zero, zero + z)]
@@ -340,15 +340,15 @@ def segment_gap(start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Fl
     """
     Return the vectors between the nearest points of pairs of segments, from second to first.
 
-    The minimum of a convex quadratic form over the unit square (Ericson, Real-Time Collision
+    They minimize a convex quadratic form over the unit square (Ericson, Real-Time Collision
     Detection, 5.1.9). Segments can be parallel, or points.
 
-    :param start_1: (3, ...) [m]; the segment ends at ``start_1 + vector_1``.
+    :param start_1: (3, ...) [m]; the first segment ends at ``start_1 + vector_1``.
     """
     r = start_1 - start_2
     a, e = _dot(vector_1, vector_1), _dot(vector_2, vector_2)
     b, c, f = _dot(vector_1, vector_2), _dot(vector_1, r), _dot(vector_2, r)
-    # For parallel segments any s will do to begin with.
+    # For parallel segments the first s can be any number.
     s = (b * f - c * e) / np.maximum(a * e - b * b, _PARALLEL * a * e + _TINY)
     np.clip(s, 0.0, 1.0, out=s)
     t = np.clip((b * s + f) / np.maximum(e, _TINY), 0.0, 1.0)
@@ -379,7 +379,7 @@ def _link_bodies(size: BodySizes) -> list[_LinkBody]:
 
 def _ends_on_axes(arm: Arm, bodies: list[_LinkBody]) -> tuple[Indices, Floats]:
     """
-    Return the axis and the distance along it of both ends of each body, (2, k) each.
+    Return for both ends of each body the axis, and the distance along it [m], (2, k) each.
 
     The origin of a calibrated DH frame can lie anywhere on its axis, hundreds of metres away
     where axes are nearly parallel. With all joints at 0 the true axis is close to the nominal

@@ -3,7 +3,7 @@
 """
 Exact distances between the links of an arm, from the manufacturer's meshes.
 
-:mod:`~.link_shapes` knows the models that have meshes and where they are; pinocchio computes the
+:mod:`~.link_shapes` knows the models that have meshes, and their files; pinocchio computes the
 distances. Packages and meshes are optional; without them the cylinders of
 :mod:`~.collision_bodies` decide. The connector at the base is always the cylinder of that module,
 because the meshes of the e-Series have none.
@@ -79,7 +79,7 @@ class CollisionMeshes:
             self._attach(shape.link, T_base_shape, _solid(shape))
         length = hypot(*T_flange_tcp.position)
         if tool_radius > 0.0 and length > 0.0:
-            # The shape is along z and has its origin in the middle.
+            # The cylinder is along z and has its origin in the middle.
             to_tcp = T_flange_tcp.position
             T_flange_middle = Pose(
                 (0.5 * to_tcp[0], 0.5 * to_tcp[1], 0.5 * to_tcp[2]),
@@ -118,7 +118,7 @@ class CollisionMeshes:
         """
         Return the distance of two links.
 
-        :param pair: the lower link first.
+        :param pair: the two links, the one nearer to the base first.
         :param q: (n, 6) [rad].
         :returns: (n,) [m]; 0 where they touch or overlap.
         """
@@ -164,7 +164,7 @@ class CollisionMeshes:
 
 
 def _solid(shape: LinkShape) -> Any:
-    """Return a shape as an object with which pinocchio measures."""
+    """Return a shape as an object that pinocchio can measure."""
     if shape.mesh is None:
         return _coal().Cylinder(shape.radius, shape.length)
     return _mesh(str(shape.mesh))
@@ -172,7 +172,7 @@ def _solid(shape: LinkShape) -> Any:
 
 @lru_cache
 def _mesh(file: str) -> Any:
-    """Return the tree of the triangles of a mesh."""
+    """Return the tree of the triangles in a mesh file."""
     return _coal().MeshLoader().load(file, np.ones(3))
 
 

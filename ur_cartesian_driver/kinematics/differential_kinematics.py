@@ -17,7 +17,7 @@ from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose
 
-# Far below the smallest singular value at which the arm may move.
+# Added to Jacobians; far below the smallest singular value at which the arm is allowed to move.
 _MIN_SINGULAR_VALUE = 1e-12
 
 
@@ -36,8 +36,8 @@ def joint_rates(
     Return the joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) of a TCP motion.
 
     :param q: (n, 6) [rad]; near a singularity joint velocities are not limited.
-    :param twist: (n, 6) of the TCP in base axes [m/s], [rad/s].
-    :param acceleration: (n, 6) [m/s^2], [rad/s^2].
+    :param twist: (n, 6) twist of the TCP in base axes [m/s], [rad/s].
+    :param acceleration: (n, 6) likewise [m/s^2], [rad/s^2].
     """
     at = _jacobians(arm, T_flange_tcp, q)
     # Avoid a division by zero for an arm at rest in a singularity.
@@ -66,8 +66,9 @@ def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
     """
     Return J' q' (n, 6): the acceleration of the TCP at constant joint velocities.
 
-    From link to link: a link that turns with w adds the angular acceleration w x (z q') of the
-    joint it carries, and a point at r from the joint is accelerated by e x r + w x (w x r).
+    The sum goes from link to link: a joint on a link with the angular velocity w adds the
+    angular acceleration w x (z q'). On a link with the angular acceleration e, a point at r from
+    the joint is accelerated by e x r + w x (w x r).
     """
     origins, axes = np.array(at.frames.origins), np.array(at.frames.axes)  # (6, 3, n)
     w, e, a = np.zeros((3, 3, len(qd)))

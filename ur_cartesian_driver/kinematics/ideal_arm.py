@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Fit an ideal arm to a calibrated one, as a start for the closed-form inverse kinematics.
+Fit an ideal arm, whose inverse kinematics has a closed form, to a calibrated one.
 
 The closed form needs axes that are exactly parallel or perpendicular, which a calibrated arm does
 not have. The ideal lengths cannot be read from the calibrated DH table: the axes of shoulder lift,
 elbow and wrist 1 are so nearly parallel that their common normals may lie metres away. Then d2, d3
-and d4 are large and cancel, and theta 2 to 4 mean little one by one. So the ideal arm is fitted to
-the flange poses of the real one: six lengths and six joint offsets, by least squares.
+and d4 are large and cancel, and theta 2 to 4 mean little on their own. So the ideal arm is fitted
+to the flange poses of the real one: six lengths and six joint offsets, by least squares.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class IdealArm:
 
 @lru_cache(maxsize=64)
 def ideal_arm_of(arm: Arm) -> IdealArm:
-    """Return the ideal arm that fits this one best; a nominal arm is its own ideal arm."""
+    """Return the ideal arm that fits an arm best; a nominal arm is its own ideal arm."""
     lengths = _nominal_lengths(arm)
     offsets = np.zeros(6)
     misfit = 0.0

@@ -35,17 +35,17 @@ _LIMIT_ROUNDING = 1e-9
 # tried if the first finds no solution, which happens where two singularities meet.
 MISFIT_FACTORS = (3.0, 30.0)
 
-# Newton: squared error (metres and radians) that is exact enough, maximum number of steps, number
-# of steps that may fail to halve the squared error, and largest joint step [rad].
+# Newton: squared error (metres and radians) that is exact enough; maximum number of steps; number
+# of steps that may fail to halve the squared error; largest joint step [rad].
 _EXACT = 1e-24
 _MAX_STEPS = 40
 _MAX_FAILURES = 12
 _MAX_JOINT_STEP = 0.5
 #: Minimum damping: keeps the normal equations of a singular arm solvable and does not slow down
-#: the convergence of others.
+#: the convergence of other arms.
 MIN_DAMPING = 1e-14
-# Smallest singular value of the Jacobian, and sine of theta5, below which another solution may be
-# close; largest distance of a twin that is searched [rad]; step of the derivative [rad].
+# Least singular value of the Jacobian below which another solution may be close; sine of theta5
+# likewise; largest distance of a twin that is searched [rad]; step of the derivative [rad].
 _NEARLY_SINGULAR = 0.05
 _NEARLY_STRAIGHT = 0.1
 _MAX_TWIN_DISTANCE = 0.6
@@ -71,10 +71,12 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
 
     For a calibrated arm, solutions may be missing within some degrees of two singularities at
     once, and rarely within half a degree of a straight wrist, because the ideal arm is a poor
-    start there. The solution next to the seed is never missing. There may be more than eight.
+    start there. The solution next to the seed is never missing. There may be more than eight
+    solutions.
 
-    :param seed: position of wrist 3 where the axes of wrist 1 and wrist 3 are parallel (default
-        0). For a calibrated arm, a seed near the pose is one more start of the search.
+    :param seed: configuration that gives the position of wrist 3 if the axes of wrist 1 and 3 are
+        parallel (default 0). For a calibrated arm, a seed near the pose is one more start of
+        the search.
     """
     wrist_3 = 0.0 if seed is None else seed[5]
     if not arm.calibrated:
@@ -202,7 +204,7 @@ def _step_along(q: Joints, direction: Floats, distance: float) -> Joints:
 def _nearest_of(
     arm: Arm, T_base_flange: Pose, starts: list[Joints], q_near: Joints
 ) -> Joints | None:
-    """Return the nearest solution found from the starts; refine only those that can win."""
+    """Return the nearest solution from the starts; only starts that can lead to it are refined."""
     # Ignoring joint limits gives a lower bound of the distance.
     ranked = sorted((_distance_by_turns(q, q_near), q) for q in starts)
     allowance = _PRUNING_MARGIN if arm.calibrated else 0.0
@@ -295,7 +297,7 @@ def _nearest_turns(
     """
     Return q with each joint turned as near to ``wanted`` as its limits allow, or None.
 
-    :param q_before: decides if two turns are equally near.
+    :param q_before: of two equally near turns, the one nearer to this configuration is taken.
     """
     turned = []
     for joint, (angle, target, (low, high)) in enumerate(zip(q, wanted, limits, strict=True)):
@@ -358,7 +360,7 @@ def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
 
 
 def _explain_outside_limits(found: list[Joints], model: RobotModel) -> str:
-    """Explain which joint exceeds its limits in the best solution; empty if none does."""
+    """Return a clause on the joint beyond its limits in the best solution; '' if there is none."""
     worst = [max(_outside(q, model.position_limits)) for q in found]
     excess, joint, angle = min(worst)
     if excess <= 0.0:
@@ -372,7 +374,7 @@ def _explain_outside_limits(found: list[Joints], model: RobotModel) -> str:
 
 
 def _outside(q: Joints, limits: PositionLimits) -> Iterator[tuple[float, int, float]]:
-    """Yield for each joint its excess over the limits at the best turn [rad], index, angle."""
+    """Yield for each joint, at its best turn: excess over the limits [rad], index, angle [rad]."""
     for joint, (angle, (low, high)) in enumerate(zip(q, limits, strict=True)):
         if _nearest_turn(angle, 0.0, low, high) is not None:
             yield 0.0, joint, angle

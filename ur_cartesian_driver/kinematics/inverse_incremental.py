@@ -26,7 +26,7 @@ _ONE_STEP_LEFT = 1e-12
 _MAX_STEPS = 8
 #: If a joint moves farther than this [rad], Newton's method converges to another branch.
 _MAX_JOINT_CHANGE = 0.5
-#: Keeps the normal equations of an exactly singular arm solvable.
+#: Damping that keeps the normal equations of an exactly singular arm solvable.
 _DAMPING = 1e-14
 
 
@@ -35,7 +35,8 @@ def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None
     Return the joint positions of a pose [rad], starting from the joints of a nearby pose.
 
     :param q_before: joint positions of a pose at most centimetres away [rad].
-    :returns: None if the iteration does not converge: out of reach, or nearly singular.
+    :returns: None if the iteration does not converge because the pose is out of reach or nearly
+        singular.
     """
     rotation = rotation_from_quaternion(T_base_flange.quaternion)
     q = q_before
@@ -57,8 +58,8 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     """
     Return the distances of wrist [rad], elbow [rad] and shoulder [m] from singularity.
 
-    All >= 0: the angles of wrist 2 and elbow, and the distance of the wrist centre from the plane
-    of axes 1 and 2.
+    All are >= 0: the angles of wrist 2 and elbow, and the distance of the wrist centre from the
+    plane of axes 1 and 2.
     """
     ideal = ideal_arm_of(arm)
     _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))

@@ -9,7 +9,7 @@ previous row. A row is certain to do so if its step is shorter than half the dis
 branches. The few rows that are not certain (near singularities, at joint limits, after a jump) go
 to :mod:`~.inverse`, so that both modules return the same solutions.
 
-Poses are rows (n, 7), x y z [m] and the unit quaternion x y z w; joints rows (n, 6) [rad].
+Poses are rows (n, 7), x y z [m] and the unit quaternion x y z w; joints are rows (n, 6) [rad].
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ _BLOCK = 1024
 # Block size after a row that needed a search; it then grows again.
 _MIN_BLOCK = 16
 
-# Newton: squared error (metres and radians) that is exact enough.
+# Newton: squared error (metres and radians) that is exact enough; largest joint step [rad].
 _EXACT = 1e-21
 _MAX_JOINT_STEP = 0.5
 # Newton steps from a solution of the ideal arm: two suffice except near singularities.
 _STEPS = 3
-# On a path, one in this many rows starts from the ideal solution. The rows in between start from
-# there plus the shifts that the iterations of their neighbours have found.
+# On a path, Newton starts from the ideal solution in one of this many rows. The rows in between
+# start from their ideal solutions plus the shifts that were found for their neighbours.
 _STRIDE = 8
-# Farther than this from the ideal solution [rad], Newton may have found another branch.
+# A result of Newton farther than this [rad] from the ideal solution may be on another branch.
 _MAX_CALIBRATION_SHIFT = 0.05
 # Branches of the ideal arm closer than this may be swapped in the real one [rad].
 _AMBIGUOUS_SEPARATION = 4.0 * _MAX_CALIBRATION_SHIFT
@@ -63,7 +63,7 @@ class PathSolution:
     #: (n,) whether there is a solution.
     found: Flags
     #: (n,) largest joint change from the last solved row (or from the start) [rad]. If the branch
-    #: or the turn jumps, it is large however finely the path is sampled.
+    #: or the turn jumps, the change is large however finely the path is sampled.
     step: Floats
 
 
@@ -161,7 +161,7 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
 def _on_branch(
     arm: Arm, targets: TargetPoses, signs: tuple[int, int, int]
 ) -> tuple[Floats, Floats]:
-    """Return one branch (n, 6) and half its distance to the next (n,), negative if unsure."""
+    """Return the joints on a branch (n, 6) and half its distance to others (n,), < 0 if unsure."""
     branch = branch_rows(ideal_arm_of(arm), targets, signs)
     q, max_step = branch.q.T, 0.5 * branch.separation
     sound = branch.exists

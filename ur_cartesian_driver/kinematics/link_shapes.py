@@ -9,8 +9,8 @@ joint's real axis, as near as possible to its place on the nominal arm with all 
 
 The meshes are the manufacturer's. UR3, UR5 and UR10 are in the package example-robot-data (BSD),
 UR3e and UR5e (also for a UR7e) in the package airo-models (MIT). Both packages are optional; links
-without a mesh are the cylinders of :mod:`~.collision_bodies`. The meshes of the e-Series have no
-connector at the base.
+without a mesh are drawn as the cylinders of :mod:`~.collision_bodies`. The meshes of the e-Series
+have no connector at the base.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, multiply
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
 #: `visual` has tens of thousands of triangles a link, `collision` about a thousand. The collision
-#: meshes of the e-Series are convex hulls of the links. The UR5e's long links are hulls in parts;
+#: meshes of the e-Series are convex hulls of the links. The UR5e's long links consist of parts;
 #: a cylinder fills the gaps between the parts of its forearm.
 Detail: TypeAlias = Literal['visual', 'collision']
 
@@ -99,9 +99,9 @@ class _MeshSource:
     parts: Mapping[Link, tuple[str, ...]]
     #: Cylinders about z of the mesh that fill gaps between parts: from, to, radius [m].
     fillings: Mapping[Link, tuple[float, float, float]]
-    #: Origins of the meshes of upper arm, forearm, wrists 1 to 3 along z of their frames [m].
+    #: Mesh origins of upper arm, forearm, wrists 1 to 3, along z of their link frames [m].
     offsets: tuple[float, float, float, float, float]
-    #: How much nearer two links were found by their visual than by their collision meshes [m].
+    #: By how much two links were found nearer by their visual than by their collision meshes [m].
     tolerance: float
 
     def files(self, link: Link, detail: Detail) -> list[Path]:
@@ -201,7 +201,7 @@ class LinkShape:
 
     :param T_link_shape: in the frame of the link, the frame of the mesh's vertices [m], or the
         middle of the cylinder, whose axis is z.
-    :param mesh: the file; None: a cylinder of this radius and length [m].
+    :param mesh: the file; None: a cylinder of ``radius`` and ``length`` [m].
     """
 
     link: Link
@@ -290,8 +290,8 @@ class LinkFrames:
                 for frame, origin, axis in zip(nominal[1:], true.origins, true.axes, strict=True)
             ),
         )
-        #: The frame of each joint in that of the link before, while the joint is at 0; the joint
-        #: turns about its z.
+        #: The frame of each joint in the frame of the link before, while the joint is at 0; the
+        #: joint turns about z of its frame.
         self.joints: tuple[Pose, ...] = tuple(
             before.inverse() @ after
             for before, after in zip(self.at_zero[:-1], self.at_zero[1:], strict=True)
@@ -318,7 +318,7 @@ class LinkFrames:
 
 
 def _nominal_frames(arm: Arm) -> list[Pose]:
-    """Return ``T_base_link`` of the nominal arm, all joints at 0: after d in each DH row."""
+    """Return ``T_base_link`` of the nominal arm at joints 0; a frame is after d of its DH row."""
     g, T, frames = arm.model.geometry, IDENTITY, [IDENTITY]
     for theta, d, a, alpha in zip(g.theta, g.d, g.a, g.alpha, strict=True):
         T = T @ Pose((0.0, 0.0, d), (0.0, 0.0, sin(0.5 * theta), cos(0.5 * theta)))

@@ -4,9 +4,9 @@
 The robot description (URDF) of an arm, from its calibrated geometry.
 
 Links, joints and fixed frames have the names of Universal Robots' own description, so programs
-made for that description can use this one: ``base_link``, ``base`` turned by pi about z, the six
-links, ``tool0`` and ``flange``. The links are drawn as meshes if the package of the meshes is
-installed, else as cylinders.
+made for that description can use this one: ``base_link``; ``base``, which is turned by pi about z;
+the six links; ``tool0`` and ``flange``. The links are drawn as meshes if the package of the meshes
+is installed, else as cylinders.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ class DhTable:
         return {'a': self.a, 'd': self.d, 'alpha': self.alpha, 'theta': self.theta}
 
     def difference(self, other: DhTable) -> float:
-        """Return the largest difference of any number of the two tables [m or rad]."""
+        """Return the largest difference between corresponding numbers of two tables [m or rad]."""
         return max(
             abs(mine - theirs)
             for name, column in self.columns().items()
@@ -90,11 +90,11 @@ class JointLimits:
 
     #: Lowest and highest position of each joint [rad].
     position: PositionLimits
-    #: [rad/s]
+    #: Largest speed of each joint [rad/s].
     speed: Vector6
 
 
-#: Names the source of a limit that is tighter than the model's.
+#: A clause that names the source of a limit that is tighter than the model's.
 REPORTED = ', which the controller reports in its configuration'
 #: A limit is tighter than another one only if they differ by more than this [rad], [rad/s].
 _ROUNDING = 1e-4
@@ -111,24 +111,25 @@ class RobotModel:
     geometry: DhTable
     #: Lowest and highest position of each joint [rad], infinite where it turns without end.
     position_limits: PositionLimits
-    #: [rad/s]. For ur15, ur18 and ur8long nothing is published: they are given the values of the
-    #: ur20, which are the lowest of the series.
+    #: Largest speed of each joint [rad/s]. For ur15, ur18 and ur8long nothing is published: they
+    #: are given the values of the ur20, which are the lowest of the series.
     max_joint_speed: Vector6
-    #: [Nm]; None where nothing is published.
+    #: Largest torque of each joint [Nm]; None = not published.
     max_joint_torque: Vector6 | None
-    #: [kg]
+    #: Largest payload [kg].
     payload: float
-    #: As in the data sheet, from the shoulder to the centre of the wrist [m].
+    #: Reach in the data sheet, from the shoulder to the centre of the wrist [m].
     max_reach: float
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
-    #: The joints for which the controller reports a tighter range, or speed, than the model's.
+    #: The joints for which the controller reports a tighter range than the model's.
     reported_ranges: frozenset[int] = frozenset()
+    #: The joints for which the controller reports a lower speed than the model's.
     reported_speeds: frozenset[int] = frozenset()
 
     def limited_to(self, limits: JointLimits) -> RobotModel:
         """
-        Return the model with the limits of a controller where they are tighter.
+        Return the model with those limits of a controller that are tighter.
 
         Limits that no joint can have (an empty range, no speed, NaN) are ignored.
         """
@@ -162,7 +163,7 @@ class RobotModel:
 
     @property
     def control_cycle(self) -> float:
-        """The cycle time of its controller [s]."""
+        """The cycle time of the controller [s]."""
         return 0.008 if self.series == 'CB3' else 0.002
 
 
@@ -246,7 +247,7 @@ MODELS: Mapping[str, RobotModel] = MappingProxyType({row[0]: RobotModel(*row) fo
 
 def robot_model(name: str) -> RobotModel:
     """
-    Return the model of a name such as ``ur5e``.
+    Return the model with a name such as ``ur5e``.
 
     :raises ValueError: there is no such model; the text lists all models.
     """

@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The errors of this package: one class, and one code of the action, for each way a goal can fail.
+The errors of this package: a class, with the action's code, for each way a goal can fail.
 
 ::
 
     DriverError
     |-- GoalRefused              nothing has moved
     |   |-- InvalidGoal              the goal contradicts itself or the rules
-    |   |   |-- NotAvailable             it needs something that this version does not do
-    |   |   `-- TooFast                  it needs more speed than the limits allow
+    |   |   |-- NotAvailable             the goal needs something that this version does not do
+    |   |   `-- TooFast                  the goal needs more speed than the limits allow
     |   |-- InvalidJoints            posture names or values do not fit the robot
     |   |-- OldHeaderTimestamp       header.stamp lies too far in the past
     |   |-- InvalidPosture           the motion cannot arrive in the required posture
@@ -23,11 +23,11 @@ The errors of this package: one class, and one code of the action, for each way 
     |   |-- ProtectiveStop, EmergencyStop, ProgramStopped, ConnectionLost
     |   |-- Preempted, Cancelled
     |   `-- ExecutionFailed          the robot program failed, or the robot left the plan
-    `-- ProtocolError            ends a goal like a lost connection
+    `-- ProtocolError            a wire protocol was broken; treated as a lost connection
         |-- LocalProtocolError       we tried to send something illegal; nothing was sent
         `-- RemoteProtocolError      the robot sent nonsense; its bytes are in the text
 
-:data:`ERRORS` is the table of codes and classes. ``Outcome.raise_for_error()`` raises from it.
+:data:`ERRORS` is the table of codes and classes, which ``Outcome.raise_for_error()`` uses.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class DriverError(Exception):
     report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle and copy with the finished sentence, because constructors take its parts."""
+        """Rebuild pickles and copies from the text, because some constructors take its parts."""
         return _restore, (type(self), str(self)), self.__dict__
 
 
@@ -96,8 +96,8 @@ class InvalidGoal(GoalRefused):
         Build the sentence.
 
         :param field: the wrong field, for example ``trajectory.points[2].pose.orientation``.
-        :param problem: its fault, with value and bound.
-        :param remedy: the advice, if there is any.
+        :param problem: the fault of the field, with its value and bound.
+        :param remedy: advice to the user; empty = none.
         """
         super().__init__(f'{field} {problem}' + (f'; {remedy}.' if remedy else '.'))
         self.field = field
@@ -110,12 +110,13 @@ class NotAvailable(InvalidGoal):
 class AlreadySent(InvalidGoal):
     """Points to be replaced were sent already; the text names the first replaceable one."""
 
-    #: The first point that can be replaced, and the earliest time [s].
+    #: Index of the first point that can be replaced.
     first_point = 0
+    #: Earliest ``time_from_start`` from which points can be replaced [s].
     first_time = 0.0
 
     def __init__(self, first_point: int, first_time: float) -> None:
-        """Take the first replaceable point and time, which is meant as ``time_from_start`` [s]."""
+        """Take the first replaceable point and the earliest ``time_from_start`` [s]."""
         DriverError.__init__(
             self,
             'What is to be replaced has been sent to the robot; replace from point '
@@ -187,7 +188,7 @@ class PathToleranceViolated(ExecutionEnded):
 
 
 class GoalToleranceViolated(ExecutionEnded):
-    """The arm ended outside ``goal_tolerance``, or too late."""
+    """The arm came to rest outside ``goal_tolerance``, or arrived too late."""
 
     code = ErrorCode.GOAL_TOLERANCE_VIOLATED
 
@@ -211,7 +212,7 @@ class ProgramStopped(ExecutionEnded):
 
 
 class ConnectionLost(ExecutionEnded):
-    """A connection to the robot broke, or its states arrive too late."""
+    """A connection to the robot broke, or the robot's states arrived too late."""
 
     code = ErrorCode.CONNECTION_LOST
 
@@ -253,7 +254,7 @@ class RemoteProtocolError(ProtocolError):
 
 
 #: The error class for every code but SUCCESSFUL: the direct subclasses of :class:`GoalRefused`
-#: (raised before the motion) and of :class:`ExecutionEnded` (which end it).
+#: (nothing has moved) and of :class:`ExecutionEnded` (an accepted goal has ended).
 ERRORS: Mapping[ErrorCode, type[DriverError]] = {
     error.code: error
     for error in sorted(

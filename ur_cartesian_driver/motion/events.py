@@ -19,15 +19,17 @@ from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 
 class TrajectoryResult(IntEnum):
-    """The robot program's report of the end of a trajectory; the numbers on the wire."""
+    """The end of a trajectory as the robot program reports it, numbered as on the wire."""
 
     SUCCESS = 0
     CANCELED = 1
     FAILURE = 2
-    #: This result and the following ones come from our own robot program only.
+    #: An awaited input did not come in time. Only our own robot program reports this result and
+    #: the following ones.
     INPUT_MISSING = 3
-    #: The tool made contact, which ends the trajectory; or a required contact did not come.
+    #: The tool made contact, which ends the trajectory.
     CONTACT = 4
+    #: A required contact did not come.
     NO_CONTACT = 5
 
 
@@ -79,7 +81,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoReceived:
-    """The robot reported its servo feedback."""
+    """The robot program reported on the set-points that it follows."""
 
     feedback: ServoFeedback
 
@@ -95,9 +97,9 @@ class OffsetReceived:
 class OutputsSecured:
     """The safe outputs were written to the robot, as far as possible."""
 
-    #: The outputs whose values were changed, with the values before.
+    #: The outputs whose values were changed, each with its value before the change.
     changed: tuple[SafeOutput, ...] = ()
-    #: The sentence that names the outputs that were not written, and why; empty = all are safe.
+    #: The sentence that names the unwritten outputs and the reason; empty = all were written.
     failure: str = ''
 
 
@@ -119,7 +121,7 @@ class Progress:
     """
     The progress of a running motion.
 
-    Poses, twists and accelerations of the controlled frame, in the robot's base.
+    Poses, twists and accelerations are those of the controlled frame in the robot's base.
     """
 
     #: Index of the waypoint that the tool moves to.
@@ -128,12 +130,13 @@ class Progress:
     fraction: float
     desired_pose: Pose
     desired_twist: Vector6 = ZERO6
-    #: None = the robot does not report accelerations.
+    #: None = the robot does not report accelerations; also for ``actual_acceleration``.
     desired_acceleration: Vector6 | None = None
     actual_pose: Pose
     actual_twist: Vector6 = ZERO6
     actual_acceleration: Vector6 | None = None
-    #: Joint positions [rad] and velocities [rad/s], as desired by the controller and as measured.
+    #: Joint positions [rad] and velocities [rad/s]: those that the controller desires (first two
+    #: fields), and the measured ones (next two).
     desired_q: Vector6 = ZERO6
     desired_qd: Vector6 = ZERO6
     actual_q: Vector6 = ZERO6
@@ -161,11 +164,11 @@ class Progress:
 class PathPlace:
     """A place on the path of a goal."""
 
-    #: Index of the point to which its segment leads.
+    #: Index of the point at the end of the segment on which the place lies.
     point: int
-    #: Fraction of the segment before the place, 0 to 1: of its length, of the travel of a joint
-    #: motion, of the time of a spline. In the first half of a blend it rises to 1; the second half
-    #: belongs to the next segment, whose fraction rises from 0 there.
+    #: Fraction of this segment that lies before the place, 0 to 1: by length; for a joint motion,
+    #: by joint travel; for a spline, by time. In the first half of a blend the fraction rises to
+    #: 1; the second half belongs to the next segment, whose fraction rises from 0 there.
     fraction: float
 
 
@@ -177,7 +180,7 @@ class Outcome:
     text: str
     report: tuple[str, ...] = ()
     #: The place on the path at which the goal was stopped; the arm came to rest some millimetres
-    #: farther on. None = the goal succeeded, the arm had not begun to move, or it is not known.
+    #: farther on. None = the goal succeeded, nothing had moved, or the place is not known.
     stopped: PathPlace | None = None
 
     @property
@@ -192,7 +195,7 @@ class Outcome:
         ``driver.execute(goal).raise_for_error()`` lets Python code handle failures as exceptions;
         the table of codes and classes is :data:`~ur_cartesian_driver.motion.errors.ERRORS`.
 
-        :raises GoalRefused: nothing has moved.
+        :raises GoalRefused: the goal was refused before anything moved.
         :raises ExecutionEnded: the goal ended before its last point. Like GoalRefused, the error
             carries the text and the ``report`` of this outcome.
         """

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compose a path of the tool in a few lines, without ROS and for ROS.
+Compose a path of the tool in a few lines, with or without ROS.
 
 ::
 

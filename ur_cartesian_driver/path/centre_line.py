@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arcs through three points, and the centre line, of lines and arcs, along which a path weaves."""
+"""Arcs through three points; the centre line of a weave, which consists of lines and arcs."""
 
 from __future__ import annotations
 
@@ -35,14 +35,16 @@ _FLAT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A line (no curvature) or an arc from pose to pose."""
+    """A straight line or an arc, from one pose to another."""
 
     start: Pose
     end: Pose
     length: float
-    #: Centre and axis of an arc, which turns about the axis from start to end [rad].
+    #: Centre of an arc [m].
     centre: Vector3 = (0.0, 0.0, 0.0)
+    #: Unit vector of the axis of an arc.
     axis: Vector3 = (0.0, 0.0, 0.0)
+    #: Angle of an arc about its axis, from start to end [rad]; 0 = a straight line.
     angle: float = 0.0
 
     def position(self, s: float) -> Vector3:
@@ -103,7 +105,7 @@ def turned(stroke: Stroke) -> Pose:
 
 
 class CentreLine:
-    """Consecutive strokes, with a sideways direction: across both the line and the tool axis."""
+    """Consecutive strokes; sideways is perpendicular to both the stroke and the tool's z axis."""
 
     def __init__(self, strokes: Sequence[Stroke]) -> None:
         """
@@ -117,9 +119,9 @@ class CentreLine:
 
     def swing(self, s: float, amplitude: float, waves: int) -> Pose:
         """
-        Return the pose after a distance s [m] along the line, on a sine wave to both sides.
+        Return the pose after a distance s [m] along the line, on a sine wave about the line.
 
-        :param amplitude: to either side [m].
+        :param amplitude: largest distance of the wave to either side [m].
         :param waves: number of waves on the whole line.
 
         :raises ZeroDivisionError: the tool points along the line.
@@ -150,7 +152,7 @@ class RestToRest:
         return self.time(self.length)
 
     def time(self, s: float) -> float:
-        """Return the time at which a distance is reached [s]."""
+        """Return the time [s] at which a distance s [m] is reached."""
         a, ramp = self.acceleration, self._ramp
         if s <= ramp:
             return sqrt(2.0 * s / a)
@@ -162,5 +164,5 @@ class RestToRest:
         return 2.0 * top / a + (cruise_end - ramp) / top - sqrt(2.0 * left / a)
 
     def rate(self, s: float) -> float:
-        """Return the speed at a distance [m/s]."""
+        """Return the speed [m/s] after a distance s [m]."""
         return sqrt(2.0 * self.acceleration * min(s, self._ramp, max(0.0, self.length - s)))

@@ -23,9 +23,9 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     Vector3,
 )
 
-#: The tool's axis z straight down, its x along y of the frame.
+#: The tool's axis z points straight down, its axis x along y of the frame.
 DOWN: Quaternion = (sqrt(0.5), sqrt(0.5), 0.0, 0.0)
-#: Directions.
+#: Directions of the axes of the frame.
 X: Vector3 = (1.0, 0.0, 0.0)
 Y: Vector3 = (0.0, 1.0, 0.0)
 Z: Vector3 = (0.0, 0.0, 1.0)
@@ -65,8 +65,9 @@ def against(normal: Sequence[float], x: Sequence[float]) -> Quaternion:
     """
     Return the orientation whose axis z points against the normal of a surface.
 
-    :param x: where the tool's axis x points, as far as it can; not along the normal.
-    :raises InvalidGoal: a direction is zero, or the two are parallel.
+    :param x: direction in which the tool's axis x points as nearly as possible; not parallel to
+        the normal.
+    :raises InvalidGoal: a direction is zero, or the two directions are parallel.
     """
     n, along = direction('normal', normal), direction('x', x)
     along = subtract(along, scale(n, dot(along, n)))
@@ -78,18 +79,18 @@ def against(normal: Sequence[float], x: Sequence[float]) -> Quaternion:
 
 def tilted(angle: float, about: Sequence[float] = X, of: Quaternion = DOWN) -> Quaternion:
     """
-    Return an orientation turned by an angle [rad] about an axis of the frame; by default, DOWN.
+    Return an orientation (by default DOWN) turned by an angle [rad] about an axis of the frame.
 
-    :raises InvalidGoal: as :func:`axis_angle`.
+    :raises InvalidGoal: as for :func:`axis_angle`.
     """
     return multiply(axis_angle(about, angle), of)
 
 
 def direction(name: str, vector: Sequence[float]) -> Vector3:
     """
-    Return a vector of length 1.
+    Return the vector of length 1 with the direction of a vector.
 
-    :raises InvalidGoal: it is zero, or no vector of three numbers.
+    :raises InvalidGoal: the vector is zero, or does not consist of three finite numbers.
     """
     values = [float(value) for value in vector]
     if len(values) != 3 or not all(map(isfinite, values)) or not any(values):
@@ -99,7 +100,7 @@ def direction(name: str, vector: Sequence[float]) -> Vector3:
 
 
 def _of_axes(ex: Vector3, ey: Vector3, ez: Vector3) -> Quaternion:
-    """Return the orientation of a frame from its axes, by its largest component."""
+    """Return the orientation of a frame from its axes; the largest component is computed first."""
     m = (ex, ey, ez)  # columns
     trace = ex[0] + ey[1] + ez[2]
     candidates = (trace, ex[0], ey[1], ez[2])

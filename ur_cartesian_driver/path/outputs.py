@@ -95,7 +95,7 @@ class Input:
     pin: int
 
     def wait(self, value: float, timeout: float, below: bool, go_on: bool) -> InputWait:
-        """Return the wait for a value; the value is not checked."""
+        """Return the event that waits for a value of the input; the value is not checked."""
         return InputWait(
             waypoint=0,
             input=self.kind,

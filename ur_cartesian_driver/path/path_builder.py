@@ -5,7 +5,7 @@ A path of the tool, composed motion by motion.
 
 A :class:`Path` never changes: each method returns a new one. Units are SI (:func:`~.units.mm` and
 :func:`~.units.deg` convert), poses place the controlled frame in the frame of the path. A mistake
-raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line that makes it.
+raises an :exc:`~ur_cartesian_driver.motion.errors.InvalidGoal` at the line with the mistake.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ from ur_cartesian_driver.path.weave import strokes, woven
 @dataclass(frozen=True, slots=True, init=False, repr=False)
 class Path(PathWithEvents):
     """
-    A path from a start through points, without ROS and for ROS.
+    A path from a start through points, for use with or without ROS.
 
     ::
 
@@ -76,8 +76,9 @@ class Path(PathWithEvents):
         )
         driver.execute(square).raise_for_error()
 
-    The start is not a point of the goal. The arm has to be there when the goal begins, the first
-    :meth:`by` is relative to it, and its orientation holds until another one is given.
+    The start is not a point of the goal. The arm has to be at the start when the goal begins, the
+    first :meth:`by` is relative to the start, and the start's orientation holds until another one
+    is given.
     """
 
     # ---- the path as a whole -------------------------------------------------------------------
@@ -116,18 +117,18 @@ class Path(PathWithEvents):
 
     def asking(self, **fields: Any) -> Path:
         """
-        Set fields of the goal for which there is no method, by their names in the action.
+        Set goal fields that have no method of their own, by their names in the action.
 
         :raises InvalidGoal: a field cannot have the value.
         """
         return self._with(_settings=with_fields('asking()', self._settings, fields))
 
     def executed_as(self, mode: ExecutionMode) -> Path:
-        """Choose how the path is executed: a spline by the robot (SPLINE) or streamed (SERVO)."""
+        """Choose how the path is executed, such as by the robot (SPLINE) or streamed (SERVO)."""
         return self._with(_settings=replace(self._settings, execution=mode))
 
     def steady(self, min_fraction: float = 0.95) -> Path:
-        """Demand this fraction of the asked speed (0 to 1) everywhere; else refuse the path."""
+        """Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused."""
         return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
 
     def path_offset(
@@ -144,12 +145,13 @@ class Path(PathWithEvents):
         """
         Allow offsets from the path while the arm moves, in PRIMITIVES or SERVO.
 
-        Offsets come by ``set_path_offset`` of the running motion, or on ``~/path_offset``.
+        Offsets are set by ``set_path_offset`` of the running motion, or on the topic
+        ``~/path_offset``.
 
         :param along: largest offset along the path, either way [m]; likewise ``across`` it and
             ``normal`` to it.
-        :param speed: of the offset along each axis [m/s]; 0 = 0.02.
-        :param acceleration: of the offset along each axis [m/s^2]; 0 = 0.2.
+        :param speed: largest speed of the offset along each axis [m/s]; 0 = 0.02.
+        :param acceleration: largest acceleration of the offset along each axis [m/s^2]; 0 = 0.2.
         :param timeout: age from which an offset is stale [s]; 0 = 0.5.
         :param on_stale: whether a stale offset stays, or the tool goes back to its path.
         """
@@ -166,8 +168,8 @@ class Path(PathWithEvents):
         """
         Allow points to be appended while the arm moves.
 
-        :param replace_horizon: how far ahead of the arm points are final [s], so that later ones
-            can be replaced; 0 = none can be replaced.
+        :param replace_horizon: how far ahead of the arm points are final [s]; later points can be
+            replaced. 0 = no points can be replaced.
         """
         return self._with(
             _settings=replace(self._settings, keep_open=True, replace_horizon=replace_horizon)
@@ -191,7 +193,8 @@ class Path(PathWithEvents):
         """
         Return this path followed by another one.
 
-        :raises InvalidGoal: frames, tools or settings differ, or the other path begins elsewhere.
+        :raises InvalidGoal: frames, tools or settings differ, the other path begins elsewhere, or
+            only one of the paths is a spline or has durations.
         """
         for name in ('frame', 'tool'):
             mine, its = getattr(self, name), getattr(other, name)
@@ -232,7 +235,7 @@ class Path(PathWithEvents):
         Return this path moved by a distance [m].
 
         :param of_tool: move each point along the axes of the tool there, not of the frame.
-        :raises InvalidGoal: ``of_tool`` on an arc that turns the tool: the result is no arc.
+        :raises InvalidGoal: with ``of_tool``, an arc turns the tool, so that the result is no arc.
         """
         step = vector('offset()', (dx, dy, dz), MAX_COORDINATE_OF_BASE, 'd')
         if not of_tool:
@@ -250,7 +253,7 @@ class Path(PathWithEvents):
         )
 
     def transformed(self, T: Pose) -> Path:
-        """Return this path with all its poses moved by a pose of the frame: ``T @ pose``."""
+        """Return this path with each pose transformed by a pose in the frame: ``T @ pose``."""
         T = Pose(
             vector('transformed()', T.position, MAX_COORDINATE), unit_quaternion('T', T.quaternion)
         )
@@ -261,9 +264,10 @@ class Path(PathWithEvents):
 
     def reversed(self) -> Path:
         """
-        Return the way back: from the end to the start.
+        Return the path backwards, from its end to its start.
 
-        :raises InvalidGoal: the path has no start to end at, or events, which have no reverse.
+        :raises InvalidGoal: the path has no start at which to end, or has events, which cannot be
+            reversed.
         """
         if self._start is None:
             raise InvalidGoal('reversed()', 'has no start to go back to', 'write Path(start)')
@@ -276,7 +280,7 @@ class Path(PathWithEvents):
         if not self._points:
             return self
         places = (self._start, *self._points)
-        # Blend and dwell belong to their point, everything else in a segment to the motion.
+        # Blend and dwell of a segment belong to its point, the other fields to its motion.
         points = [
             replace(
                 motion,
@@ -300,7 +304,7 @@ class Path(PathWithEvents):
         self, place: PathPlace, *, overlap: float = OVERLAP, approach: float = APPROACH
     ) -> Path:
         """
-        Return the rest of the path after it was stopped at a place (``outcome.stopped``).
+        Return what remains of the path after its goal stopped at a place (``outcome.stopped``).
 
         For ``overlap`` and ``approach`` [m] see :func:`~.resumption.resume`.
 
@@ -320,7 +324,7 @@ class Path(PathWithEvents):
         alternating: bool = False,
     ) -> Path:
         """
-        Return this path several times, each pass moved by a step [m] from the one before.
+        Return this path repeated, each pass moved by a step [m] from the one before.
 
         If a pass does not begin at the end of the one before, a line leads there, with the speed
         and blend that hold at the end of the path.
@@ -350,10 +354,10 @@ class Path(PathWithEvents):
         Lines and arcs without corners become a spline through eight points on each wave. The
         motion is from rest to rest, at the speed along the path that :meth:`at` has set.
 
-        :param amplitude: to either side [m].
-        :param wavelength: of one wave [m], rounded so that whole waves fit into the path.
-        :raises InvalidGoal: the path has a corner, events, durations, no start or no speed, or a
-            motion that is no line or arc.
+        :param amplitude: largest distance to either side [m].
+        :param wavelength: length of one wave [m], rounded so that whole waves fit into the path.
+        :raises InvalidGoal: the path has corners, motions that are no lines or arcs, events,
+            durations, postures or dwells, no start or no speed, or the tool points along it.
         """
         for name, value in (('amplitude', amplitude), ('wavelength', wavelength)):
             amount('weave()', name, value, MAX_BLEND, 'm')
@@ -382,7 +386,8 @@ class Path(PathWithEvents):
         """
         Return the goal, as the driver plans it.
 
-        :param frames: poses of the frames that the path names; None = the frames of every robot.
+        :param frames: poses of the frames that the path names; None = only the frames that every
+            robot has.
         :param snapshot: where the arm is, for frames that move with it.
         :raises InvalidGoal: a frame is not known.
         :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
@@ -395,9 +400,10 @@ class Path(PathWithEvents):
         """
         Return the path of a goal; the path has no start.
 
-        A goal in a frame without a name is transformed into the base.
+        If the frame of the goal has a pose but no name, the path is transformed into the base.
 
-        :raises InvalidGoal: the goal would be refused anyway, or its controlled frame has no name.
+        :raises InvalidGoal: planning would refuse the goal, too, or its controlled frame has a
+            pose but no name.
         """
         if goal.T_flange_controlled is not None and not goal.controlled_frame:
             raise InvalidGoal(
@@ -420,7 +426,8 @@ class Path(PathWithEvents):
         """
         Return the path of a goal message, whether its points are packed or not.
 
-        :raises InvalidGoal: it sets what a path does not have: a start time or ``validate_only``.
+        :raises InvalidGoal: the message has a start time or ``validate_only``, which a path cannot
+            have.
         """
         if nanoseconds(message.trajectory.header.stamp) or message.validate_only:
             raise InvalidGoal(
@@ -440,7 +447,7 @@ class Path(PathWithEvents):
         Return the path of a goal in YAML.
 
         :raises GoalFileError: the text is no goal.
-        :raises InvalidGoal: as :meth:`from_message`.
+        :raises InvalidGoal: as for :meth:`from_message`.
         """
         return cls.from_message(read_goal_file(text))
 
@@ -450,7 +457,7 @@ class Path(PathWithEvents):
 
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Path:
-        """Return the path of a goal file; raises as :meth:`from_yaml`."""
+        """Return the path of a goal file; errors as for :meth:`from_yaml`."""
         return cls.from_message(read_goal_file(FilePath(file)))
 
     def _table(self) -> GoalTable:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Events at the points of a path: outputs, inputs, rests, presses."""
+"""Events at the points of a path, such as outputs, waits for inputs, dwells and presses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ from ur_cartesian_driver.path.path_points import PathPoint
 from ur_cartesian_driver.planning.request.point_events.payload_changes import MAX_OFFSET
 from ur_cartesian_driver.planning.request.point_events.registry import check_event
 
-#: Of events with a begin and an end: the methods that set both, and words that identify the event.
+#: For each event with a begin and an end: the method that sets the begin, the method that sets the
+#: end, and a phrase that identifies the event.
 _METHODS = {
     Press: ('press()', 'end_press()', ''),
     ProportionalOutput: ('follow_speed()', 'end_follow_speed()', ' for analog output {0.pin}'),
@@ -48,7 +49,7 @@ class PathWithEvents(PathOfMotions):
         :param value: True or False for a digital output, fraction of the range for an analog one.
         :param after: time after the point [s].
         :param before: time before the point [s]; only if the motion to it has a duration.
-        :raises InvalidGoal: there is no point, no such output, or no such value.
+        :raises InvalidGoal: there is no point, or the value or a time is not possible.
         """
         if not self._points:
             raise InvalidGoal('set()', 'comes before the first point', 'add a motion first')
@@ -85,14 +86,15 @@ class PathWithEvents(PathOfMotions):
         """
         Make an analog output follow the speed of the tool from the last point on.
 
-        The output is ``offset + gain * speed``, from ``minimum`` to ``maximum``; its values are
-        fractions of its range.
+        The output is ``offset + gain * speed``, but at least ``minimum`` and at most ``maximum``,
+        all as fractions of its range.
 
         :param gain: fraction of the range per speed [1/(m/s)].
         :param filter_time: time constant of a low-pass filter for the speed [s].
         :param lead: time before the point at which the output begins to follow [s].
         :param idle: value after the end, and when the motion does not go on as planned.
-        :raises InvalidGoal: there is no point or no such output, or a number must be a mistake.
+        :raises InvalidGoal: there is no point, the output is not analog, or a number is out of its
+            range.
         """
         where = f'follow_speed() at point {len(self) - 1}'
         if not self._points:
@@ -119,7 +121,8 @@ class PathWithEvents(PathOfMotions):
         End :meth:`follow_speed` at the last point.
 
         :param lead: time before the point at which the output ceases to follow [s].
-        :raises InvalidGoal: the output does not follow the speed from an earlier point on.
+        :raises InvalidGoal: the output does not follow the speed from an earlier point on, or
+            ``lead`` is out of its range.
         """
         begun = self._begun(
             lambda one: isinstance(one, ProportionalOutput) and one.pin == output.pin
@@ -151,18 +154,18 @@ class PathWithEvents(PathOfMotions):
         """
         Press with the controller's force mode from the last point on, where the arm stops.
 
-        :param forces: forces along the compliant axes of the frame, 'x' 'y' 'z' [N], and about
-            them, 'rx' 'ry' 'rz' [Nm]; empty = none, only watch for contact.
-        :param speed_limits: how fast the tool may give way, for the same axes [m/s], [rad/s];
-            None = 0.05 and 0.2.
+        :param forces: forces along the compliant axes of the frame, 'x' 'y' 'z' [N], and torques
+            about them, 'rx' 'ry' 'rz' [Nm]; empty = no force, only watch for contact.
+        :param speed_limits: how fast the tool may give way along and about the same axes [m/s],
+            [rad/s]; None = 0.05 and 0.2.
         :param max_yield: how far the tool may give way along the compliant axes [m]; about them:
             ``max_yield_angle`` [rad].
         :param max_deviation: how far the tool may be off its path along the other axes [m]; about
             them: ``max_deviation_angle`` [rad]. For all four, 0 = the default.
         :param damping: of force mode, 0 to 1; ``gain_scaling``: 0 to 2.
-        :param zero_sensor: zero the force sensor before.
-        :param contact: whether the goal ends where the tool touches.
-        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
+        :param zero_sensor: zero the force sensor before the press.
+        :param contact: the effect of the tool's first contact, which can end the goal.
+        :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('press')
         limits = speed_limits or {}
@@ -195,7 +198,7 @@ class PathWithEvents(PathOfMotions):
 
         The motion to the next point begins where the tool is, and leads straight to that point.
 
-        :raises InvalidGoal: as :meth:`dwell`, or no press has begun at a point before.
+        :raises InvalidGoal: as for :meth:`dwell`, or no press has begun at an earlier point.
         """
         where, point = self._stop('end_press')
         begun = self._begun(lambda one: isinstance(one, Press))
@@ -205,9 +208,9 @@ class PathWithEvents(PathOfMotions):
 
     def dwell(self, time: float) -> Self:
         """
-        Make the arm stop at the last point and rest there for a time [s].
+        Make the arm stop at the last point and wait there for a time [s].
 
-        The durations of motions do not include it: everything that follows is later by this time.
+        The durations of motions do not include this time: all that follows is delayed by it.
 
         :raises InvalidGoal: there is no point, or the point has a blend or a twist of its own.
         """
@@ -222,9 +225,9 @@ class PathWithEvents(PathOfMotions):
         """
         Call a function of ``script_prelude`` at the last point, where the arm stops.
 
-        :param function: its name; a driver that does not have it refuses the path.
-        :param timeout: longest time until it returns [s].
-        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
+        :param function: the function's name; a driver without such a function refuses the path.
+        :param timeout: longest time until the function returns [s].
+        :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('call')
         numbers = tuple(float(argument) for argument in arguments)
@@ -241,15 +244,16 @@ class PathWithEvents(PathOfMotions):
         go_on: bool = False,
     ) -> Self:
         """
-        Make the arm stop at the last point and rest there until an input has a value.
+        Make the arm stop at the last point and wait there until an input has a value.
 
-        A :meth:`dwell` and the times of outputs at this point begin when the input has come.
+        A :meth:`dwell` and the times of outputs at this point begin when this wait ends.
 
         :param value: True or False for a digital input, the level of an analog one [A] or [V].
         :param timeout: longest wait [s].
         :param below: wait until an analog input is below the level, not at it or above.
-        :param go_on: go on if the input does not come; else the goal fails.
-        :raises InvalidGoal: as :meth:`dwell`, or there is no such input or level.
+        :param go_on: whether the motion goes on after the timeout; if not, the goal fails.
+        :raises InvalidGoal: as for :meth:`dwell`, there is no such input or level, or the point
+            already has a wait or a call.
         """
         where, point = self._stop('wait_for')
         wait = what.wait(float(value), timeout, below, go_on)
@@ -266,9 +270,9 @@ class PathWithEvents(PathOfMotions):
         """
         Set the payload at the last point, where the arm stops.
 
-        :param mass: [kg].
-        :param center_of_gravity: in the flange frame [m].
-        :raises InvalidGoal: as :meth:`dwell`, or a number must be a mistake.
+        :param mass: mass of the payload [kg].
+        :param center_of_gravity: its position in the flange frame [m].
+        :raises InvalidGoal: as for :meth:`dwell`, or a number is out of its range.
         """
         where, point = self._stop('payload')
         cog = vector(where, center_of_gravity, MAX_OFFSET)
@@ -287,8 +291,9 @@ class PathWithEvents(PathOfMotions):
         """
         Return the path with an event at the last point.
 
-        :param point: the last point as it is with the event.
-        :param event: begins at point 0; if it has an end, this is at point 1 for the check.
+        :param point: the last point, changed as the event requires.
+        :param event: the event, which begins at point 0. An event with an end has it at point 1,
+            so that it passes the check.
         """
         check_event(where, event)
         if type(event) in _METHODS:
@@ -296,7 +301,7 @@ class PathWithEvents(PathOfMotions):
         return self._with_point(-1, replace(point, events=(*point.events, event)))
 
     def _begun(self, is_wanted: Callable[[Any], bool]) -> tuple[int, Any] | None:
-        """Return the latest wanted event without an end, and the earlier point where it begins."""
+        """Return the point where the latest wanted event without an end begins, and the event."""
         for i in range(len(self) - 2, -1, -1):
             for event in self._points[i].events:
                 if type(event) in _METHODS and not event.last_waypoint and is_wanted(event):
@@ -314,7 +319,8 @@ class PathWithEvents(PathOfMotions):
         """
         Refuse events without an end.
 
-        :raises InvalidGoal: names the methods that begin and end the event.
+        :raises InvalidGoal: an event has no end; the text names the methods that set begin and
+            end.
         """
         for i, point in enumerate(self._points):
             for event in point.events:
@@ -327,7 +333,7 @@ class PathWithEvents(PathOfMotions):
                     )
 
     def _stop(self, name: str) -> tuple[str, PathPoint]:
-        """Return words for a method's place, and the last point as one where the arm stops."""
+        """Return a phrase for the place of a method call, and the last point with a stop there."""
         if not self._points:
             raise InvalidGoal(f'{name}()', 'comes before the first point', 'add a motion first')
         where, point = f'{name}() at point {len(self) - 1}', self._points[-1]

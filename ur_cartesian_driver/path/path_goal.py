@@ -20,11 +20,12 @@ from ur_cartesian_driver.path.path_numbers import NANOSECONDS, to_nanoseconds
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 
-#: The blend of a point on a process for which none is given [m], and the least time in it [s]: the
-#: robot leaves out a blend that it passes within one cycle, 8 ms on the slowest controller.
+#: The usual blend radius at both ends of a PROCESS motion for which none is given [m].
 PROCESS_BLEND = 0.002
+#: The least duration of such a blend [s]: the robot leaves out a blend that is shorter than one
+#: cycle, which is 8 ms on the slowest controller.
 _PROCESS_BLEND_TIME = 0.01
-#: The largest fraction of a segment that such a blend takes.
+#: The largest fraction of a segment that such a blend takes up.
 _PROCESS_BLEND_SHARE = 0.3
 
 
@@ -32,7 +33,7 @@ def goal_of_points(
     points: Sequence[PathPoint], settings: Goal, start: Pose | None, frame: str, tool: str
 ) -> GoalTable:
     """
-    Return the goal of points, with frames given by name only.
+    Return the goal with the given points; its frames are given by name only.
 
     :param settings: a goal without points, with the settings of the whole path.
     :param start: the pose at which the path begins, if it is known.
@@ -73,7 +74,7 @@ def goal_of_points(
 
 
 def settings_of(goal: Goal) -> Goal:
-    """Return a goal without points, with the settings of a goal that hold for its whole path."""
+    """Return the settings of a goal that hold for its whole path, as a goal without points."""
     events = {kind.field for kind in EVENT_KINDS.values()}
     others = {'waypoints', 'segments', 'frame_id', 'controlled_frame', *events}
     given = {each.name: getattr(goal, each.name) for each in goal_fields(Goal)}
@@ -86,7 +87,8 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
     """
     Return the points of a goal.
 
-    :raises InvalidGoal: its lists do not fit each other, so that it would be refused anyway.
+    :raises InvalidGoal: segments, times or events do not fit the points; planning would refuse
+        such a goal, too.
     """
     points, segments = tuple(goal.waypoints), tuple(goal.segments)
     if len(segments) not in (0, len(points)):
@@ -115,7 +117,7 @@ def points_of_goal(goal: Goal) -> tuple[PathPoint, ...]:
 
 
 def _events(goal: Goal) -> dict[int, list[Any]]:
-    """Return the events that happen or begin at each point, by its number."""
+    """Return the events that happen or begin at each point, by the number of the point."""
     found: dict[int, list[Any]] = {}
     for kind in EVENT_KINDS.values():
         for event in kind.of(goal):
@@ -139,9 +141,9 @@ def _nanoseconds(time: float) -> int:
 
 def _process_blend(points: Sequence[PathPoint], index: int, start: Pose | None) -> float:
     """
-    Return the radius of the blend at a point that has none; 0 if none is needed, or none fits.
+    Return the blend radius of a point for which none is given [m]; 0 if it gets no blend.
 
-    A blend is needed if the motion to the point or the one after it is a PROCESS motion.
+    It gets a blend if the motion to or from the point is a PROCESS motion, and if the blend fits.
     """
     if index + 1 == len(points):
         return 0.0

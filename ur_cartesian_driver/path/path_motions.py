@@ -44,16 +44,16 @@ from ur_cartesian_driver.path.path_points import (
 #: A place: a position x y z [m], or a pose.
 Place: TypeAlias = Sequence[float] | Pose
 
-#: A twist or an acceleration of a spline point that the driver chooses to fit the neighbours.
+#: For a spline point: a twist or an acceleration that the driver chooses to fit the neighbours.
 FREE: Vector6 = (nan,) * 6
 
-#: Larger numbers must be mistakes, mostly of the unit. Frames other than the base may be far from
-#: the robot.
+#: Larger coordinates [m], blends [m] and durations [s] must be mistakes, mostly of the unit. Other
+#: frames than the base may be far from the robot.
 MAX_COORDINATE_OF_BASE = 3.0
 MAX_COORDINATE = 50.0
 MAX_BLEND = 0.5
 MAX_DURATION = 3600.0
-#: By the unit of a motion's speed: the largest speed and acceleration.
+#: The largest speed and acceleration of a motion, by the unit of its speed.
 _TOOL, _JOINTS, _FRACTION = 'm/s', 'rad/s', 'of the limits of the robot'
 _MAX_SPEED = {_TOOL: (5.0, 100.0), _JOINTS: (20.0, 200.0), _FRACTION: (1.0, 1.0)}
 
@@ -61,7 +61,7 @@ _BASE_FRAMES = ('', 'base', 'base_link')
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 _FREE_AXES = {axis.name.lower(): axis for axis in FreeAxis if axis}
-#: Fields of a segment that methods set by other parameters; the other fields are given by name.
+#: Segment fields for which methods have parameters with other names; the rest is given by name.
 _OWN_WORDS = {
     *('type', 'blend_radius', 'dwell', 'velocity', 'acceleration'),
     *('via', 'via_posture', 'arc_mode', 'free_axis', 'free_min', 'free_max'),
@@ -97,10 +97,10 @@ class PathOfMotions:
         """
         Begin a path.
 
-        :param start: where the arm stands; None = not known.
-        :param frame: the frame of all poses, as ``header.frame_id`` of a goal.
+        :param start: where the arm is when the path begins; None = not known.
+        :param frame: the frame of all poses, like ``header.frame_id`` of a goal.
         :param tool: the controlled frame; empty = the robot's active TCP.
-        :raises InvalidGoal: a name is no text, or the start is no pose within an arm's reach.
+        :raises InvalidGoal: a name is no text, or the start is no pose or too far away.
         """
         for name, value in (('frame', frame), ('tool', tool)):
             if not isinstance(value, str):
@@ -131,12 +131,12 @@ class PathOfMotions:
 
     @property
     def start(self) -> Pose | None:
-        """The pose at which the path begins; None if the path does not say."""
+        """The pose at which the path begins; None if it is not known."""
         return None if self._start is None else self._start.pose
 
     @property
     def end(self) -> Pose | None:
-        """The pose of the last point, or the start."""
+        """The pose of the last point, or the start if there are no points."""
         return self._points[-1].pose if self._points else self.start
 
     @property
@@ -166,10 +166,13 @@ class PathOfMotions:
         """
         Set speeds and blends of the motions that follow, like a feed rate; None = as before.
 
-        :param speed: of the tool on lines, arcs and PROCESS [m/s], with ``acceleration`` [m/s^2].
-        :param blend: radius around each point [m]; 0 = stop there.
-        :param joint_speed: of the leading axis in joint motions [rad/s], [rad/s^2].
-        :param turn_speed: of the tool where it only turns [rad/s], [rad/s^2].
+        :param speed: speed of the tool on lines, arcs and PROCESS motions [m/s]; ``acceleration``:
+            likewise [m/s^2].
+        :param blend: blend radius at each point [m]; 0 = stop there.
+        :param joint_speed: speed of the leading axis in joint motions [rad/s];
+            ``joint_acceleration``: likewise [rad/s^2].
+        :param turn_speed: speed of the tool in motions that only turn it [rad/s];
+            ``turn_acceleration``: likewise [rad/s^2].
         :param fields: other fields of a segment, by their names in ``MotionSegment``.
         :raises InvalidGoal: a value is negative, or looks like millimetres or degrees.
         """
@@ -192,14 +195,14 @@ class PathOfMotions:
         start = path._start
         if start is None or self._points or 'blend' not in given:
             return path
-        segment = replace(start.segment, blend_radius=given['blend'])  # for the reversed path
+        segment = replace(start.segment, blend_radius=given['blend'])  # for reversed()
         start = replace(start, segment=segment, feed_blend=True, auto_blend=False)
         return path._with(_start=start)
 
     def _with_segment(self, segment: Segment) -> Self:
-        """Return the path with another segment for the motions that follow."""
+        """Return the path with other segment fields for the motions that follow."""
         start = self._start
-        if start is not None and not self._points:  # for the reversed path
+        if start is not None and not self._points:  # for reversed()
             own = {**point_fields(segment), 'blend_radius': start.segment.blend_radius}
             start = replace(start, segment=replace(start.segment, **own))
         return self._with(_feed=replace(self._feed, segment=segment), _start=start)
@@ -210,7 +213,7 @@ class PathOfMotions:
 
         :param axis: ``x``, ``y`` or ``z``; None = no axis is free any longer.
         :param low: least rotation from the orientation of each point [rad]; ``high``: greatest
-            rotation; if neither is given, any is allowed.
+            rotation. If neither is given, any rotation is allowed.
         :raises InvalidGoal: there is no such axis, or the range is empty or too large.
         """
         where = f'free() after {len(self)} points'
@@ -255,13 +258,14 @@ class PathOfMotions:
         Add a straight line.
 
         :param place: where the line ends: a pose, or a position.
-        :param orientation: at its end; None = that of the pose, or of the point before.
-        :param blend: replaces the one of :meth:`at`, as do ``speed`` and ``acceleration``.
-        :param duration: of this motion [s]; a path has durations everywhere, or nowhere.
-        :param posture: joint positions near which to arrive, by joint name [rad].
-        :param optimized: use optimovel, where speed and acceleration are fractions of the limits.
-        :param fields: other fields of its segment, by their names in ``MotionSegment``.
-        :raises InvalidGoal: a value must be a mistake.
+        :param orientation: orientation at the end of the line; None = that of the pose, or of the
+            point before.
+        :param blend: replaces the blend of :meth:`at`; likewise ``speed`` and ``acceleration``.
+        :param duration: duration of this motion [s]; in a path, all motions have one, or none.
+        :param posture: joint positions near which the arm is to arrive, by joint name [rad].
+        :param optimized: use optimovel; speed and acceleration are then fractions of the limits.
+        :param fields: other fields of the segment, by their names in ``MotionSegment``.
+        :raises InvalidGoal: a value is missing, is out of its range or contradicts another one.
         """
         kind = SegmentType.OPTIMIZED_LINEAR if optimized else SegmentType.LINEAR
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
@@ -281,7 +285,7 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add a joint motion, in which the path of the tool is not straight; as :meth:`line`.
+        Add a joint motion, on which the tool does not move straight; otherwise like :meth:`line`.
 
         ``speed`` and ``acceleration`` are those of the leading axis [rad/s], [rad/s^2].
         """
@@ -302,10 +306,10 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add a straight line at constant speed with rounded corners (movep); as :meth:`line`.
+        Add a straight line at constant speed (movep); parameters as for :meth:`line`.
 
-        Without a given blend it gets one of about 2 mm, because the arm would stop at its point;
-        ``blend=0`` means a stop. An arc before it gets such a blend, too.
+        If no blend is given, the motion gets one of about 2 mm, because the arm would otherwise
+        stop at its point; ``blend=0`` means a stop. An arc before it gets such a blend, too.
         """
         options = MotionOptions(blend, speed, acceleration, duration, posture, fields)
         return self._move(SegmentType.PROCESS, place, orientation, options)
@@ -326,7 +330,7 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add an arc through a point on the way; as :meth:`line`.
+        Add an arc through a point on the way; other parameters as for :meth:`line`.
 
         :param via: a position on the arc, or a pose (whose orientation is only used with
             ``via_posture``).
@@ -384,13 +388,13 @@ class PathOfMotions:
         **fields: Any,
     ) -> Self:
         """
-        Add a point of a spline; either all points of a path are of a spline, or none is.
+        Add a point of a spline; if a path has such points, it has no others.
 
-        :param duration: from the point before [s].
-        :param twist: linear [m/s] and angular [rad/s] velocity there, in the frame of the path, or
-            the linear one alone; NaN = the driver chooses, 0 = the arm stops.
+        :param duration: time from the point before [s].
+        :param twist: linear [m/s] and angular [rad/s] velocity at the point, in the frame of the
+            path, or the linear one alone; NaN = the driver chooses, 0 = the arm stops.
         :param acceleration: likewise [m/s^2], [rad/s^2].
-        :raises InvalidGoal: as :meth:`line`.
+        :raises InvalidGoal: as for :meth:`line`, or the path has other motions.
         """
         where = self._where('spline')
         if self._points and not self._points[-1].in_spline:
@@ -432,9 +436,10 @@ class PathOfMotions:
         Add a motion from the point before by a distance [m] and a turn.
 
         :param turn: a rotation, made by :func:`~.orientations.axis_angle` for example.
-        :param of_tool: take distance and turn along the axes of the tool, not of the frame.
-        :param motion: ``line``, ``process`` or ``joint``; all else as in that method.
-        :raises InvalidGoal: the path has neither a point nor a start, or as :meth:`line`.
+        :param of_tool: whether distance and turn are along the axes of the tool, not of the frame.
+        :param motion: ``line``, ``process`` or ``joint``; the other parameters are those of this
+            method.
+        :raises InvalidGoal: as for :meth:`line`, or the path has neither a point nor a start.
         """
         if motion not in _BY_NAME:
             raise InvalidGoal(
@@ -464,7 +469,7 @@ class PathOfMotions:
         return f'point {len(self)} ({kind})'
 
     def _pose(self, where: str, place: Place, orientation: Quaternion | None) -> Pose:
-        """Return the pose of a place; without an orientation, that of the point before holds."""
+        """Return the pose of a place; None = its own orientation, or that of the point before."""
         before = place if isinstance(place, Pose) else self.end
         position = place.position if isinstance(place, Pose) else place
         if orientation is None:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check the numbers that people write, and refuse mistakes with a sentence."""
+"""Check the numbers that users write, and refuse mistakes with a sentence that explains them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 
 NANOSECONDS = 1_000_000_000
-#: Twists and accelerations, and joint positions, that are larger than these must be mistakes.
+#: Larger numbers in twists and accelerations, and larger joint positions [rad], must be mistakes.
 _MAX_RATE, _MAX_JOINT = 100.0, 25.2
-#: Largest difference from 1 of the square of a quaternion that is accepted, and of an exact one.
+#: A quaternion is accepted, or exact, if its squared length differs from 1 by at most this.
 _UNIT, _EXACT_UNIT = 1e-3, 1e-12
 
 
 def amount(where: str, name: str, value: float | None, bound: float, unit: str) -> float | None:
-    """Return a number from 0 to a bound; None stays None."""
+    """Return a value that is a number from 0 to a bound; None stays None."""
     if value is None:
         return None
     number = any_number(where, name, value)
@@ -41,7 +41,7 @@ def any_number(where: str, name: str, value: Any) -> float:
 
 
 def vector(where: str, values: Sequence[float], bound: float, prefix: str = '') -> Vector3:
-    """Return three numbers that are not too large."""
+    """Return three numbers, none of which is larger than a bound."""
     try:
         x, y, z = (float(value) for value in values)
     except (TypeError, ValueError):
@@ -78,7 +78,7 @@ def unit_quaternion(where: str, q: Sequence[float]) -> Quaternion:
 
 
 def six_numbers(where: str, values: Sequence[float]) -> Vector6:
-    """Return three linear and three angular numbers; these are free (NaN) if not given."""
+    """Return three linear and three angular numbers; angular ones not given are free (NaN)."""
     try:
         numbers = [float(value) for value in values]
     except (TypeError, ValueError):

@@ -25,17 +25,17 @@ SAME_POSITION, SAME_ANGLE = 1e-6, 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feed:
-    """Settings of motions, which hold until they are changed; 0 = the driver's parameter."""
+    """Settings of motions, which hold until they are changed; 0 = the driver's default."""
 
     speed: float = 0.0
     acceleration: float = 0.0
-    #: None = no blend, but a small one at PROCESS points.
+    #: None = no blend, except a small one before and after PROCESS motions.
     blend: float | None = None
     joint_speed: float = 0.0
     joint_acceleration: float = 0.0
     turn_speed: float = 0.0
     turn_acceleration: float = 0.0
-    #: The other fields of the segments of motions.
+    #: The other segment fields of the motions.
     segment: Segment = field(default_factory=Segment)
 
 
@@ -47,13 +47,14 @@ class PathPoint:
     segment: Segment = field(default_factory=Segment)
     #: Duration of the motion [ns]; 0 = the speed decides.
     duration: int = 0
-    #: The events that happen or begin here, as if this were point 0. An event that has to end, but
-    #: whose last waypoint is 0, has no end yet.
+    #: The events that happen or begin here, with waypoints numbered as if this were point 0. An
+    #: event that has to end, but whose last waypoint is 0, has no end yet.
     events: tuple[Any, ...] = ()
-    #: Whether the blend comes from the feed (the last point of a path then has none), and whether
-    #: the blend is chosen when the path is finished.
+    #: Whether the blend comes from the feed; if so, it is left out at the last point of a path.
     feed_blend: bool = False
+    #: Whether the blend is chosen when the path becomes a goal.
     auto_blend: bool = False
+    #: Whether a spline leads to the point.
     in_spline: bool = False
 
     @property
@@ -71,15 +72,15 @@ class MotionOptions:
     acceleration: float | None
     duration: float | None
     posture: Mapping[str, float] | None
-    #: Other fields of its segment.
+    #: Other fields of the segment.
     fields: Mapping[str, Any]
 
 
 def with_fields(where: str, record: T, fields: Mapping[str, Any]) -> T:
     """
-    Return a dataclass of a goal with other values in some fields.
+    Return a goal or a segment with other values in some of its fields.
 
-    :param where: the name of the dataclass in a refusal.
+    :param where: the name of the goal or segment in a refusal.
     :raises InvalidGoal: a field cannot have the value.
     """
     kind: type[T] = type(record)
@@ -99,7 +100,7 @@ def point_fields(segment: Segment) -> dict[str, Any]:
 
 
 def moved(point: PathPoint, T: Pose) -> PathPoint:
-    """Return a point moved by a pose of its frame."""
+    """Return a point with its poses and rates transformed by a pose in its frame."""
     waypoint, via = point.waypoint, point.segment.via
     return replace(
         point,
@@ -122,7 +123,7 @@ def _turned(rates: Vector6, q: Quaternion) -> Vector6:
 
 
 def seen_from(point: PathPoint, T_tool_new: Pose, before: Pose | None, where: str) -> PathPoint:
-    """Return a point as a frame on the tool passes it, at ``T_tool_new`` in the tool's frame."""
+    """Return the point that a frame on the tool passes; ``T_tool_new`` is this frame's pose."""
     waypoint, segment = point.waypoint, point.segment
     offset = rotate(waypoint.pose.quaternion, T_tool_new.position)
     if segment.via is not None:
@@ -161,9 +162,9 @@ def is_same(a: Pose, b: Pose) -> bool:
 
 def merged(first: Goal, second: Goal) -> Goal:
     """
-    Return the settings of two paths as one.
+    Return the combined settings of two paths.
 
-    :raises InvalidGoal: both paths set a field, to different values.
+    :raises InvalidGoal: the paths set the same field to different values.
     """
     usual, values = Goal(waypoints=()), {}
     for each in goal_fields(Goal):

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Make the goal that is left of a goal that was stopped on its way.
+Make a goal from what remains of a goal that was stopped on its way.
 
 The resumed goal approaches a place on the path some way before the stop (the overlap), puts the
-outputs in the state that they have there, and follows the original path to its end. The rest of a
-line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which the
-arm gathers speed within the overlap.
+outputs in the state that they have there, and follows the original path to its end. What remains
+of a line is a line, of an arc an arc of the same circle, and of a spline the same curve, on which
+the arm gathers speed within the overlap.
 
-A place on a path is a number: ``k + u`` is on the segment to point k, at the fraction u of it.
+A place on a path is a number: ``k + u`` is at the fraction u of the segment to point k.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from ur_cartesian_driver.planning.spline.spline_points import tool_points
 #: How far before the stop the path is resumed, and how far from the path the approach begins,
 #: backwards along the tool's z axis [m].
 OVERLAP, APPROACH = 0.005, 0.03
-#: In a goal with times: time to the begin of the approach [s], and speed of the approach [m/s].
+#: In a goal with times: time until the approach begins [s], and speed of the approach [m/s].
 APPROACH_TIME, APPROACH_SPEED = 4.0, 0.03
 #: Factor on blend radii: on arcs, blends begin somewhat farther from their points.
 _BLEND_MARGIN = 1.05
-#: A rest of a segment that is shorter than this [m] is left out.
+#: If less than this remains of a segment [m], it is left out.
 _NOTHING = 1e-5
-#: The least length, and the least height over its chord, of the rest of an arc [m].
+#: The least length, and the least height above the chord, of what remains of an arc [m].
 _MIN_ARC, _MIN_HEIGHT = 4e-3, 3e-5
 #: The least time in which the arm gathers speed on a spline [s], and the number of points in it.
 _RAMP_TIME, _RAMP_POINTS = 0.4, 8
@@ -62,12 +62,12 @@ _JOINT_MOTIONS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResumedGoal:
-    """The goal that is left of an original goal, which was stopped."""
+    """What remains of an original goal, which was stopped, as a goal."""
 
     goal: Goal
-    #: The place on the original path where it begins.
+    #: The place on the original path where this goal begins.
     begin: PathPlace
-    #: (n,) the places of its points on the original path, as numbers; see the module.
+    #: (n,) the places of this goal's points on the original path, as numbers; see the module.
     places: tuple[float, ...]
 
     def original(self, place: PathPlace) -> PathPlace:
@@ -86,17 +86,17 @@ def resume(
     start: Pose | None = None,
 ) -> ResumedGoal:
     """
-    Return the goal that is left of a goal that was stopped at a place.
+    Return what remains of a goal that was stopped at a place, as a goal.
 
     :param place: of the stop, as the outcome of the goal reports it.
-    :param overlap: how far before that place the path is resumed [m]; farther if this would be in
-        a blend, but never before a joint motion or the first point.
-    :param approach: distance from which the tool comes down to the path, backwards along its own z
-        axis [m]; 0 = straight to the path.
+    :param overlap: how far before that place the path is resumed [m]; farther if a blend is there,
+        but never before the beginning of a joint motion or of the path.
+    :param approach: distance from which the tool comes down to the path, backwards along the z
+        axis of the tool [m]; 0 = straight to the path.
     :param start: pose of the tool when the goal began, in the frame of the goal; needed only for a
         spline whose first twist is NaN.
-    :raises InvalidGoal: the goal is kept open, its frame moves with the arm, or a number is out of
-        its range.
+    :raises InvalidGoal: the goal is kept open, its frame moves with the arm, it is a spline with
+        dwells, or a number is out of its range.
     """
     return _Resumption(goal, place, overlap, approach, start).resumed()
 
@@ -118,7 +118,7 @@ class _Resumption:
         self.begin = self._begin(place, overlap)
 
     def resumed(self) -> ResumedGoal:
-        """Return the rest of the goal."""
+        """Return the resumed goal."""
         n, k = len(self.points), min(floor(self.begin), len(self.points) - 1)
         if k == self.begin == self.stopped > 0.0:
             k -= 1  # the arm rests at a point, and is not on its way to the next one
@@ -180,7 +180,7 @@ class _Resumption:
         """Return the segments from k on, the first of which begins wherever the arm is."""
         first, *rest = self.segments[k:]
         # The arm may be in the blend already. A goal that demands a speed keeps the blend, because
-        # the tool would stop without it.
+        # without it the tool would stop.
         if self.stopped > k and not self.goal.min_speed_fraction:
             first = replace(first, blend_radius=0.0)
         return [first, *rest]
@@ -217,7 +217,7 @@ class _Resumption:
             k, u = k - 1, 1.0
 
     def _enough_of_an_arc(self, k: int, u: float) -> float:
-        """Return a fraction, reduced on an arc so that the rest of it determines a circle."""
+        """Return a fraction, reduced on an arc until what remains of it determines a circle."""
         if self.segments[k].type is not SegmentType.CIRCULAR:
             return u
         arc = self._arc(k)
@@ -259,7 +259,7 @@ class _Resumption:
         return self._curve_start(k).interpolate(self.points[k].pose, u)
 
     def _cut(self, k: int, u: float) -> Segment:
-        """Return the rest of a segment."""
+        """Return what remains of a segment after a fraction of it."""
         segment = self.segments[k]
         if segment.type is not SegmentType.CIRCULAR:
             return segment
@@ -268,7 +268,7 @@ class _Resumption:
     # -- the approach ----------------------------------------------------------------------------
 
     def _approach(self, k: int, u: float) -> tuple[list[Waypoint], list[Segment], list[float]]:
-        """Return the points and segments up to the place, at rest, and the points' places."""
+        """Return points and segments up to the place, where the arm rests, and their places."""
         there = self._pose(k, u)
         poses = [there]
         if self.approach > 0.0:
@@ -277,7 +277,7 @@ class _Resumption:
         if self.spline is None and (len(poses) > 1 or self.goal.min_speed_fraction):
             kinds[0] = SegmentType.JOINT
         if self.goal.min_speed_fraction and self.spline is None:
-            kinds[-1] = SegmentType.JOINT  # a rest between lines would miss min_speed_fraction
+            kinds[-1] = SegmentType.JOINT  # a stop between lines would miss min_speed_fraction
         cut = self.segments[k]
         free = Segment(free_axis=cut.free_axis, free_min=cut.free_min, free_max=cut.free_max)
         return (
@@ -292,14 +292,14 @@ class _Resumption:
         return [APPROACH_TIME, APPROACH_TIME + max(0.5, self.approach / APPROACH_SPEED)]
 
     def _times(self, k: int, u: float, approach: int = 0) -> list[float]:
-        """Return the times of all points of a goal of moves, those of an approach first."""
+        """Return the times of all points of a goal of moves; those of the approach come first."""
         if not self.timed:
             return [0.0] * (len(self.points) - k + approach)
         arrive = [point.time for point in self.points]
         took = arrive[k] - (arrive[k - 1] if k else 0.0)
         dwell = self.segments[k - 1].dwell if k else 0.0
         times = self._approach_times() if approach else []
-        # From rest to rest, at the same acceleration, the time is as the root of the distance.
+        # From rest to rest at the same acceleration, the time grows as the root of the distance.
         took = sqrt(1.0 - u) * (took - dwell)
         end = times[-1] + took if times else max(took, APPROACH_TIME * (k > 0))
         return [*times, *(round(end + time - arrive[k], _DIGITS) for time in arrive[k:])]
@@ -307,7 +307,7 @@ class _Resumption:
     # -- splines ---------------------------------------------------------------------------------
 
     def _resumed_spline(self, points: list[Waypoint]) -> ResumedGoal:
-        """Return the rest of a spline, on which the arm first gathers speed from rest."""
+        """Return the resumed goal of a spline, on which the arm first gathers speed from rest."""
         assert self.spline is not None
         spline, zero = self.spline, self._approach_times()[: len(points)]
         points = [replace(point, time=time) for point, time in zip(points, zero, strict=True)]
@@ -340,7 +340,7 @@ class _Resumption:
     # -- events ----------------------------------------------------------------------------------
 
     def _time_since(self, waypoint: int, field: str, offset: float) -> float:
-        """Return the time from a waypoint to the place [s]; 0 if the offset does not need it."""
+        """Return the time from a waypoint to the place [s]; 0 if the offset is not positive."""
         if offset <= 0.0:
             return 0.0
         if self.timed:
@@ -366,7 +366,7 @@ class _Resumption:
 
 
 class _Spline:
-    """The curve of a spline in the frame of its goal, from its first point or the start on."""
+    """The curve of a spline goal in its frame, from the start if known, else from point 0."""
 
     def __init__(self, table: GoalTable, start: Pose | None) -> None:
         points = table.waypoints
@@ -394,7 +394,7 @@ class _Spline:
 
     @property
     def end(self) -> float:
-        """The time of its last point [s]."""
+        """The time of the last point [s]."""
         return float(self.knots[-1])
 
     def time(self, place: float) -> float:
@@ -426,10 +426,11 @@ class _Spline:
 
     def waypoint(self, time: float, at: float, rate: float, gain: float) -> Waypoint:
         """
-        Return the point of the curve at a time [s], for a goal that passes it at another rate.
+        Return the point of the curve at a time [s], for a goal that follows it at another rate.
 
         :param at: time of the point in that goal [s].
-        :param rate: time of the curve that passes in each second; ``gain``: its change [1/s].
+        :param rate: time of the curve that passes in each second of that goal; ``gain``: change of
+            the rate [1/s].
         """
         assert self.curve is not None
         rows = self.curve.at(np.array([time]))
@@ -456,7 +457,7 @@ def _check(goal: Goal, place: PathPlace, overlap: float, approach: float) -> Non
             'is true, so the goal does not hold all points of its path',
             'send what is left of the path as a goal of its own',
         )
-    # The name may have a prefix. A goal that has the pose of its frame keeps this pose.
+    # The name may have a prefix. If the goal has the pose of its frame, this pose is kept.
     if goal.frame_id.endswith(FRAMES_OF_TOOL) and goal.T_base_frame == IDENTITY:
         raise InvalidGoal(
             'trajectory.header.frame_id',

@@ -19,12 +19,12 @@ def mm(x: float, y: float, z: float, /) -> Vector3: ...
 
 
 def mm(x: float, y: float | None = None, z: float | None = None, /) -> float | Vector3:
-    """Return a length, or a position x, y, z, given in millimetres [m]."""
+    """Convert a length, or a position x, y, z, from millimetres to metres."""
     if y is None or z is None:
         return x / 1000.0
     return (x / 1000.0, y / 1000.0, z / 1000.0)
 
 
 def deg(value: float, /) -> float:
-    """Return an angle given in degrees [rad]."""
+    """Convert an angle from degrees to radians."""
     return radians(value)

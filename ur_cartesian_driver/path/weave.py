@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.path.centre_line import arc, CentreLine, line, RestToRest, Stroke
 from ur_cartesian_driver.path.path_points import PathPoint, SAME_POSITION
 
-#: Points on each wave, and the time step of the differences that give their twists [s].
+#: Number of points on each wave; time step of the differences that give their twists [s].
 _POINTS_PER_WAVE = 8
 _STEP = 1e-5
 
@@ -23,7 +23,8 @@ def strokes(start: Pose, points: Sequence[PathPoint]) -> list[Stroke]:
     """
     Return the lines and arcs of a path.
 
-    :raises InvalidGoal: it has corners, other motions, outputs, durations, postures or dwells.
+    :raises InvalidGoal: the path has corners, other motions than lines and arcs, events,
+        durations, postures or dwells.
     """
     found: list[Stroke] = []
     before = start
@@ -61,7 +62,7 @@ def woven(
     centre: CentreLine, motion: RestToRest, amplitude: float, waves: int
 ) -> Iterator[tuple[Pose, float, Vector6]]:
     """
-    Yield pose, time [s] and twist of points on waves along a line.
+    Yield pose, time [s] and twist of the points on waves along a centre line.
 
     :raises ZeroDivisionError: the tool points along the line.
     """

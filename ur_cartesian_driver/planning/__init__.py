@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ['PlanningOptions', 'check', 'plan', 'plan_joint_goal']
 
-# Code that composes a path or sends a goal needs the rules for its fields, but no planner.
+# Loaded on first use: code that only composes a path or sends a goal needs no planner.
 __getattr__ = lazy_names(
     __name__,
     {

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check that the tool of a goal is nowhere slower than demanded (``min_speed_fraction``)."""
+"""Check that the tool is nowhere slower than its goal demands (``min_speed_fraction``)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUNDING = 1e-6
 
 
 def slower_by(goal: Goal) -> float:
-    """Return the fraction by which the tool must be slower than asked for a stretch to be slow."""
+    """Return the least speed deficit of a slow stretch, as a fraction of the asked speed."""
     return min(SLOWER_BY, 1.0 - goal.min_speed_fraction + _ROUNDING)
 
 
@@ -30,7 +30,7 @@ def check_min_speed(goal: Goal, stretches: Sequence[SlowStretch]) -> None:
     Refuse a goal whose tool is slower than demanded.
 
     :raises JointLimitExceeded: joint limits make the tool slow.
-    :raises InvalidGoal: the path or the numbers of the goal make it slow.
+    :raises InvalidGoal: the path or the numbers of the goal make the tool slow.
     """
     counted = [each for each in stretches if each.counts]
     worst = min(counted, key=lambda each: each.lowest / each.asked, default=None)
@@ -50,8 +50,8 @@ def unknown_speed_remark(goal: Goal, blends: Sequence[int], free: Sequence[int])
     """
     Return the remark that names the motions whose tool speed is not known, and so not checked.
 
-    :param blends: the points with blends.
-    :param free: the points of joint and OPTIMIZED motions.
+    :param blends: the points with blends in which the robot chooses its speed.
+    :param free: the points to which joint and OPTIMIZED motions lead.
     """
     parts = [
         f'in the blends at {name_points(blends)}, where the robot chooses its speed'

@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.parameter_fields import check_parameters, D
 from ur_cartesian_driver.program.prelude import NO_PRELUDE, Prelude
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
-#: The largest number of points, and the largest clearance [m], that make sense.
+#: Upper bounds of the parameters max_points, and min_clearance [m].
 MAX_POINTS, MAX_CLEARANCE = 1_000_000, 1.0
 
 
@@ -38,28 +38,29 @@ class PlanningOptions:
     :raises ValueError: an option is not in its range.
     """
 
-    #: Largest number of points. 20,000 points arrive within milliseconds in flat arrays (packed),
-    #: within 2 s as separate messages.
+    #: Largest number of points of a goal. 20,000 points arrive within milliseconds in flat arrays
+    #: (packed), within 2 s as separate messages.
     max_points: Annotated[int, Range(1, MAX_POINTS)] = 100_000
     #: Largest age of a goal's header.stamp on arrival [s].
     stamp_tolerance: Annotated[float, Range(0.0, 3600.0)] = 1.0
-    #: Largest distance of the TCP from a first point at time 0 [m]: the robot must stand there.
+    #: Largest distance of the TCP from a first point whose time is 0 [m]: the robot must already
+    #: be there.
     start_tolerance_position: Annotated[float, Range(0.0, 1.0)] = 0.001
-    #: Largest angle of the TCP from a first point at time 0 [rad].
+    #: Largest angle of the TCP from a first point whose time is 0 [rad].
     start_tolerance_angle: Annotated[float, Range(0.0, 3.2)] = 0.01
-    #: Largest distance of the tool to the first point [m]; 0.0: no limit. Catches poses in a wrong
-    #: frame or unit.
+    #: Largest distance of the tool from the first point [m]; 0.0: no limit. This catches poses in
+    #: a wrong frame or unit.
     max_approach_distance: Annotated[float, Range(0.0, 10.0)] = 0.5
-    #: Largest speed of the TCP [m/s]; 0.0: no limit. Motions without times are slowed down to it;
-    #: for timed ones that need more, see on_too_fast. 0.25 m/s is the usual limit for working next
-    #: to an arm; raise it when you know your cell.
+    #: Largest speed of the TCP [m/s]; 0.0: no limit. Motions without times are slowed down to this
+    #: speed; for timed motions that need more, see on_too_fast. 0.25 m/s is the usual limit for
+    #: working next to an arm; raise it when you know your cell.
     max_tool_speed: Annotated[float, Range(0.0, 10.0)] = 0.25
     #: What to do if the times of a goal need more speed than the limits allow: refuse the goal, or
     #: slow it down.
     on_too_fast: Literal['refuse', 'slow'] = 'refuse'
     #: What to do if a line or arc cannot arrive in the required posture, or passes a singularity,
-    #: the end of a joint's range or poses out of reach. refuse: refuse the goal. movej: go to its
-    #: end by a joint motion; the path is then not straight.
+    #: the end of a joint's range or poses out of reach. refuse: refuse the goal. movej: replace
+    #: the line or arc by a joint motion to its end; the path is then not straight.
     on_posture_change: Literal['refuse', 'movej'] = 'refuse'
     #: What to do if the arm comes closer to itself than min_clearance: 'off' (in quotes: YAML
     #: reads the bare word as false), warn (in the report), refuse, or auto: refuse for the models
@@ -70,22 +71,22 @@ class PlanningOptions:
     #: Smallest distance of the arm to itself [m]. An arm differs from its model by some
     #: millimetres.
     min_clearance: Annotated[float, Range(0.0, MAX_CLEARANCE)] = 0.005
-    #: Radius of a cylinder from flange to TCP that stands for the tool, for self_collision and
-    #: workspace_planes [m]; 0.0: no tool.
+    #: Radius of the cylinder from flange to TCP that represents the tool in the checks of
+    #: self_collision and workspace_planes [m]; 0.0: no tool.
     tool_radius: Annotated[float, Range(0.0, 1.0)] = 0.0
-    #: Each 'name x y z nx ny nz [margin]' [m]: planes that neither the arm beyond its base, nor
-    #: the tool, nor the TCP may cross; a point on the plane, its normal, which points to the
-    #: allowed side (both in base, not base_link), and the distance to keep. Goals that cross one
-    #: are refused. Empty texts are skipped.
+    #: Planes that neither the arm beyond its base, nor the tool, nor the TCP may cross, each
+    #: 'name x y z nx ny nz [margin]' [m]: a point on the plane, the normal, which points to the
+    #: allowed side (both in base, not base_link), and the distance to keep. Goals that cross a
+    #: plane are refused. Empty texts are skipped.
     #:
     #: Example: ['table 0 0 0 0 0 1', 'wall 0 0.6 0 0 -1 0 0.05']
     workspace_planes: tuple[str, ...] = ()
-    #: Each 'kind pin value [current | voltage] [restore]': the value that an output takes when a
-    #: goal or live session ends other than by success, and when the arm stops in a pause or a
-    #: protective stop. kind is standard_digital, configurable_digital, tool_digital or
-    #: standard_analog (value: fraction of the range). restore: the output gets its value back
-    #: after a pause; without it, a pause that changed the output ends the goal. A goal may name
-    #: more outputs, and other values for these. Empty texts are skipped.
+    #: Values that outputs take when a goal or live session ends without success, and when the arm
+    #: stops in a pause or a protective stop, each 'kind pin value [current | voltage] [restore]'.
+    #: kind is standard_digital, configurable_digital, tool_digital or standard_analog (value:
+    #: fraction of the range). restore: the output gets its previous value back after a pause;
+    #: without it, a pause that changed the output ends the goal. A goal may name more outputs, and
+    #: other values for these. Empty texts are skipped.
     #:
     #: Example: ['standard_digital 3 0', 'standard_analog 0 0.0 current']
     safe_outputs: tuple[str, ...] = ()
@@ -149,8 +150,8 @@ class PlanningOptions:
     #: 0.0: no limit.
     goal_tolerance_angular_acceleration: Annotated[float, Range(0.0, 1000.0)] = 0.0
 
-    #: Angular speed of the tool on lines for each m/s of their speed [rad/s]: 4 was recorded once,
-    #: 1 is what the manual says.
+    #: Angular speed at which the robot turns the tool on lines, for each m/s of their speed
+    #: [rad/s]: 4 was recorded once, 1 is the value in the manual.
     turn_ratio: Annotated[float, Range(1.0, 4.0)] = 4.0
 
     #: Speed of the tool on lines and arcs [m/s].
@@ -193,7 +194,7 @@ class PlanningOptions:
     max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
     #: Largest acceleration of a joint that the times of a goal may need [rad/s^2].
     max_joint_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
-    # The least tolerance is the resolution of the joint positions on the wire.
+    # The lower bound of spline_tolerance is the resolution of the joint positions on the wire.
     #: Largest distance of the tool from the curve through the points of SPLINE and SERVO goals
     #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value needs more
     #: pieces on the wire.
@@ -217,7 +218,7 @@ class PlanningOptions:
             self,
             dialect=settings.dialect,
             prelude=settings.prelude,
-            # An older program may skip the command, and would then move the wrong TCP.
+            # An older program may ignore the command that sets the TCP; the wrong TCP would move.
             allow_tcp_change=self.allow_tcp_change and settings.dialect.is_own,
         )
 

@@ -29,11 +29,11 @@ def place_outputs(
     Return the segments with the outputs that are switched during the motion, in order of time.
 
     :param reference: the path of the TCP, with the times of the segments.
-    :param events: the output events by goal field; their waypoints are numbered as the segments.
-    :param blend_halves: the time in the first half of the blend after each segment [s]; None =
+    :param events: the output events by goal field, with the waypoint numbers of ``segments``.
+    :param blend_halves: duration of the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].
-    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
+    :raises InvalidGoal: no motion leads to an event, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
@@ -62,5 +62,5 @@ def place_outputs(
 
 
 def _waiting(records: Sequence[OutputRecord]) -> int:
-    """Return the number of records that wait for a trigger pose; speed laws do, too."""
+    """Return the number of records that wait for a trigger pose, speed laws included."""
     return sum(isinstance(each, SpeedLaw) or each.trigger_pose is not None for each in records)

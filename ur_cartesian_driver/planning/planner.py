@@ -4,13 +4,13 @@
 Plan a goal: choose the primitives, and refuse goals that the arm cannot execute.
 
 :func:`plan` makes the checks that need no robot
-(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses the goal for the TCP with
-which it runs, and gives it to the planner of its execution mode: :func:`plan_moves` or
+(:func:`~ur_cartesian_driver.planning.request.validate.check`), expresses the goal for the TCP that
+is active while the goal runs, and calls the planner of the execution mode: :func:`plan_moves` or
 :func:`plan_spline_goal`.
 
 The stages of :func:`plan_moves`: the curve of every segment with the configuration in which the
 arm arrives, and the blends between the curves; clearance; times and speeds; primitives, outputs,
-reference path and report. The first stage that finds a reason for a refusal raises it.
+reference path and report. The first stage that finds a fault in the goal raises the refusal.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ from ur_cartesian_driver.planning.stop_prediction import at_set_point
 #: Static error of the TCP of a CB3 arm at full reach [m]: about 0.3 mm, from the 0.2 to 0.4 mrad
 #: that were recorded on the joints of a UR10.
 CB3_STATIC_ERROR = 3e-4
-#: Sample densities of the two searches for rotations about a free axis, as multiples: the denser
-#: search sees singularities between the samples of the first.
+#: Sample densities of the two searches for rotations about a free axis, as multiples of the usual
+#: density: the second search sees singularities between the samples of the first.
 _SEARCH_DENSITIES = (1, 4)
 
 #: A function that plans a checked goal.
@@ -110,12 +110,13 @@ def plan(
     running: PlannedSegment | None = None,
 ) -> Plan:
     """
-    Return the plan of a goal for a robot that rests in a state.
+    Return the plan of a goal for a robot at rest.
 
-    :param state: joints, TCP pose and TCP offset are read from it.
-    :param arm: the kinematics, the robot's own calibrated one if it is known.
+    :param state: the robot's state, of which joints, TCP pose and TCP offset are used.
+    :param arm: the kinematics, calibrated if the robot's calibration is known.
     :param running: the planned motion to the first point, if it has been sent already.
-    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
+    :raises GoalRefused: the goal fails a check (a subclass is raised); the text names point,
+        quantity, value and bound.
     """
     table = check(goal, options)
     if table.segments.free_axes.any():
@@ -139,9 +140,9 @@ def _plan_fixed(
 
 def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     """
-    Return the plan of a checked goal whose rotations about its free axis are to be chosen.
+    Return the plan of a checked goal with a free axis, and choose the rotations about this axis.
 
-    If no choice passes the checks, the orientations that the goal names are planned.
+    If no choice passes the checks, the goal is planned with the orientations that it gives.
     """
     refusal: GoalRefused | None = None
     found = 'no rotation about the free axis was found that leads along the whole path'
@@ -167,7 +168,7 @@ def _plan_free(table: GoalTable, state: RobotState, arm: Arm, options: PlanningO
 
 
 def plan_moves(planner: GoalPlanner) -> Plan:
-    """Return the plan of a goal whose points are joined by motion commands of the robot."""
+    """Return the plan of a goal whose points are connected by motion commands of the robot."""
     goal, state, arm, options = planner.goal, planner.state, planner.arm, planner.options
     paths = JointPathPlanner(
         goal,
@@ -214,7 +215,7 @@ def plan_moves(planner: GoalPlanner) -> Plan:
 def _planned_rows(
     paths: JointPathPlanner, geometries: SegmentGeometries, timings: SegmentTimings
 ) -> PlannedRows:
-    """Return the primitive of each segment and its expected path and time."""
+    """Return the segments with their primitives, expected times and report lines."""
     curves, begin = geometries.path.curves, geometries.begin
     moves = segment_primitives(paths, geometries, timings)
     return PlannedRows(
@@ -262,7 +263,7 @@ PLANNERS: Mapping[ExecutionMode, PlanGoal] = {
 
 def _with_offset_band(plan: Plan, planner: GoalPlanner) -> Plan:
     """
-    Return a plan with the band in which path offsets may move the tool.
+    Return the plan completed by the band in which path offsets may move the tool.
 
     :raises GoalRefused: offsets are possible nowhere, or the arm cannot reach all of the band.
     """
@@ -290,8 +291,8 @@ class GoalPlanner:
     """
     The input of the planners of all execution modes; collects the remarks for the goal's report.
 
-    :param retargeted: the checked goal for the TCP with which it runs.
-    :param T_flange_active: the TCP that the robot has now.
+    :param retargeted: the checked goal, expressed for the TCP that is active while it runs.
+    :param T_flange_active: the TCP that is active on the robot now.
     :param running: the planned first segment, if it has been sent already.
     """
 
@@ -312,7 +313,7 @@ class GoalPlanner:
         self.T_flange_active, self._retargeted = T_flange_active, retargeted
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks = list(retargeted.remarks)
-        #: By point: the reasons why its primitive is not the usual one of its segment type.
+        #: The reasons why a primitive is not the usual one of its segment type, by point.
         self.reasons: dict[int, list[str]] = {}
         #: The points in base, rows (n, 7).
         self.targets = transform_rows(goal.T_base_frame, goal.waypoints.poses)
@@ -324,7 +325,7 @@ class GoalPlanner:
         check_approach(state, self._first, options)
 
     def _static_error_remarks(self) -> list[str]:
-        """Return a warning of a goal tolerance that the arm may not meet."""
+        """Return a warning if the arm may not meet the position tolerance of the goal."""
         tightest = min(
             (limit for limit in self.goal.goal_tolerance.position if limit > 0.0), default=inf
         )
@@ -363,7 +364,7 @@ class GoalPlanner:
         """
         Return the plan of a motion with its stops and outputs.
 
-        :param goal: as planned, without stops.
+        :param goal: the goal as planned, without stops.
         :param remarks: appended to the remarks that have been collected so far.
         :raises GoalRefused: the tool is slower than demanded, or an output cannot be placed.
         """

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The states from which goals are planned: an arm at rest, and a moving one after a stop.
+The states from which goals are planned: an arm at rest, and a moving arm after a stop.
 
 A goal that preempts another one is checked from where the arm comes to rest.
 
 The robot program stops the arm along its joints (``stopj``): the leading joint brakes evenly and
-the others in proportion, so each travels half the distance that it would have travelled in the
-time of the stop. The prediction assumes that the stop begins now. But the arm moves on while the
-goal is checked, for an unknown time; so a goal that passes is planned again once the arm rests.
+the others in proportion, so each travels half as far as it would at constant speed in the time of
+the stop. The prediction assumes that the stop begins now. But the arm moves on for an unknown time
+while the goal is checked; so a goal that passes is planned again once the arm is at rest.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Joints, subtract6, ZERO6
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: Largest distance from its set-point at which friction may hold a joint [rad]: 0.2 to 0.4 mrad
-#: were recorded.
+#: Largest deviation of a joint from its set-point that is ascribed to friction [rad]: 0.2 to 0.4
+#: mrad were recorded.
 MAX_STATIC_ERROR = 0.005
 
 
@@ -42,9 +42,9 @@ def at_set_point(state: RobotState, arm: Arm) -> RobotState:
     """
     Return the state of an arm that rests exactly at its set-point.
 
-    The controller's moves begin at its set-point, from which friction holds the arm 0.2 to 0.4
-    mrad away (recordings of real arms). The state of an arm that is farther away than
-    ``MAX_STATIC_ERROR`` is returned unchanged: something else has moved that arm.
+    The controller's moves begin at its set-point, although friction holds the arm 0.2 to 0.4 mrad
+    away from it (recorded on real arms). A state in which the arm is farther away than
+    ``MAX_STATIC_ERROR`` is returned unchanged: friction cannot be the cause.
     """
     q = state.target_q
     if max(map(abs, subtract6(q, state.actual_q))) > MAX_STATIC_ERROR:
@@ -54,7 +54,7 @@ def at_set_point(state: RobotState, arm: Arm) -> RobotState:
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
     """
-    Return the state of the arm after a stop that begins now; the state itself if it is at rest.
+    Return the state of the arm after a stop that begins now; the same state if it is at rest.
 
     :param deceleration: of the leading joint [rad/s^2].
     """
@@ -77,5 +77,6 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _tcp_at(state: RobotState, arm: Arm, q: Joints) -> Pose:
-    """Return the reported TCP, moved by the model's change: the arm may differ from its model."""
+    """Return the reported TCP, moved as the flange of the model moves to ``q``."""
+    # Forward kinematics alone is not enough: the arm may differ from its model.
     return arm.forward(q) @ (arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose)

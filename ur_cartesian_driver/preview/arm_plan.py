@@ -20,7 +20,7 @@ class ArmPlan(Plan):
     """A plan with the arm for which it was made."""
 
     arm: Arm
-    #: The planes that the arm does not cross.
+    #: The workspace planes, which the plan does not cross.
     planes: tuple[Plane, ...] = ()
 
     @classmethod
@@ -34,14 +34,14 @@ class ArmPlan(Plan):
 
     def write_page(self, path: str | Path) -> None:
         """
-        Write the page that shows the arm and its path over time; it opens without a network.
+        Write the page that shows the arm and its path over time; the page opens without a network.
 
         :raises ImportError: viser is not installed; the text says how to get it.
         """
         Path(path).write_text(motion_page(self, self.arm, self.planes), encoding='utf-8')
 
     def show(self) -> Path:
-        """Write the page into a temporary file, open it in the browser, and return its path."""
+        """Write the page to a temporary file, open it in the browser, and return its file path."""
         descriptor, name = mkstemp(prefix='motion_', suffix='.html')
         path = Path(name)
         with open(descriptor, 'w', encoding='utf-8') as file:

@@ -22,7 +22,7 @@ TRAIL_STEP, TRAIL_EDGES = 0.002, 1000
 
 
 class LivePage:
-    """A page that is served; made by :func:`live_page`."""
+    """A page that follows a robot; made by :func:`live_page`."""
 
     def __init__(self, server: Server, arm: Arm, state: RobotState, plan: Plan | None) -> None:
         """Draw the arm where it is, and the plan if there is one."""
@@ -51,7 +51,7 @@ class LivePage:
         self._text.content = _text(state, self._plan)
 
     def say_lost(self, reason: str) -> None:
-        """Say that the connection is lost; the arm is still drawn where it was."""
+        """Say that the connection is lost; the arm is still drawn where it was last."""
         self._text.content = f'**Not connected**: {reason}. The arm is drawn where it last was.'
 
 
@@ -69,9 +69,9 @@ def live_page(
     Serve a page that follows a robot, until the end of the context.
 
     :param state: the robot's present state.
-    :param plan: the motion that is expected of the robot.
+    :param plan: the motion that the robot is expected to make.
     :param host: the address to listen on: anyone who can reach it sees the robot.
-    :param port: the first port to try; the next free one is taken.
+    :param port: the first port to try; if it is in use, the next free one is taken.
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     with serve(planes, host, port) as server:
@@ -82,7 +82,7 @@ def path_deviation(path: Floats, place: Floats) -> float:
     """
     Return the distance of a place from a path.
 
-    :param path: (m, 3) its corners [m].
+    :param path: (m, 3) the corners of the path [m].
     """
     start, vector = path[:-1], np.diff(path, axis=0)
     square = np.einsum('ni,ni->n', vector, vector)

@@ -4,7 +4,7 @@
 One HTML page that shows the arm on its path: it opens in any browser, without a network.
 
 viser draws the scene, plays it over time, and makes the page. The page holds the scene once for
-each colouring of the path, with the legend and the report beside it.
+each colouring of the path, with the legend and the report beside the scene.
 """
 
 from __future__ import annotations
@@ -39,12 +39,13 @@ Colour = tuple[int, int, int]
 #: A server of viser, which has to be installed only to make a page.
 Server = Any
 
-#: Least time between two pictures of the arm [s], and largest number of pictures.
+#: Least time between two pictures of the arm [s]; largest number of pictures.
 MIN_PERIOD = 0.04
 MAX_PICTURES = 600
 #: Largest number of points that are drawn.
 MAX_NUMBERED_POINTS = 60
-#: A margin of this fraction or more is drawn as ample; see :func:`normalized_margins`.
+#: A margin of at least this fraction of its scale is drawn as ample; see
+#: :func:`normalized_margins`.
 AMPLE_MARGIN = 0.5
 
 _ARM, _TOOL, _POINT, _START, _OUTPUT, _PLANE, _REFUSED, _TRAIL = (
@@ -70,10 +71,10 @@ _TYPES: dict[str, tuple[str, Colour]] = {
 _ASIDE = np.array((0.65, 0.65, 0.4))
 _BLEND: Colour = (240, 200, 60)
 _LOW, _MIDDLE, _HIGH = np.array([(205, 40, 40), (235, 190, 40), (40, 150, 70)], dtype=np.float64)
-#: The scene and the settings in viser's page.
+#: Where viser's page has the scene; where it has the settings.
 _DATA = re.compile(r'window\.__VISER_EMBED_DATA__="([^"]*)";')
 _CONFIG = 'window.__VISER_EMBED_CONFIG__'
-#: The place in the text of a refusal: the point, and the fraction of the segment to it.
+#: What names the place in the text of a refusal: the point; the fraction of the segment to it.
 _PLACE = re.compile(r'(?:points|segments)\[(\d+)\]|point (\d+)')
 _FRACTION = re.compile(r'at ([\d.]+) % of its segment')
 
@@ -89,7 +90,7 @@ aside .refused { color: #c01818; font-weight: 600; }
 aside i { display: inline-block; width: .8em; height: .8em; margin: 0 .4em 0 .8em; }
 </style>
 """
-#: Puts the scene that the address names where viser's page looks for it.
+#: Script that puts the scene named in the page's address where viser's page looks for it.
 _CHOICE = """
 <script>
 window.__VISER_EMBED_DATA__ = (SCENES => SCENES[location.hash.slice(1)] || SCENES.type)(%s);
@@ -126,7 +127,7 @@ def motion_page(plan: Plan, arm: Arm, planes: Sequence[Plane] = ()) -> str:
 
 
 def scene_of_plan(server: Server, arm: Arm, tcp: Pose, plan: Plan | None) -> Scene:
-    """Draw the arm and, if there is a plan, its path by type, its points and outputs."""
+    """Draw the arm and, if there is a plan, the path coloured by type, points and outputs."""
     scene = Scene(server, arm, tcp)
     if plan is not None:
         scene.add_points(_waypoints(plan))
@@ -139,7 +140,7 @@ def refusal_page(goal: Goal, refusal: GoalRefused, arm: Arm, q: Joints, tcp: Pos
     """
     Return the page of a goal that was refused: its points, and the place of the refusal in red.
 
-    :param q: where the arm stands [rad].
+    :param q: the joint positions of the arm [rad].
     :raises ImportError: viser is not installed; the text says how to get it.
     """
     points = [goal.T_base_frame @ waypoint.pose for waypoint in goal.waypoints]
@@ -162,7 +163,7 @@ def _period(duration: float) -> float:
 
 
 def _place(text: str, path: Floats) -> Floats | None:
-    """Return the place that a refusal names; row 0 of the path is the start."""
+    """Return the place that a refusal names, or None; row 0 of the path is the start."""
     found = _PLACE.search(text)
     if found is None:
         return None
@@ -247,7 +248,7 @@ def _waypoints(plan: Plan) -> Iterator[tuple[int, Floats]]:
 
 
 def _outputs(plan: Plan) -> Iterator[tuple[str, Floats]]:
-    """Yield outputs, waits for inputs and calls in words, with the places where they happen."""
+    """Yield a text and the place for each output, wait for an input and call."""
     for segment in plan.segments:
         stop = segment.primitive
         if not (segment.outputs or isinstance(stop, AwaitInput | CallFunction)):
@@ -313,7 +314,7 @@ class Scene:
         )
 
     def add_path(self, positions: Floats, colours: Colours) -> None:
-        """Draw a path, a colour for each of its edges, and look at it."""
+        """Draw a path with a colour for each of its edges, and point the camera at the path."""
         edges = np.stack((positions[:-1], positions[1:]), axis=1).astype(np.float32)
         self._scene.add_line_segments(
             '/path', edges, np.repeat(colours[:, None], 2, axis=1), thickness=0.007
@@ -321,7 +322,7 @@ class Scene:
         self.look_at(positions)
 
     def look_at(self, positions: Floats) -> None:
-        """Look at path and arm from beside the path, right of the text."""
+        """Point the camera at path and arm, from beside the path; they appear beside the text."""
         low, high = np.minimum(positions.min(axis=0), 0.0), np.maximum(positions.max(axis=0), 0.4)
         x, y, _ = positions.mean(axis=0)
         out = np.array((0.7 * x - 0.7 * y, 0.7 * x + 0.7 * y, 0.5 * np.hypot(x, y)))
@@ -348,7 +349,7 @@ class Scene:
             self._scene.add_label(f'/points/{number}/label', str(number), font_screen_scale=0.7)
 
     def add_outputs(self, outputs: Iterable[tuple[str, Floats]]) -> None:
-        """Mark the places where outputs switch."""
+        """Mark places of outputs, waits and calls with their texts."""
         for k, (text, place) in enumerate(outputs):
             self.add_ball(f'outputs/{k}', place, 0.008, _OUTPUT)
             self._scene.add_label(f'/outputs/{k}/label', text, font_screen_scale=0.7)
@@ -395,7 +396,7 @@ def serve(planes: Sequence[Plane], host: str = '127.0.0.1', port: int = 0) -> It
             '`pip install viser trimesh`.',
             name='viser',
         ) from error
-    with redirect_stdout(io.StringIO()):  # it prints a greeting in spite of verbose=False
+    with redirect_stdout(io.StringIO()):  # viser prints a greeting in spite of verbose=False
         server = viser.ViserServer(host=host, port=port, verbose=False)
     try:
         _light(server.scene)

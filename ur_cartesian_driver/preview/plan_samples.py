@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Preview a plan: tool and joints over time, and a table.
+Preview a plan: tool and joints over time, and tables.
 
-Samples serve for pictures, markers and a check before the first run. The robot uses its own speed
-profile; times are those that are expected of it at full speed.
+The samples are for pictures, for markers, and for checking a plan before the arm moves. Their
+times are predictions for full speed; the robot uses its own speed profile.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from ur_cartesian_driver.motion.plan.primitive import MoveJ, OptimoveJ, Optimove
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Preview:
-    """A plan, sampled; one row for each time."""
+    """Samples of a plan, one row for each time."""
 
     #: (n,) the times since the start of the motion [s]; the last one is its end.
     time: Floats
-    #: (n, 7) of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
+    #: (n, 7) poses of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
     poses: Floats
-    #: (n, 6) [rad]; NaN where the calibrated arm has no solution.
+    #: (n, 6) joint positions [rad]; NaN where the arm has no solution for the pose.
     joints: Floats
 
 
@@ -52,7 +52,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     reference = plan.reference
     end = float(reference.time[-1])
     time = np.minimum(np.arange(ceil(end / period - 1e-9) + 1) * period, end)
-    # Where times repeat, the later row is used, as the robot passes through both at once.
+    # If rows have the same time, the last of them is used.
     row = np.clip(
         np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
     )
@@ -69,7 +69,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
 
 
 def table(plan: Plan) -> str:
-    """Return the plan as lines of text: one for each segment, and the sum."""
+    """Return the plan as text: a line for the motion to each point, and one for the sum."""
     length = sum(segment.length for segment in plan.segments)
     lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
     lines += [_line(segments) for segments in _to_points(plan)]
@@ -78,7 +78,7 @@ def table(plan: Plan) -> str:
 
 
 def postures(plan: Plan) -> str:
-    """Return the joint positions [rad] in which the arm is predicted to arrive, line by line."""
+    """Return the predicted joint positions at the start and each point [rad], a line for each."""
     names = [name.removesuffix('_joint') for name in JOINT_NAMES]
     lines = [f'{"point":>5}  ' + ' '.join(f'{name:>13}' for name in names) + ' [rad]']
     ends = (segments[-1] for segments in _to_points(plan))
@@ -86,13 +86,13 @@ def postures(plan: Plan) -> str:
         ('start', plan.start),
         *((str(segment.waypoint), segment.joints) for segment in ends),
     ]:
-        # + 0.0: no -0.0000
+        # + 0.0 turns -0.0 into 0.0
         lines.append(f'{point:>5}  ' + ' '.join(f'{round(q, 4) + 0.0:13.4f}' for q in joints))
     return '\n'.join(lines)
 
 
 def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
-    """Return the segments that lead to each point, several in a spline."""
+    """Return the segments that lead to each point; in a spline there may be several."""
     return [
         list(segments)
         for _, segments in groupby(plan.segments, key=lambda segment: segment.waypoint)
@@ -114,7 +114,7 @@ def _line(segments: Sequence[PlannedSegment]) -> str:
 
 
 def _time(segments: Sequence[PlannedSegment]) -> str:
-    """Return the time of segments; that of OPTIMIZED moves is not known in advance."""
+    """Return the time of segments as text; that of OPTIMIZED moves is not known in advance."""
     if any(isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in segments):
         return '      ? s'
     return f'{sum(segment.duration for segment in segments):7.3f} s'
@@ -144,8 +144,8 @@ def _joints(
     """
     Return joint positions for poses at row positions (row + fraction) of the reference path.
 
-    Each row is the solution nearest to the one before. In joint moves, which may pass through
-    singularities where branches meet, it is the one nearest to the straight line in joint space.
+    Each row is the solution nearest to the previous one. In joint moves, which may pass through
+    singularities where branches meet, it is the solution nearest to the straight joint line.
     """
     lines = _joint_moves(plan)
     point = plan.reference.point
@@ -162,7 +162,7 @@ def _joints(
 
 @dataclass(frozen=True, slots=True)
 class _JointMove:
-    """A joint move between two rows of the reference path, which has evenly spaced samples."""
+    """A joint move between two rows of the reference path; its rows are evenly spaced."""
 
     q_start: Joints
     q_end: Joints
@@ -175,7 +175,7 @@ class _JointMove:
 
 
 def _joint_moves(plan: Plan) -> dict[int, _JointMove]:
-    """Return the joint moves by point."""
+    """Return the joint moves, by the point to which each leads."""
     point = plan.reference.point
     lines = {}
     q = plan.start

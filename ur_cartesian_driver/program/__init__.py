@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's side: the URScript program, and the code that renders it."""
+"""The robot program in URScript, and the code that renders it."""
 
 from ur_cartesian_driver.program.render import (
     PROGRAM_NAME,

@@ -1,28 +1,30 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Render the robot program: insert the addresses and the constants of the protocol.
+Renders the robot program: inserts the addresses and the constants of the protocol.
 
-Every number that both sides must agree on is defined once, in an enum of
-:mod:`ur_cartesian_driver.protocol`; the head of the program is rendered from there. Lines of the
-program that start with ``#!`` are instructions for this module:
+Every number on which driver and robot program must agree is defined once, in Python (mostly in
+:mod:`ur_cartesian_driver.protocol`); the head of the program is rendered from these definitions.
+Lines of the program that start with ``#!`` are instructions for this module:
 
 ``#! constants``
     insert the constants.
 ``#! include NAME``
     insert the file ``NAME.script``.
 ``#! prelude``
-    insert the script prelude, as it is.
+    insert the script prelude unchanged.
 ``#! calls``
     insert the code that calls the functions of the prelude by their numbers.
 ``#! if FEATURE`` ... ``#! end``
     keep these lines only if the controller's software has the feature, because a controller
     refuses a program that names an unknown function. Two features do not depend on the software:
-    lines for ``freedrive`` are kept if freedrive is allowed, and for ``prelude`` if there is one.
+    lines for ``freedrive`` are kept if the settings allow freedrive, and lines for ``prelude`` if
+    the prelude defines functions.
 
 The program is sent without empty lines, and without comments except the markers of the External
-Control node. Programs on the pendant share one name space with ours, so each name that the program
-defines on its first level (variables, functions, threads) is sent with the :data:`PREFIX`.
+Control node. Programs on the pendant share a name space with the robot program, so each variable,
+function and thread that the robot program defines at its top level is sent with the
+:data:`PREFIX`.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 
-#: Prefix of the name of every global variable, function and thread on the robot.
+#: Prefix, on the robot, of every global variable, function and thread of the program.
 PREFIX = 'urcd_'
 
 #: Comments by which the External Control node divides the program.
@@ -61,16 +63,17 @@ MARKERS = frozenset(
 _DEFINITION = re.compile(r'(?:def|thread) (\w+)\(|(\w+) = ')
 _STRING_OR_NAME = re.compile(r'"[^"]*"|\w+')
 
-#: The buffered servo repeats a set-point until each joint is within this tolerance [rad], but at
-#: most this number of times, as in the manufacturer's guide.
+#: The buffered servo repeats a set-point until each joint is within this tolerance [rad] of it.
 SERVO_TOLERANCE = 0.2
+#: Largest number of such repetitions, as in the manufacturer's guide.
 SERVO_MAX_REPEATS = 500
-#: If more than this many steps lie between two set-points, one step is assumed, as in the guide.
+#: If more controller steps than this lie between two set-points, one step is assumed, as in the
+#: guide.
 SERVO_MAX_STEPS = 50
 
-#: For a feature that no version is known to have.
+#: The first version with a feature that no version is known to have.
 _NO_VERSION = (1000, 0, 0)
-#: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
+#: For each feature, the first version of CB3/e-Series and of PolyScope X software that has it.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     'optimove': ((5, 21, 0), (10, 8, 0)),
     'path_offset': ((5, 6, 0), _NO_VERSION),
@@ -79,36 +82,38 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 
 #: Constants of the spline interpolation.
 SPLINE_CONSTANTS: dict[str, float] = {
-    #: The smallest acceleration for speedj brakes the fastest joint in this time [s], but lies
-    #: within these bounds [rad/s^2].
+    #: speedj gets at least the acceleration that brakes the fastest joint in this time [s].
     'BRAKING_TIME': 0.025,
+    #: Bounds [rad/s^2] on the acceleration for speedj, whatever the braking time.
     'MIN_BRAKING': 1.0,
     'MAX_ACCELERATION': 40.0,
-    #: A call that takes at least this number of steps has ended late: the arm has coasted.
+    #: If a call of speedj has taken at least this many steps, the arm has coasted into a pause.
     'COASTED': 2.0,
-    #: If the slider shortens a step, speedj is called for this fraction of its time.
+    #: If the speed slider shortens a step, speedj is called for this fraction of the short step.
     'SHORT_CALL': 0.9,
-    #: Above the first fraction the arm moves at full speed; below the second it nearly stands.
+    #: If the arm reaches more than this fraction of the planned speed, it moves at full speed.
     'FULL_SPEED': 0.999,
+    #: Smallest fraction of a step that is planned, even if the arm nearly stands still.
     'MIN_FRACTION': 0.01,
-    #: A call took one step if the arm moved as far as expected, give or take this fraction.
+    #: A call has taken one step if the arm moved the planned distance, to within this fraction.
     'SAME_STEP': 0.02,
     #: Fraction of the position error that is corrected in one step.
     'CORRECTION': 0.4,
-    #: Deceleration at the end of the last piece [rad/s^2], and the highest mean joint speed of a
-    #: piece [rad/s]; these numbers and START_TOLERANCE are the client library's.
+    #: Largest deceleration [rad/s^2] at the end of the last piece, as in the client library.
     'MAX_DECELERATION': 15.0,
+    #: Largest mean joint speed [rad/s] of a piece, as in the client library.
     'MAX_SPEED': 20.0,
-    #: Largest distance from the arm to a first point that has no time [rad].
+    #: Largest distance [rad] from the arm to a first point at time 0, as in the client library.
     'START_TOLERANCE': 0.01,
-    #: If a spline stops farther than this from its end [rad], a movej covers the rest, at an
-    #: acceleration [rad/s^2] and a speed [rad/s].
+    #: If a spline ends farther than this [rad] from its last point, or moves on by more than this
+    #: in a step, a movej covers what remains.
     'END_TOLERANCE': 1e-05,
+    #: Acceleration [rad/s^2] and speed [rad/s] of that movej.
     'END_ACCELERATION': 15.0,
     'END_SPEED': 1.0,
-    #: Below this speed the arm is at rest [rad/s].
+    #: Below this speed [rad/s] the arm is at rest.
     'REST_SPEED': 0.0001,
-    #: Smallest step whose progress can be measured [rad].
+    #: Smallest planned step [rad] whose progress can be measured.
     'MIN_STEP': 1e-06,
     #: Smaller differences [s] or [rad] are rounding errors.
     'ROUNDING': 1e-10,
@@ -116,12 +121,12 @@ SPLINE_CONSTANTS: dict[str, float] = {
 
 #: Constants of force mode.
 PRESS_CONSTANTS: dict[str, float] = {
-    #: The arm stands still for this time before force mode begins [s], as the manual advises.
+    #: Time [s] for which the arm stands still before force mode begins, as the manual advises.
     'REST_TIME': 0.02,
-    #: Acceleration [m/s^2] and speed [m/s] of the way back to the place of contact.
+    #: Acceleration [m/s^2] and speed [m/s] of the move back to where the contact began.
     'RETURN_ACCELERATION': 0.5,
     'RETURN_SPEED': 0.02,
-    #: The step of a CB3 controller [s], whose force mode has no gain.
+    #: The step [s] of a CB3 controller; its force mode has no gain scaling.
     'STEP_WITHOUT_GAIN': 0.008,
 }
 
@@ -129,27 +134,28 @@ PRESS_CONSTANTS: dict[str, float] = {
 OFFSET_CONSTANTS: dict[str, float] = {
     #: The controller's number for offsets along the axes of the base.
     'FRAME_BASE': 1,
-    #: Time constant of the controller's filter [s]: a coefficient of 0.1 at 500 Hz, which the
-    #: manual calls a good compromise for welding.
+    #: Time constant [s] of the controller's filter; at 500 Hz it gives the coefficient 0.1, which
+    #: the manual calls a good compromise for welding.
     'FILTER_TIME': 0.018,
-    #: The controller's default limit of rotational offsets [rad], which are not used here.
+    #: The controller's default limit [rad] of rotational offsets, none of which is used.
     'MAX_TURN': 0.52,
-    #: An offset brakes with this fraction of its acceleration, and has reached its target within
-    #: this distance [m]; both as in the driver.
+    #: Fraction of its acceleration with which an offset brakes, as in the driver.
     'BRAKING': BRAKING_FRACTION,
+    #: Distance [m] from its target within which an offset has arrived, as in the driver.
     'TOLERANCE': ARRIVAL_TOLERANCE,
-    #: Largest change of the offset's time rate, which follows that of the motion [1/s].
+    #: Largest change [1/s] of the rate of the offset's time, which follows the motion's rate.
     'RATE_CHANGE': 10.0,
-    #: Shortest time in which the offset moves [s].
+    #: A step of the offset's time that is not longer than this [s] does not move the offset.
     'MIN_TIME': 1e-6,
-    #: The tool is on its path if it is no farther away than this [m].
+    #: The tool is on its path if its offset is not larger than this [m].
     'GONE': 1e-6,
 }
 
-#: Cycles by which an output is switched early: it takes effect at the end of its cycle.
+#: Cycles by which an output is switched early, because it takes effect at the end of a cycle.
 OUTPUT_LEAD = 1.5
-#: The number of words kept for a pending output, and the names of the columns that are used.
+#: The number of words that the program keeps for a pending output.
 OUTPUT_WORDS = 18
+#: The columns among these words that the program uses, and their names in the program.
 OUTPUT_COLUMNS = {
     point_fields.PointField.OUTPUT_KIND: 'KIND',
     point_fields.PointField.OUTPUT_PIN: 'PIN',
@@ -159,30 +165,31 @@ OUTPUT_COLUMNS = {
 }
 
 
-#: State of an analog output that follows the speed: its law in the order of a record, whether it
-#: follows now, and the filtered speed [m/s].
+#: The columns for an analog output that follows the speed: its law in the order of a record,
+#: whether the output follows the speed now, and the filtered speed [m/s].
 FOLLOW_COLUMNS = ('GAIN', 'OFFSET', 'MINIMUM', 'MAXIMUM', 'FILTER_TIME', 'ACTIVE', 'SPEED')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramSettings:
-    """Everything that differs between installations."""
+    """The settings of the program that differ between installations."""
 
     #: Address at which the robot reaches the driver.
     host: str
     reverse_port: int
     trajectory_port: int
     script_command_port: int
-    #: The number by which the driver recognises this program; random, not 0.
+    #: The number by which the driver recognises this program; random, and never 0.
     number: int = 1
     #: Software version of the controller: major, minor, bugfix.
     version: tuple[int, int, int] = (5, 21, 0)
-    #: Deceleration of the leading axis for every stop [rad/s^2].
+    #: Deceleration [rad/s^2] of the leading axis in every stop.
     stop_deceleration: float = 4.0
-    #: Timeout of the next trajectory point [s].
+    #: Timeout [s] of the next trajectory point.
     point_timeout: float = 0.5
-    #: Stiffness of ``servoj``, and its lookahead time [s].
+    #: Stiffness of ``servoj``.
     servoj_gain: float = 1000.0
+    #: Lookahead time [s] of ``servoj``.
     servoj_lookahead_time: float = 0.06
     #: Capacity of the buffered servo [set-points].
     servo_buffer_depth: int = 250
@@ -192,7 +199,7 @@ class ProgramSettings:
     prelude: Prelude = NO_PRELUDE
 
     def __post_init__(self) -> None:
-        """Refuse a host whose characters could break the quoted string in the program."""
+        """Refuse an empty host, and a host with characters that could end its quoted string."""
         if not self.host or not all(c.isalnum() or c in '.-_:' for c in self.host):
             raise LocalProtocolError(
                 f'reverse_ip: {self.host!r} is not a host name or address; set it to the address '
@@ -202,9 +209,9 @@ class ProgramSettings:
 
 def render(settings: ProgramSettings) -> str:
     """
-    Return the program's text for the script sender: header and node, not wrapped in a ``def``.
+    Return the program for the script sender: header and node, without a ``def`` around them.
 
-    :raises LocalProtocolError: an instruction in the program is unknown (a defect of ours).
+    :raises LocalProtocolError: the program has an unknown instruction, which is a bug in it.
     """
     lines = [line for line in _lines('driver', settings) if not _is_comment(line)]
     own = {match[1] or match[2] for line in lines if (match := _DEFINITION.match(line))}
@@ -219,14 +226,14 @@ def render(settings: ProgramSettings) -> str:
 
 
 class _ForeignLine(str):
-    """A line of the prelude or its calls, whose names get no prefix."""
+    """A line of the prelude, or of the code that calls its functions; the names get no prefix."""
 
     __slots__ = ()
 
 
 @cache
 def taken_names() -> tuple[frozenset[str], frozenset[str]]:
-    """Return the controller's functions that the program calls, and the names of its locals."""
+    """Return the controller's functions that the program calls, and its parameters and locals."""
     text = ''.join(
         files('ur_cartesian_driver.program').joinpath(f'{name}.script').read_text('ascii')
         for name in ('driver', 'servo')
@@ -238,13 +245,13 @@ def taken_names() -> tuple[frozenset[str], frozenset[str]]:
 
 
 def wrap_in_program(text: str) -> str:
-    """Return the text as a program that can be uploaded: indented, in a ``def``."""
+    """Return the text as a program that can be uploaded: indented, within a ``def``."""
     body = ''.join(f'\t{line}\n' for line in text.splitlines() if line not in MARKERS)
     return f'def {PROGRAM_NAME}():\n{body}end\n'
 
 
 def _is_comment(line: str) -> bool:
-    """Return whether a line is empty or a comment, so that the robot does not need it."""
+    """Return whether a line is empty, or is a comment other than a marker."""
     return line not in MARKERS and line.lstrip()[:1] in ('', '#')
 
 
@@ -290,9 +297,9 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'COMMAND_PORT = {settings.script_command_port}'
     yield f'STOP_DECELERATION = {settings.stop_deceleration}'
     yield f'POINT_TIMEOUT = {settings.point_timeout}'
-    # PolyScope X can read twice as often in a step as its predecessors.
+    # In a step, PolyScope X can read twice as many messages as its predecessors.
     yield f'DISCARDED_PER_STEP = {20 if settings.version[0] >= 10 else 10}'
-    # Floats, because quotients by them have fractions.
+    # Floats, because the program divides by them and needs the fractions.
     yield f'MULT_JOINTSTATE = {float(FIXED_POINT)}'
     yield f'MULT_TIME = {float(FIXED_POINT)}'
     yield f'REVERSE_FIELDS = {reverse.MESSAGE_FIELDS}'
@@ -327,9 +334,9 @@ def _message_constants() -> Iterator[str]:
 
 
 def _output_constants() -> Iterator[str]:
-    """Yield the constants of safe outputs, and of outputs that are due along the path."""
+    """Yield the constants of safe outputs, and of outputs that are switched along the path."""
     yield from _enum('SAFE_OUTPUTS', script_command.SafeOutputsAction)
-    # Index in the list that the robot reads: after its length, command, action and token.
+    # Indices in the list that the robot reads; its length, command, action and token come first.
     yield 'SAFE_DIGITAL = 4'
     yield f'SAFE_ANALOG = {4 + script_command.DIGITAL_OUTPUTS}'
     yield f'DIGITAL_OUTPUTS = {script_command.DIGITAL_OUTPUTS}'
@@ -364,10 +371,10 @@ def _event_constants() -> Iterator[str]:
     yield f'FOLLOW_ROW = {[0.0] * len(FOLLOW_COLUMNS)}'
     for column, name in enumerate(FOLLOW_COLUMNS):
         yield f'FOLLOW_{name} = {column}'
-    # Column of a field in the row of a pending output.
+    # Columns of the fields in the row of a pending output.
     for field, name in OUTPUT_COLUMNS.items():
         yield f'OUTPUT_{name} = {field.value}'
-    # Index of a field in the list that the robot reads, whose first item is its length.
+    # Indices of the fields in the list that the robot reads; its first item is its length.
     yield from _enum('POINT', point_fields.PointField, offset=1)
 
 
@@ -377,7 +384,7 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVOJ_LOOKAHEAD_TIME = {settings.servoj_lookahead_time}'
     yield f'SERVO_ALLOW_FREEDRIVE = {settings.allow_freedrive}'
     yield f'SERVO_BUFFER_DEPTH = {settings.servo_buffer_depth}'
-    # A list as long as the buffer, written out because old controllers cannot make it otherwise.
+    # A list as long as the buffer, written out because old controllers have no other way.
     yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
     yield f'SERVO_ROW = {[0.0] * 6}'
     yield f'SERVO_MAX_STEPS = {SERVO_MAX_STEPS}'

@@ -35,11 +35,11 @@ class CommandSpec:
     """
     A command and its reply on success.
 
-    :param reply: the reply, with ``{}`` for its value.
+    :param reply: the reply on success, with ``{}`` in place of its value.
     :param takes_argument: whether a text follows the command.
     :param argument_is_optional: whether the text may be left out.
     :param cb3: first CB3 software version that has the command; None = no version has it.
-    :param e_series: first e-Series software version that has it; None = no version has it.
+    :param e_series: first e-Series version that has the command; None = no version has it.
     """
 
     reply: str
@@ -49,7 +49,7 @@ class CommandSpec:
     e_series: tuple[int, int] | None = (5, 0)
 
     def reply_pattern(self) -> re.Pattern[str]:
-        """Return a pattern of the whole reply; group 1 is the value."""
+        """Return a pattern for the whole reply; group 1, if there is one, is the value."""
         before, value, after = self.reply.partition('{}')
         return re.compile(re.escape(before) + ('(.*)' if value else '') + re.escape(after))
 
@@ -122,7 +122,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     }
 )
 
-#: Possible values in some replies, above all in those that consist only of the value.
+#: Patterns for the valid values of some replies, mainly of those that are only a value.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     {
         'running': re.compile('true|false'),
@@ -146,7 +146,7 @@ class DashboardRequest:
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Refuse an unknown command, several lines, and a missing or surplus argument."""
+        """Refuse an unknown command, and an argument that is missing, surplus or several lines."""
         spec = COMMAND_SPECS.get(self.name)
         if spec is None:
             raise LocalProtocolError(f'{self.name!r} is not a dashboard command.')
@@ -162,7 +162,7 @@ class DashboardRequest:
             )
 
     def encode(self) -> bytes:
-        """Return the line."""
+        """Return the line of the command as bytes."""
         return (f'{self.name} {self.argument}' if self.argument else self.name).encode() + b'\n'
 
 
@@ -171,8 +171,8 @@ class DashboardReply:
     """
     A reply and the command that it belongs to.
 
-    :param text: the line.
-    :param value: value in the line if the command succeeded ('' = without value), else None.
+    :param text: the line of the reply.
+    :param value: the value in the line, '' if it has none; None = the command failed.
     """
 
     request: DashboardRequest
@@ -187,13 +187,13 @@ class DashboardReply:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardGreeting:
-    """The first line of the server."""
+    """The first line that the server sends."""
 
     text: str
 
 
 def parse_reply(request: DashboardRequest, line: str) -> DashboardReply:
-    """Return a reply with its value, if it reports success."""
+    """Return the reply in a line; its value is None if the line does not report success."""
     match = COMMAND_SPECS[request.name].reply_pattern().fullmatch(line.rstrip())
     value = None if match is None else ''.join(match.groups())
     value_pattern = _VALUE_PATTERNS.get(request.name)
@@ -206,7 +206,7 @@ class DashboardClientCodec:
     """The client: matches replies with commands by their order."""
 
     def __init__(self) -> None:
-        """Wait for the greeting."""
+        """Start with no pending commands; the greeting of the server comes first."""
         self._lines = LineBuffer(MAX_LINE_LENGTH)
         self._pending: deque[DashboardRequest] = deque()
         self._greeted = False
@@ -215,7 +215,8 @@ class DashboardClientCodec:
         """
         Return the line of a command and remember that its reply is due.
 
-        :raises LocalProtocolError: command or argument is invalid, or too many commands wait.
+        :raises LocalProtocolError: command or argument is invalid, or too many commands wait for
+            their replies.
         """
         request = DashboardRequest(name=name, argument=argument)
         if len(self._pending) >= MAX_PENDING_REQUESTS:
@@ -227,10 +228,11 @@ class DashboardClientCodec:
 
     def feed(self, data: bytes) -> list[DashboardGreeting | DashboardReply]:
         """
-        Take bytes from the server (``b''`` = end of stream) and return the replies in them.
+        Take bytes from the server (``b''`` = end of stream) and return the greeting and
+        the replies in them.
 
-        :raises RemoteProtocolError: a reply has no command, a line is too long or truncated, or
-            the stream ended while a command waited.
+        :raises RemoteProtocolError: a line is too long or truncated, no command waits for it, or
+            the stream ended while a command waited for its reply.
         """
         events: list[DashboardGreeting | DashboardReply] = []
         lines = self._lines.feed(data)
@@ -253,16 +255,16 @@ class DashboardClientCodec:
 
 
 class DashboardServerCodec:
-    """The server: decodes commands; a reply is made by :func:`success`, or is any other line."""
+    """The server: decodes commands; :func:`success` and others encode the replies."""
 
     def __init__(self, version: tuple[int, int] | None = None) -> None:
         """
         Start empty.
 
-        :param version: software version, whose commands are accepted; None = all commands.
+        :param version: only the commands of this software version are accepted; None = all.
         """
         self._lines = LineBuffer(MAX_LINE_LENGTH)
-        # Longest first, so that ``load installation`` is not taken for ``load``.
+        # Longest names first, so that ``load installation`` is not taken for ``load``.
         self._names = sorted(
             (
                 name
@@ -277,7 +279,7 @@ class DashboardServerCodec:
         """
         Take bytes from a client (``b''`` = end of stream) and return its commands.
 
-        A line that is not a command is returned as text; it also needs a reply
+        A line that is not a command is returned as text; such a line needs a reply, too
         (:func:`not_understood`).
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.
@@ -301,7 +303,7 @@ def success(request: DashboardRequest, value: str | None = None) -> bytes:
     """
     Return the reply to a command that succeeded.
 
-    :param value: the value; None = the argument of the command.
+    :param value: the value in the reply; None = the argument of the command.
     """
     return encode_line(
         COMMAND_SPECS[request.name].reply.replace(

@@ -5,7 +5,7 @@ Basics of all wire formats: fixed-point numbers and bounded buffers.
 
 Every number on the robot program's sockets is a big-endian int32, usually a value times 1,000,000.
 A value that does not fit raises an error before a byte is sent; otherwise the robot would read a
-wrapped number and move there.
+wrapped number and move to a wrong place.
 
 A stream is cut into records (of a fixed size), frames (which begin with their size) or lines. Each
 buffer holds at most one incomplete unit, of a bounded size, so a peer that sends nonsense cannot
@@ -35,13 +35,13 @@ _MAX_QUOTED = 48
 
 def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
     """
-    Return the int32 of a value, ties rounded away from zero.
+    Return a value, scaled and rounded to an int32; ties are rounded away from zero.
 
     :param field: name of the value, for the error text.
     :raises LocalProtocolError: the value is not finite or does not fit.
     """
     scaled = value * scale
-    # NaN fails this comparison, too. The bounds include what rounds to the outermost integers.
+    # NaN fails this comparison, too. The bounds include values that round to INT32_MIN or _MAX.
     if not INT32_MIN - 0.5 < scaled < INT32_MAX + 0.5:
         raise range_error(value, field, scale)
     whole = int(scaled)
@@ -53,7 +53,7 @@ def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
 
 
 def from_fixed(raw: int, scale: int = FIXED_POINT) -> float:
-    """Return the value of an int32."""
+    """Return the value that an int32 encodes."""
     return raw / scale
 
 
@@ -67,7 +67,7 @@ def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProt
 
 def checked_int32(value: int, field: str) -> int:
     """
-    Return an integer that is sent unscaled, if it fits.
+    Return an integer that is sent unscaled, after checking that it fits into an int32.
 
     :raises LocalProtocolError: the value does not fit.
     """
@@ -118,7 +118,7 @@ class RecordDecoder(Generic[T]):
         """
         Take bytes from the stream (``b''`` = end of stream) and return the messages in them.
 
-        :raises RemoteProtocolError: a message is wrong, or the stream ended inside one.
+        :raises RemoteProtocolError: a record is invalid, or the stream ended inside one.
         """
         if not data:
             if self._rest:
@@ -161,7 +161,7 @@ def encode_result(result: IntEnum) -> bytes:
 
 class FrameBuffer:
     """
-    Cuts a stream into frames that begin with their own total size, big-endian.
+    Cuts a stream into frames that begin with their total size (big-endian).
 
     ::
 
@@ -175,7 +175,7 @@ class FrameBuffer:
         """
         Start empty.
 
-        :param size_width: bytes of the size field.
+        :param size_width: width of the size field [bytes].
         :param min_size: smallest size of a frame [bytes].
         :param max_size: largest size that is accepted [bytes]; it bounds the memory.
         :param what: the name of a frame, for error texts.

@@ -3,16 +3,18 @@
 """
 The Robot API of PolyScope X, which replaces the dashboard of other robots: HTTP with JSON.
 
-Commands keep the names that they have on the dashboard, so one call serves every generation;
+Commands keep the names that they have on the dashboard, so a service call works on every robot;
 :data:`API_COMMANDS` has the requests for each name. The robot describes its own version of the API
 at ``/docs`` and ``/openapi.json`` below :data:`BASE_PATH`, on port 80.
 
 A request that changes the robot is answered after the change. The status is 403 unless the robot
 is in remote control, 409 if its present state does not allow the change, 504 if the change takes
-too long. An error has the fields ``message`` and ``details``; an invalid request, ``detail``.
+too long. An error has the fields ``message`` and ``details``; the answer to an invalid request
+has ``detail``.
 
 Paths, bodies and first versions come from Universal Robots' client library 2.14
-(``dashboard_client_implementation_x.cpp``); it and other clients list the statuses.
+(``dashboard_client_implementation_x.cpp``); this library and other clients
+list the statuses.
 """
 
 from __future__ import annotations
@@ -29,9 +31,9 @@ from ur_cartesian_driver.protocol.dashboard import DashboardReply, DashboardRequ
 BASE_PATH = '/universal-robots/robot-api'
 #: The first software with a Robot API; older PolyScope X has neither this API nor a dashboard.
 FIRST_VERSION = (10, 11)
-#: Beginning of the text of a refusal because the robot is in local control.
+#: How the text of a refusal begins if the robot is in local control.
 FORBIDDEN = 'HTTP 403'
-#: Beginning of the text of a refusal because of the robot's state.
+#: How the text of a refusal begins if the robot's state does not allow the request.
 CONFLICT = 'HTTP 409'
 
 _STATE, _PROGRAM = '/robotstate/v1/state', '/program/v1/state'
@@ -181,7 +183,7 @@ def parse_answer(
 
 
 def _fields(body: bytes) -> Mapping[str, Any]:
-    """Return the JSON object in an answer; empty for others, such as the error page of a proxy."""
+    """Return the JSON object in an answer; empty if it is none (a proxy's error page)."""
     try:
         fields = json.loads(body)
     except ValueError:
@@ -190,7 +192,7 @@ def _fields(body: bytes) -> Mapping[str, Any]:
 
 
 def _text(value: object) -> str:
-    """Return a text of an answer as one line; other values as JSON."""
+    """Return a field of an answer as one line: a text as it is, other values as JSON."""
     if value is None:
         return ''
     text = value if isinstance(value, str) else json.dumps(value)

@@ -23,11 +23,12 @@ class ConnectionStatus:
     """Progress of the connection, and the next step towards running a goal."""
 
     state: ConnectionState = ConnectionState.DISCONNECTED
-    #: The next step, as a sentence; empty when a goal can run.
+    #: The next step, or the reason why the robot cannot be used, as a sentence; empty when a goal
+    #: can run.
     message: str = ''
     #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
-    #: Model, software and serial number as the robot reports them; empty until then.
+    #: Model; software version; serial number; each is empty until the robot has reported it.
     robot_model: str = ''
     polyscope_version: str = ''
     serial_number: str = ''
@@ -89,7 +90,7 @@ def is_paused(robot: RobotState) -> bool:
 
 
 def has_ended(robot: RobotState) -> bool:
-    """Return whether no program runs, whatever its sockets say."""
+    """Return whether no program runs, as the robot reports, even if its sockets are open."""
     return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
 
 

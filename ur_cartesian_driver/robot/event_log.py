@@ -20,7 +20,7 @@ from typing import Protocol
 
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: Age of entries that may explain an end [s]; older entries are left out.
+#: Age up to which entries may explain why a goal or connection ended [s]; older ones are left out.
 MAX_AGE = 3.0
 #: Largest number of entries; it bounds the memory, and the text that a person has to read.
 MAX_ENTRIES = 12
@@ -37,7 +37,7 @@ class KeepaliveTimes(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EventLogEntry:
-    """Something that happened."""
+    """An event, with the time at which it was noted [s]."""
 
     time: float
     text: str
@@ -57,18 +57,19 @@ class EventLog:
         """
         self._clock, self._keepalives, self._timeout = clock, keepalives, timeout
         self._entries: deque[EventLogEntry] = deque(maxlen=MAX_ENTRIES)
-        #: The robot's last report, kept after the robot is lost, and its time [s].
+        #: The robot's last report, kept after the robot is lost.
         self._last_state: RobotState | None = None
+        #: Time of the last report [s].
         self._last_report = inf
-        #: The longest pause between keepalives in the previous period [s].
+        #: What the last call of :meth:`keepalive_gap` returned [s].
         self._last_gap = 0.0
 
     def note(self, text: str, *, is_robot_error: bool = False) -> None:
-        """Note an event of this moment; ``is_robot_error``: the robot reports it as an error."""
+        """Note an event that happens now; ``is_robot_error``: an error that the robot reports."""
         self._entries.append(EventLogEntry(self._clock(), text, is_robot_error))
 
     def note_report(self, robot: RobotState) -> None:
-        """Take the robot's newest report."""
+        """Keep the robot's newest report and its time."""
         self._last_state, self._last_report = robot, self._clock()
 
     @property
@@ -78,7 +79,7 @@ class EventLog:
 
     def robot_error(self, since: float = -inf) -> str:
         """
-        Return the newest error that the robot reported recently; empty if none.
+        Return the newest error that the robot reported recently; empty = none.
 
         :param since: errors before this time are left out [s].
         """
@@ -96,7 +97,7 @@ class EventLog:
         return self._clock() - self._keepalives.last_keepalive
 
     def event_chain(self) -> tuple[str, ...]:
-        """Return the events that led to an end, oldest first, then modes and keepalives."""
+        """Return lines: the recent events, oldest first; the robot's modes; the last keepalive."""
         now = self._clock()
         return (
             *(f'{now - entry.time:.3f} s before: {entry.text}' for entry in self._recent()),

@@ -4,7 +4,7 @@
 The connection to the robot as a table of states and events.
 
 * **DISCONNECTED**: the robot does not answer; the link keeps trying.
-* **CONNECTING**: RTDE answers; the configuration of the robot (primary interface) is missing.
+* **CONNECTING**: RTDE answers; the robot has not reported its configuration (primary interface).
 * **CONNECTED**: the robot reports its state and is the configured model, but accepts no goal: the
   robot program is not connected, has ended or is paused (it would run the goal at some later
   time), the states are too old, or the TCP of the last goal has to be restored.

@@ -52,7 +52,7 @@ from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
 
-#: How long the link waits after a loss for its cause [s]: other connections report the cause.
+#: How long the link waits, after it has lost the program, for other connections to report why [s].
 CAUSE_TIMEOUT = 0.1
 
 
@@ -60,8 +60,8 @@ CAUSE_TIMEOUT = 0.1
 class LinkCallbacks:
     """Callbacks of a link's owner; all are called on the event loop."""
 
-    #: The robot's newest state, before any status or event that follows from it: when READY is
-    #: reported, the owner has a state.
+    #: The robot's newest state; called before any status or event that follows from this state, so
+    #: the owner has a state when READY is reported.
     state: Callable[[RobotState], None]
     #: An event for the running goal.
     event: Callable[[Event], None]
@@ -86,8 +86,9 @@ class RobotLink:
         """
         Prepare; :meth:`run` connects.
 
-        :param may_upload: whether the first connection may start the robot program: in the owner's
-            first robot loop, and in a later one if the program ran when the last loop was lost.
+        :param may_upload: whether the first connection may start the robot program; True in the
+            owner's first robot loop, and in a later one if the program ran when the previous loop
+            was lost.
         """
         self._settings, self._callbacks = settings, callbacks
         self._status = LinkStatus(
@@ -100,7 +101,7 @@ class RobotLink:
         self.version: ControllerVersion | None = None
         #: The robot's newest state; None = the robot is not connected.
         self.robot: RobotState | None = None
-        #: Time of the newest state [s], and the check whether it is too old.
+        #: Time of the newest state [s]; the check whether this state is too old.
         self._state_time = inf
         self._stale = StaleStates(settings.max_state_age)
         #: The robot's inputs, outputs and tool; None = not reported yet.
@@ -153,7 +154,7 @@ class RobotLink:
             tasks.create_task(self._stay_connected())
 
     def close(self) -> None:
-        """Close all ports; the robot program stops the arm, at the latest when we hang up."""
+        """Close all ports; the robot program stops the arm, at the latest as its sockets close."""
         if self._explain_timer is not None:
             self._explain_timer.cancel()
         self.program.close()
@@ -178,7 +179,7 @@ class RobotLink:
     # ---- calls of the owner -------------------------------------------------------------------
 
     def note_remote_control(self, remote: bool) -> None:
-        """Note whether clients may control the robot; after a change, connect again."""
+        """Note whether clients may control the robot; on a change, reconnect the primary port."""
         if self._remote_control not in (None, remote):
             self._primary.reconnect()
         self._remote_control = remote
@@ -240,7 +241,7 @@ class RobotLink:
             stream.close()
 
     def _other_connections(self) -> list[Coroutine[None, None, NoReturn]]:
-        """Return the connections to keep while RTDE is connected: primary, and signals."""
+        """Return the connections to keep while RTDE is connected: primary port and signals."""
         s = self._settings
         connections = [self._primary.stay_connected(s.robot_ip, s.primary_port)]
         if s.io_publish_rate > 0.0:
@@ -249,7 +250,7 @@ class RobotLink:
         return connections
 
     async def _listen(self, stream: StateStream, version: ControllerVersion) -> None:
-        """Open our ports (once), and render the program with them."""
+        """Open our ports unless they are open, and render the robot program for them."""
         s = self._settings
         host = s.bind_address or stream.local_address
         await self.program.open(
@@ -265,8 +266,8 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._callbacks.state(robot)
         changes = () if before is None else mode_changes(before, robot)
-        # Unless a mode changes, the packet cannot change the status: then the goal reacts first,
-        # perhaps by a CANCEL.
+        # Unless a mode changes, the packet cannot change the status, so the goal reacts to the
+        # packet first, perhaps by a CANCEL.
         status_may_change = before is None or bool(changes)
         if not status_may_change:
             self._callbacks.event(StateReceived(state=robot))
@@ -332,7 +333,7 @@ class RobotLink:
         self._status.error(text)
 
     def _on_robot_text(self, text: str) -> None:
-        """Log a line of the robot's log; lines of our program may explain an end."""
+        """Log a text that the robot reports; if our program wrote it, note it as an event, too."""
         self._callbacks.log(logging.INFO, f'robot: {text}')
         program, _, said = text.partition(': ')
         if program == PROGRAM_NAME and said:
@@ -427,7 +428,7 @@ class RobotLink:
 
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
-    """Return the models that report this type; a UR7e reports itself as a UR5."""
+    """Return the models that report this type; for example, a UR7e reports that of a UR5."""
     names = [
         name
         for name, model in MODELS.items()

@@ -163,7 +163,7 @@ class LinkSettings:
 
 def _require_address(name: str, text: str) -> None:
     """
-    Refuse a text that is not an IP address: it is compared with the addresses of clients.
+    Refuse a text that is not an IP address, because it is compared with the clients' addresses.
 
     :raises ValueError: the text is a host name or a network, for example.
     """

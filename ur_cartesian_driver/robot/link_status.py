@@ -14,13 +14,13 @@ from ur_cartesian_driver.robot.connection_status import ConnectionStatus, timest
 from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
 from ur_cartesian_driver.robot.transport import AttemptLog
 
-#: States in which the robot is out of reach or the wrong one; then the message is the reason, not
-#: the next step.
+#: States in which the robot is out of reach or the wrong one; the message is then the reason for
+#: the state, not the next step.
 OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
 #: The states through which each attempt to connect passes.
 ATTEMPTING = frozenset({*OUT_OF_REACH, ConnectionState.CONNECTING})
-#: How long a next step at CONNECTED must persist before it is logged [s]: a program that is about
-#: to connect needs no help.
+#: How long the next step in the state CONNECTED must persist before it is logged [s], because a
+#: program that is about to connect makes it unnecessary.
 LOG_DELAY = 1.0
 
 

@@ -20,7 +20,7 @@ from ur_cartesian_driver.urscript.parsing.syntax_tree import (
 )
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Size above which a file must be a mistake [characters].
+#: Size [characters] above which a file must be a mistake.
 MAX_SIZE = 200_000
 
 
@@ -97,7 +97,7 @@ def compile_prelude(text: str, name: str) -> Prelude:
 
 def _code_lines(text: str, name: str) -> Iterator[str]:
     """
-    Yield the lines that are not comments: the External Control node splits a program at markers.
+    Yield the lines of code; comments are left out, as some are markers of External Control.
 
     :raises ValueError: a line of code contains a marker.
     """

@@ -32,14 +32,14 @@ from ur_cartesian_driver.robot.transport import AttemptLog, Backoff, dial, TcpCo
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
-#: Silence after which a connection is dead [s]; a command to stop the program would be lost on it.
-#: The robot reports its state ten times a second.
+#: Silence after which a connection is given up [s]: on a dead one, a command to stop the program
+#: would be lost. The robot reports its state ten times a second.
 SILENCE_TIMEOUT = 1.5
 #: Error code of a request on a read-only connection.
 READ_ONLY_CODE = 210
 #: Beginning of a message's title if a secondary program failed, which stops no other program.
 SECONDARY_EXCEPTION = 'SECONDARY_PROGRAM_EXCEPTION'
-#: Largest age of a request that is repeated [s]: switching to remote control later starts nothing.
+#: Largest age of a request that is repeated [s]; a later switch to remote control starts nothing.
 REPEAT_TIMEOUT = 1.0
 
 
@@ -78,7 +78,7 @@ class PrimaryClient:
         self._decoder = primary.PrimaryDecoder()
         self._connection: TcpConnection | None = None
         self._has_configuration = self._has_received = False
-        #: Requests that a refusal may concern, and requests to send on the next connection.
+        #: Requests that a refusal may concern; requests to send on the next connection.
         self._sent: list[_Request] = []
         self._to_send: list[_Request] = []
         #: The connection is being closed in order to connect again.
@@ -86,10 +86,10 @@ class PrimaryClient:
 
     def send(self, data: bytes, is_wanted: Callable[[], bool]) -> bool:
         """
-        Send a program or command; False while there is no connection.
+        Send a program or command; return False while there is no connection.
 
-        :param is_wanted: called before the request is sent again on a new connection, because the
-            first was read-only; returns whether it is still wanted and disturbs no other program.
+        :param is_wanted: returns whether the request is still wanted and disturbs no other
+            program; called before it is sent again because the first connection was read-only.
         """
         request = _Request(data, is_wanted, asyncio.get_running_loop().time())
         if self._is_reconnecting:
@@ -111,7 +111,7 @@ class PrimaryClient:
         return [request for request in requests if now - request.time < REPEAT_TIMEOUT]
 
     def _send_again(self) -> None:
-        """Send the requests that the previous connection refused, and those that came since."""
+        """Send the requests refused on the last connection, and those that came since."""
         self._is_reconnecting = False
         requests, self._sent, self._to_send = self._recent(self._to_send), [], []
         for request in requests:
@@ -119,7 +119,7 @@ class PrimaryClient:
                 self._connection.send(request.data)
 
     def _repeats_refused(self) -> bool:
-        """Connect again after a refusal; False = no recent request, so the refusal is final."""
+        """Connect again after a refusal; return False if no request is recent enough to repeat."""
         if not (refused := self._recent(self._sent)):
             return False
         self._to_send += refused
@@ -146,7 +146,7 @@ class PrimaryClient:
         """
         Serve one connection and return the reason of its end.
 
-        :raises OSError: nothing answers, or something that is not a robot.
+        :raises OSError: nothing answers, or what answers is not a robot.
         """
         closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._decoder = primary.PrimaryDecoder()

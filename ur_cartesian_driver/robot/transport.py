@@ -25,14 +25,14 @@ OnClosed = Callable[[str], None]
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
 
-#: Most data that waits for the other side to read it [bytes]: more than a send window of points,
-#: and a bound on the memory.
+#: Most data that may wait for the other side to read it [bytes]: more than a send window of
+#: points; it bounds the memory.
 MAX_UNSENT = 1 << 20
 #: Most data that is read at once [bytes].
 MAX_READ = 1 << 16
-#: How long a closed connection may take to send the rest [s].
+#: How long a closed connection may take to send its remaining data [s].
 LINGER_TIMEOUT = 1.0
-#: Largest number of log lines about clients in a period, and this period [s].
+#: Largest number of log lines about clients in a period; this period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
 #: Largest number of different failures to connect that are counted separately.
 MAX_FAILURES = 20
@@ -156,7 +156,7 @@ class TcpConnection(asyncio.BufferedProtocol):
                 asyncio.get_running_loop().call_later(LINGER_TIMEOUT, self._transport.abort)
 
     def abort(self, reason: str) -> None:
-        """Close at once, whatever is still unsent."""
+        """Close at once, even if data are still unsent."""
         self._reason = self._reason or reason
         if self._transport is not None:
             self._transport.abort()
@@ -182,7 +182,7 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
 
 
 def error_reason(error: OSError) -> str:
-    """Return the system's text for an error: asyncio's repeats the address, or counts attempts."""
+    """Return the system's text for an error; asyncio's repeats the address or counts attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # such as an unknown host name
@@ -196,7 +196,7 @@ class Backoff:
         self._attempt = 0
 
     def reset(self) -> None:
-        """Take note of a success."""
+        """Return to the shortest pause after a success."""
         self._attempt = 0
 
     async def wait(self) -> None:
@@ -224,18 +224,18 @@ class AttemptLog:
         self._counts: dict[str, int] = {}
 
     def failed(self, text: str) -> None:
-        """Take a failure."""
+        """Log a failure if it is new, else count it."""
         if text in self._counts:
             self._counts[text] += 1
             return
         self._log_counts()
-        if len(self._counts) >= MAX_FAILURES:  # so many texts hardly repeat
+        if len(self._counts) >= MAX_FAILURES:  # texts that always differ must not fill the memory
             self._counts.clear()
         self._counts[text] = 1
         self._log(text)
 
     def succeeded(self) -> None:
-        """Take note of a success: failures after it are new."""
+        """Log the counts, and forget all failures: after a success, any failure is new."""
         self._log_counts()
         self._counts.clear()
 
@@ -309,7 +309,7 @@ class TcpListener:
 
     async def open(self, host: str, port: int, allowed: frozenset[str]) -> None:
         """
-        Listen.
+        Start to listen.
 
         :param port: port number; 0 = any free port, which :attr:`port` then gives.
         :param allowed: addresses that may connect; empty = all.
@@ -382,7 +382,7 @@ class TcpListener:
 
 
 def plain_address(text: str) -> str:
-    """Return an address in its plain form: the IPv4 client of an IPv6 port has two forms."""
+    """Return an address in plain form: an IPv4 client of an IPv6 port has another form, too."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

@@ -3,7 +3,7 @@
 """
 The ROS interface: the node, its action, topics, services and parameters, and their messages.
 
-No package of a lower layer imports ROS. The node in a program::
+No package of a lower layer imports ROS. A program runs the node like this::
 
     rclpy.init()
     node = CartesianDriverNode(parameter_overrides={'robot_ip': '192.168.56.101'})
@@ -19,7 +19,7 @@ __all__ = ['CartesianDriverNode']
 
 
 def __getattr__(name: str) -> Any:
-    """Import the node on first use: `python -m` of a module here must not import it before."""
+    """Import the node on first use: `python -m` warns if the module that it runs is imported."""
     if name in __all__:
         from ur_cartesian_driver.ros import node
 

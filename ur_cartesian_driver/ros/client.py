@@ -4,7 +4,7 @@
 An action client: read a goal from YAML, send it, wait for its result.
 
 ``ur-cartesian send`` and the demo use it. The YAML is the same as for ``ros2 action send_goal``,
-whose reader (rosidl_runtime_py) is not among the wheels of ROS 2.
+whose reader (rosidl_runtime_py) is missing if ROS 2 is installed as Python wheels.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def resumed_goal(
     """
     Return the rest of a goal that was stopped at a place, as a message and as a resumed goal.
 
-    :param overlap: like ``approach`` a length [m], see :func:`~ur_cartesian_driver.path.resume`.
+    :param overlap: a length [m], like ``approach``; see :func:`~ur_cartesian_driver.path.resume`.
     :raises InvalidGoal: the goal cannot be resumed.
     """
     left = resume(goal_from_fields(goal), place, overlap=overlap, approach=approach)
@@ -130,11 +130,11 @@ class GoalClient:
         node: Node | None = None,
     ) -> None:
         """
-        Create the node.
+        Create the client, and its node unless one is given.
 
         :param driver: name of the driver's node, with its namespace if it has one.
-        :param node: an existing node to use instead. If an executor spins it, call the client
-            outside the executor's thread; if none does, the client spins it while it waits.
+        :param node: an existing node to use. If an executor spins the node, call the client
+            outside the executor's thread; if not, the client spins the node while it waits.
         """
         #: The signal that cancelled the last goal; 0 = none.
         self.signal_number = 0
@@ -143,14 +143,14 @@ class GoalClient:
         self._closed = False
         self._own_context: Context | None = None
         if node is None:
-            # This context installs no signal handlers: a goal can be cancelled after Ctrl-C.
+            # This context installs no signal handlers: a goal can still be cancelled after Ctrl-C.
             self._own_context = Context()
             rclpy.init(args=[], context=self._own_context)
             node = rclpy.create_node(node_name, context=self._own_context)
         self._node = node
         self._offsets: Any = None
         self._append_service: Any = None
-        #: The appender of the goal that runs.
+        #: The appender of the running goal; None = no goal runs, or it has no keep_open.
         self._appender: GoalAppender | None = None
         self._client = ActionClient(node, FollowCartesianTrajectory, self.action)
         #: None = another executor spins the node.
@@ -178,7 +178,7 @@ class GoalClient:
             self._client.destroy()
         else:
             # An executor that is about to wait would fail on a client that is destroyed meanwhile.
-            # So the client is only removed here; its last reference destroys it.
+            # So the client is only removed here, and destroyed when nothing refers to it any more.
             self._node.remove_waitable(self._client)
         if self._append_service is not None:
             self._node.destroy_client(self._append_service)
@@ -200,15 +200,17 @@ class GoalClient:
         A goal of many points is sent in flat arrays.
 
         On the first SIGINT, SIGTERM or SIGHUP, the client cancels the goal, waits for its result
-        and sets :attr:`signal_number`; on the second one, it gives up.
+        and sets :attr:`signal_number`; on the second one, it raises KeyboardInterrupt.
 
-        :param on_feedback: called with each feedback; if it raises, the goal is cancelled, and its
-            exception is raised when the goal has ended, with a note that says how.
+        :param on_feedback: called with each feedback message. If the call raises an exception, the
+            goal is cancelled; when the goal has ended, the exception is raised here, with a note
+            that gives the result.
         :param timeout: how long to look for the driver [s].
         :param cancel: whether a signal or a failed ``on_feedback`` cancels the goal; if not, the
             goal goes on.
         :raises TimeoutError: no driver answers.
-        :raises ConnectionError: the driver is gone; how the goal ended is not known.
+        :raises ConnectionError: the goal was not accepted, or the driver is gone; in the latter
+            case the end of the goal is not known.
         """
         self._find_server(timeout)
         if goal.keep_open:
@@ -275,7 +277,7 @@ class GoalClient:
         self, *, along: float = 0.0, across: float = 0.0, normal: float = 0.0
     ) -> None:
         """
-        Displace the tool from its path from now on, if the goal that runs permits it.
+        Displace the tool from its path from now on, if the running goal permits offsets.
 
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
 
@@ -299,21 +301,22 @@ class GoalClient:
         replace_from_time: float | None = None,
     ) -> Future:
         """
-        Append the points of a path to the goal that runs (``keep_open``), or replace its tail.
+        Append the points of a path to the running goal (``keep_open``), or replace its tail.
 
         This can be called from anywhere while the goal runs, also in the callback of :meth:`send`.
-        It does not wait; requests are sent one after the other.
+        The call does not wait; requests are sent one after the other.
 
-        :param path: with times from the start of the goal; of a message, only points, segments
-            and outputs are used. None = no points, allowed only with ``last``.
+        :param path: the points, with times from the start of the goal; from a message, only
+            points, segments and outputs are used. None = no points, allowed only with ``last``.
         :param last: whether these are the last points of the goal.
         :param replace_from_point: the first point that the new ones replace, together with all
             later points.
-        :param replace_from_time: alternatively, the time from which they replace the old ones [s].
-        :return: a future of the response of ``~/append_points``. After a refusal, its ``accepted``
-            is false, ``message`` says why, and the goal goes on as it was.
+        :param replace_from_time: alternatively, the time from which new points replace old ones
+            [s].
+        :return: a future of the response of ``~/append_points``. If the request is refused,
+            ``accepted`` is false, ``message`` says why, and the goal goes on as it was.
         :raises RuntimeError: no goal of this client runs.
-        :raises ValueError: both places are given.
+        :raises ValueError: both ``replace_from_point`` and ``replace_from_time`` are given.
         """
         if self._appender is None:
             raise RuntimeError(
@@ -335,12 +338,13 @@ class GoalClient:
         **where: Any,
     ) -> AppendPoints.Response:
         """
-        Append to the goal that moves the arm, from any client; return the response.
+        Append to the goal that moves the arm, whichever client sent it; return the response.
 
         If no goal runs, the response is a refusal.
 
-        :param path: see :meth:`append`, also for the response.
-        :param where: ``last``, ``replace_from_point`` or ``replace_from_time``, see there.
+        :param path: see :meth:`append`.
+        :param where: ``last``, ``replace_from_point`` or ``replace_from_time``, see
+            :meth:`append`.
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
         :raises ConnectionError: the driver is gone.
@@ -359,7 +363,7 @@ class GoalClient:
             self._appender = None
 
     def _running_goal(self) -> Any:
-        """Return the id of the goal that moves the arm: the oldest, as newer ones still wait."""
+        """Return the id of the goal that moves the arm (the oldest, newer ones wait), or None."""
         latest: list[GoalStatusArray] = []
         subscription = self._node.create_subscription(
             GoalStatusArray,
@@ -383,7 +387,7 @@ class GoalClient:
 
     def recover(self, *, unlock_protective_stop: bool = False, timeout: float = 10.0) -> Any:
         """
-        Bring a stopped robot back to READY, as far as software may do so; return the response.
+        Bring a stopped robot back to READY, as far as software is allowed to; return the response.
 
         :param unlock_protective_stop: whether a person has found and removed the cause of a
             protective stop; if not, unlocking the stop is left to a person.
@@ -404,7 +408,8 @@ class GoalClient:
         """
         Wait until the status of the driver is READY.
 
-        :raises TimeoutError: it takes longer than ``timeout`` [s]; the text names the next step.
+        :raises TimeoutError: the driver is not READY within ``timeout`` [s]; the text names the
+            next step.
         """
         latest: list[DriverStatus] = []
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -443,7 +448,12 @@ class GoalClient:
         return f'start it, with the same ROS_DOMAIN_ID as here, which is {domain}.'
 
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
-        """Spin until a future is done."""
+        """
+        Spin until a future is done, and return its result.
+
+        :param between: called after each spin, at least every 0.1 s.
+        :raises ConnectionError: the driver is gone.
+        """
         last_seen = monotonic()
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
@@ -467,7 +477,7 @@ class GoalClient:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Store the first signal that ends a process; the second one raises KeyboardInterrupt."""
+        """During the block, store the first signal; the second one raises KeyboardInterrupt."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return

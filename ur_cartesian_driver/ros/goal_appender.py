@@ -12,7 +12,7 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.ros.messages.packed_points import packed_if_long
 from ur_cartesian_driver.srv import AppendPoints
 
-#: An index that no goal has; the refusal of a request with it says how many points there are.
+#: An index that no point has: a request with this index is refused with the number of points.
 UNKNOWN_POINT = 2**32 - 1
 
 
@@ -41,9 +41,9 @@ class GoalAppender:
         """
         Send a request once all earlier ones are answered; return a future of the response.
 
-        :param goal: holds points, segments and outputs; for it and the other parameters see
-            :meth:`~ur_cartesian_driver.ros.client.GoalClient.append`.
-        :raises ValueError: both places are given.
+        :param goal: the points, segments and outputs; None = no points. For the other parameters
+            see :meth:`~ur_cartesian_driver.ros.client.GoalClient.append`.
+        :raises ValueError: both ``replace_from_point`` and ``replace_from_time`` are given.
         """
         if replace_from_point is not None and replace_from_time is not None:
             raise ValueError('Give replace_from_point or replace_from_time, not both.')

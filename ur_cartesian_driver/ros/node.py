@@ -42,7 +42,7 @@ HEARTBEAT_PERIOD = 0.5
 DISCOVERY_TIME = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_TIMEOUT = 5.0
-#: The memory of arrays of at least this size goes back to the system when it is freed [bytes].
+#: Arrays of at least this size give their memory back to the system when they are freed [bytes].
 LARGE_ARRAY = 4 * 2**20
 #: Parameters of mallopt, from malloc.h.
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8
@@ -52,8 +52,8 @@ class CartesianDriverNode(Node):
     """
     The driver of one arm as a ROS node.
 
-    From its construction until :meth:`destroy_node`, it connects to the robot by itself. Add it to
-    any executor; if the executor hangs for ``node_timeout``, the arm is stopped.
+    From its construction until :meth:`destroy_node`, the node connects to the robot by itself. Add
+    the node to any executor; if the executor hangs for ``node_timeout``, the arm is stopped.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class CartesianDriverNode(Node):
         self.create_timer(
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
             self.driver.heartbeat,
-            # Served while other callbacks run, by a clock that does not stop with simulated time.
+            # Runs during other callbacks, by a clock that does not stop with simulated time.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
@@ -243,10 +243,10 @@ def _end_goals(
 
 def _share_freed_memory() -> None:
     """
-    Make all threads share one memory arena, and return large arrays (glibc, mallopt(3)).
+    Make all threads share one memory arena, and free large arrays at once (glibc, mallopt(3)).
 
-    Each goal is planned in a thread of its own. With an arena for each thread, the memory that it
-    frees stays in its arena: five goals of 100,000 points then take 200 MB more.
+    Each goal is planned in a thread of its own. With an arena for each thread, the memory that a
+    thread frees stays in its arena: five goals of 100,000 points then take 200 MB more.
     """
     mallopt = getattr(ctypes.CDLL(None), 'mallopt', None)  # other C libraries have none
     if mallopt is not None:

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A simulated UR controller: it interprets any URScript, with no special cases for our program.
+A simulated UR controller: it interprets any URScript, with no special cases for this driver.
 
-:class:`SimulatedRobot` is a whole robot, on the ports of a real one. :func:`assemble` makes only
-its :class:`Controller`, without network and clock, for tests that count cycles.
+:class:`SimulatedRobot` is a whole robot, on the ports of a real one. :func:`assemble` makes only a
+:class:`Controller` and its fault injector, without network and clock, for tests that count cycles.
 """
 
 from typing import TYPE_CHECKING

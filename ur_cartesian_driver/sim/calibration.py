@@ -3,9 +3,9 @@
 """
 Kinematic calibrations: read from a file, or random.
 
-Both describe the joint axes in space; the common normals of the axes give the DH table. If two
-axes are nearly parallel (shoulder lift, elbow, wrist 1), their common normal can lie far away.
-This is why real robots report lengths of many metres, which cancel out.
+Both kinds describe the joint axes in space; the common normals of the axes give the DH table. If
+two axes are nearly parallel (shoulder lift, elbow, wrist 1), their common normal can lie far away.
+Real robots therefore report lengths of many metres, which cancel out.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import numpy as np
 from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: Standard deviations of the axes of a random calibration [rad, m]; they displace the flange by 1
-#: to 2 mm, as on real arms.
+#: Standard deviations of the turn [rad] and of the shift [m] of each axis in a random calibration;
+#: all axes together displace the flange by 1 to 2 mm, as on real arms.
 AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
 
 _LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
 _FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
-# Axes at a smaller angle are treated as parallel [rad], because files are rounded to ten digits.
+# Axes at a smaller angle [rad] are treated as parallel, because files are rounded to ten digits.
 _PARALLEL = 1e-8
 # Tolerated deviation of the first joint from the axis of the base [m, rad].
 _OFF_AXIS = 1e-9
@@ -37,10 +37,10 @@ _OFF_AXIS = 1e-9
 class _Axes:
     """The joint axes and the flange of an arm with all joints at 0, in base axes."""
 
-    #: A point on each joint axis [m], and the direction of the axis; both (6, 3).
+    #: A point on each joint axis [m] (6, 3); the direction of each joint axis (6, 3).
     points: Floats
     directions: Floats
-    #: The flange (4, 4): z along the last axis, origin on that axis.
+    #: The pose of the flange (4, 4); its origin lies on the last joint axis, its z axis along it.
     flange: Floats
 
 
@@ -48,11 +48,11 @@ def read_calibration(path: Path, model: RobotModel) -> DhTable:
     """
     Return the DH table of a calibration file written by ``ur_calibration`` of the UR ROS driver.
 
-    In the file, ``kinematics`` has entries shoulder, upper_arm, forearm, wrist_1, wrist_2 and
-    wrist_3 with the pose of each joint in the preceding link: x y z [m], roll pitch yaw [rad].
+    In the file, ``kinematics`` has the entries shoulder, upper_arm, forearm, wrist_1, wrist_2 and
+    wrist_3. Each is the pose of a joint in the preceding link: x y z [m], roll pitch yaw [rad].
 
     :raises OSError: the file cannot be read.
-    :raises ValueError: a value is missing or not a number; the text names file, link and field.
+    :raises ValueError: the file is not such a calibration; the text names the file and the fault.
     """
     import yaml
 
@@ -139,7 +139,7 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
         following = axes.directions[i]
         normal, d, a = _common_normal(origin, z, axes.points[i], following)
         alpha = _angle(normal, z, following)
-        # Of the two directions of the normal, choose that of the model.
+        # Of the two directions of the normal, choose the one with the signs of the model's table.
         nominal_a, nominal_alpha = model.geometry.a[i - 1], model.geometry.alpha[i - 1]
         if (a * nominal_a if nominal_a else alpha * nominal_alpha) < 0.0:
             normal, a, alpha = -normal, -a, -alpha
@@ -156,14 +156,14 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Floats, z: Floats, point: Floats, following: Floats
 ) -> tuple[Floats, float, float]:
-    """Return the direction of the common normal, its start along the first axis, its length."""
+    """Return direction of the common normal, its distance from ``origin`` along z, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:
         normal /= size
         d, a, _ = np.linalg.solve(np.column_stack([z, normal, -following]), point - origin)
         return normal, float(d), float(a)
-    # Any normal of parallel axes will do; this one goes through the origin of the row.
+    # Parallel axes have many common normals; choose the one that begins at ``origin``.
     across = point - origin
     across = across - z * (z @ across)
     a = float(np.linalg.norm(across))
@@ -171,7 +171,7 @@ def _common_normal(
 
 
 def _flange_on(axes: _Axes) -> Floats:
-    """Return the flange moved onto the last axis: z along the axis, origin on it."""
+    """Return the flange, moved so that its origin is on the last axis and its z along the axis."""
     z, point, flange = axes.directions[5], axes.points[5], axes.flange
     x = flange[:3, 0] - z * (z @ flange[:3, 0])
     x /= np.linalg.norm(x)

@@ -15,19 +15,19 @@ from dataclasses import dataclass
 import time
 from typing import Literal, Protocol
 
-#: The event loop wakes up to this much too late [s], because epoll counts in milliseconds. The
-#: clock therefore asks to be woken this much too early, and sleeps for the rest.
+#: The event loop can be late by this much [s], because epoll counts in milliseconds. The clock
+#: therefore asks to be woken this much too early, and sleeps for the remaining time.
 _LOOP_GRAIN = 0.001
 #: A clock that is late by more than this [s] (suspended process, overloaded machine) restarts
-#: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and no client could
-#: answer in time while the cycles run faster to catch up.
+#: instead of catching up. During faster cycles no client could answer in time, because programs
+#: count their timeouts (commonly 0.2 s) in cycles.
 _MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Lateness of the last cycles [s]: median, 99th percentile, worst."""
+    """Lateness of the last cycles [s] (median, 99th percentile, worst), and their number."""
 
     p50: float
     p99: float
@@ -36,7 +36,7 @@ class Lateness:
 
 
 class Clock(Protocol):
-    """Waits until the next cycle is due, while the event loop runs."""
+    """Waits until the next cycle is due, and lets the event loop run meanwhile."""
 
     #: Simulated time that the clock has skipped [s].
     skipped: float
@@ -46,7 +46,7 @@ class Clock(Protocol):
 
 
 class VirtualClock:
-    """Time that passes as fast as cycles can be computed; the servers run in between."""
+    """A clock whose time passes as fast as cycles can be computed; it never waits."""
 
     skipped = 0.0
 
@@ -56,24 +56,24 @@ class VirtualClock:
 
 
 class RealClock:
-    """Absolute deadlines, one cycle apart on the monotonic clock."""
+    """A clock with absolute deadlines, which are one cycle apart on the monotonic clock."""
 
     def __init__(
         self, cycle: float, rate: float = 1.0, when_late: Literal['skip', 'wait'] = 'skip'
     ) -> None:
         """
-        Begin with the first deadline one cycle from the first call.
+        Set the first deadline one cycle after the first call of `next_cycle`.
 
-        :param cycle: [s] of simulated time.
+        :param cycle: simulated time of a cycle [s].
         :param rate: seconds of simulated time per second of real time.
-        :param when_late: 'skip': at a restart the lateness is added to ``skipped``; 'wait': not.
+        :param when_late: 'skip' = a restart adds the lateness to ``skipped``; 'wait' = does not.
         """
         self._period, self._rate = cycle / rate, rate
         self._skips = when_late == 'skip'
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
-        #: Number of restarts of the clock, and the simulated time that it has skipped [s].
+        #: Number of restarts of the clock; simulated time that the clock has skipped [s].
         self.slips, self.skipped = 0, 0.0
 
     async def next_cycle(self) -> None:
@@ -85,7 +85,7 @@ class RealClock:
         await asyncio.sleep(max(0.0, deadline - time.monotonic() - _LOOP_GRAIN))
         rest = deadline - time.monotonic()
         if rest > 0.0:
-            # At most a millisecond, the grain of the loop's own timer.
+            # This blocks for at most a millisecond, the grain of the loop's own timer.
             time.sleep(rest)  # noqa: ASYNC251
         late = max(0.0, time.monotonic() - deadline)
         self._late.append(late)
@@ -94,7 +94,7 @@ class RealClock:
             self.skipped += late * self._rate * self._skips
 
     def lateness(self) -> Lateness:
-        """Return the lateness of the last 20,000 cycles."""
+        """Return the lateness of the last cycles, at most 20,000."""
         late = sorted(self._late) or [0.0]
         return Lateness(
             p50=late[len(late) // 2],

@@ -3,9 +3,9 @@
 """
 The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
-:func:`~.controller_assembly.assemble` makes a controller; its user calls :meth:`Controller.step`
+:func:`~.controller_assembly.assemble` makes a controller. Its user calls :meth:`Controller.step`
 once per cycle, and any other method between two steps. A controller never waits and has neither
-clock nor network, so it also runs on a virtual clock.
+clock nor network, so a controller also runs on a virtual clock.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
 #: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Times from full speed to zero: by the slider or a pause, and by a protective stop [s]. The
-#: manufacturer publishes neither.
+#: Time from full speed to zero by the slider or in a pause [s]. Not published.
 SLIDER_TIME = 0.25
+#: Time from full speed to zero in a protective stop [s]. Not published.
 PROTECTIVE_STOP_TIME = 0.1
-#: Time from full speed to zero for a program that ends on its path [s]: the speed scaling of a
-#: UR5e recorded in URSim falls by 6.25 per second.
+#: Time from full speed to zero if a program ends while the arm is on a path [s]: the speed scaling
+#: of a UR5e recorded in URSim falls by 6.25 per second.
 PROGRAM_STOP_TIME = 0.16
 #: States of a program in which the arm slows down to a standstill, or stands still.
 _HELD_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING)
@@ -67,13 +67,13 @@ MAX_HISTORY = 100
 _MAX_POPUPS = 100
 #: Error code of a protective stop (C209).
 _PROTECTIVE_STOP_CODE = 209
-#: Delay from a line that unlocks a protective stop to its effect [s]. It is only known that the
-#: effect is not immediate.
+#: Delay from a line that demands the unlocking of a protective stop to the unlocking [s]. It is
+#: only known that a real robot does not unlock immediately.
 UNLOCK_TIME = 0.02
 
 
 class CycleFaults(Protocol):
-    """The faults of a controller, as its cycle uses them."""
+    """The faults of a controller, as the controller's cycle uses them."""
 
     #: Whether `step` has to be called in each cycle.
     active: bool
@@ -98,7 +98,7 @@ class Controller:
         :param sockets: the sockets of programs; None = in memory, for tests.
         """
         self.config = config
-        #: Duration of a cycle [s], and number of cycles so far.
+        #: Duration of a cycle [s]; number of cycles so far.
         self.cycle = config.cycle
         self.cycles = 0
         #: Time that the clock has skipped because this computer was too busy [s].
@@ -108,7 +108,7 @@ class Controller:
         self.motion.turn_ratio = config.turn_ratio
         #: The bodies that the tool can touch, and the compliance of the arm.
         self.contact = ContactMotion(self.motion, config.contact_bodies)
-        #: The measured motion: equal to the targets, unless it is disturbed.
+        #: The measured motion, which equals the targets unless something disturbs the arm.
         self.actual = ActualMotion(self.motion, config.imperfections, self.contact)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
@@ -125,11 +125,11 @@ class Controller:
         self.watchdogs = Watchdogs()
         self.popups: list[Popup] = []
         self.payload = Payload()
-        #: Acceleration that counters gravity, in the base [m/s^2].
+        #: Acceleration opposite to gravity, in base axes [m/s^2].
         self.gravity: Vector3 = (0.0, 0.0, 9.82)
         self.freedrive = FreedriveState.OFF
         self.process = ProcessState()
-        #: Target of the last move; None after a stream of set-points.
+        #: Target pose of the last move; None after a stream of set-points.
         self.waypoint: Pose | None = None
         self.external_ft = False
         self._unlock_at = inf
@@ -137,9 +137,9 @@ class Controller:
         self.remote_control = config.remote_control and config.has_remote_control
         #: The speed slider, 0..1.
         self.speed_slider = 1.0
-        #: The rate at which motion runs now, 0..1; it follows slider, pauses and stops.
+        #: The rate at which motions run now, 0..1; determined by slider, pauses and stops.
         self.scale = 1.0
-        #: Whether the arm slows down on its path because a program has ended in motion.
+        #: Whether the arm slows down on its path because the program ended during the motion.
         self._stopping_on_path = False
         self._joint_history: deque[Vector6] = deque([config.q] * MAX_HISTORY, maxlen=MAX_HISTORY)
         self.programs: ProgramRunner = ProgramRunner(
@@ -154,14 +154,14 @@ class Controller:
         if config.program and (refusal := self.load_program(config.program)):
             raise ValueError(f'program is {config.program}, which cannot be loaded: {refusal}')
         self.messages.on_error = self._pause_if_wanted
-        #: Set by the assembly; None = nothing goes wrong.
+        #: The faults, set by the assembly; None = no faults.
         self.faults: CycleFaults | None = None
 
     # ---- state --------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
-        """The controller's clock [s]: it counts cycles and contains no skipped time."""
+        """The controller's clock [s], which counts cycles and does not include skipped time."""
         return START_TIME + self.cycles * self.cycle
 
     @property
@@ -169,14 +169,14 @@ class Controller:
         """
         The controller's clock as clients read it [s].
 
-        It contains the time that was skipped because this computer was too busy: otherwise
-        clients that compare it with their own clock would consider the states too old.
+        The time that was skipped because this computer was too busy is included: otherwise clients
+        that compare timestamps with their own clock would consider the states too old.
         """
         return self.time + self.skipped_time
 
     @property
     def at_rest(self) -> bool:
-        """Whether the arm stands still, at the end of a motion or paused on its path."""
+        """Whether the arm stands still, because no motion runs or because the scale is 0."""
         return self.scale == 0.0 or not self.motion.moving
 
     @property
@@ -186,14 +186,14 @@ class Controller:
 
     @property
     def speed_scaling(self) -> float:
-        """The speed scaling without the speed slider, 0..1; 0 at rest and in pauses."""
+        """The speed scaling 0..1, not including the speed slider; 0 at rest and in pauses."""
         if self.at_rest or not self.speed_slider:
             return 0.0
         return min(1.0, self.motion.scaling / self.speed_slider)
 
     @property
     def robot_status(self) -> RobotStatus:
-        """The status bits of power and program."""
+        """The status bits for power and program."""
         powered = self.power.mode >= RobotMode.POWER_ON
         bits = RobotStatus.POWER_ON if powered else RobotStatus(0)
         return bits | RobotStatus.PROGRAM_RUNNING if self.programs.running else bits
@@ -205,7 +205,7 @@ class Controller:
 
     @property
     def _is_moving_freely(self) -> bool:
-        """Whether neither a pause nor a stop holds the arm."""
+        """Whether the arm has power, and no pause or stop holds the arm."""
         return (
             self.safety.mode in OPERATIONAL
             and self.power.mode is RobotMode.RUNNING
@@ -224,7 +224,7 @@ class Controller:
 
     @property
     def tool_accelerometer(self) -> Vector3:
-        """The reading of an accelerometer in the flange, with gravity, in flange axes [m/s^2]."""
+        """The reading of the flange's accelerometer [m/s^2], including gravity, in flange axes."""
         motion = self.motion
         frames = self.arm.frames(motion.q)
         acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
@@ -238,14 +238,15 @@ class Controller:
 
     @property
     def takes_scripts(self) -> bool:
-        """Whether clients can send programs and commands; always if there is no remote control."""
+        """Whether clients can send programs; always true for a robot without remote control."""
         return self.remote_control or not self.config.has_remote_control
 
     def joint_history(self, steps: int) -> Vector6:
         """
-        Return the joint positions some cycles ago.
+        Return the actual joint positions of an earlier cycle [rad].
 
-        :raises RuntimeException: the cycle lies before the history.
+        :param steps: how many cycles ago.
+        :raises RuntimeException: ``steps`` is negative, or longer than the history.
         """
         if not 0 <= steps < MAX_HISTORY:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{MAX_HISTORY - 1}')
@@ -281,9 +282,9 @@ class Controller:
 
     def _change_scale(self, was_at_rest: bool) -> None:
         """
-        Ramp the speed scaling towards its target, as fast as an arm can follow.
+        Ramp the scale towards its target, in the time that a real arm takes.
 
-        :param was_at_rest: the arm stood still before this cycle, so it needs no ramp.
+        :param was_at_rest: whether the arm stood still before this cycle; then no ramp is needed.
         """
         held = self.programs.state in _HELD_STATES or self._stopping_on_path
         target = 0.0 if held else self.speed_slider
@@ -296,7 +297,7 @@ class Controller:
         self.scale = min(max(target, self.scale - step), self.scale + step)
 
     def _report_motion_events(self) -> None:
-        """Send the warnings of the motion; a fault stops the robot."""
+        """Send the warnings of the motion; a fault of the motion causes a protective stop."""
         for warning in self.motion.warnings:
             self.messages.error(warning.code, warning.argument, warning.text)
         self.motion.warnings.clear()
@@ -311,7 +312,7 @@ class Controller:
             self.programs.pause()
 
     def _watch_inputs(self, now: float) -> None:
-        """Stop or pause the program whose RTDE client has stopped writing an input."""
+        """Stop or pause the program if an RTDE input was not written in time."""
         for variable, action in self.watchdogs.expired(now):
             self.messages.text(f'RTDE watchdog: {variable} was not written in time.')
             if action == 'stop':
@@ -325,7 +326,7 @@ class Controller:
         """
         Stop the arm because the program has ended: on the path, or hard if there is no path.
 
-        If the arm already stands still on its path, paused or at a fault, the path is discarded.
+        If the arm is paused on its path or stopped by a fault, the path is discarded.
         """
         if self.scale == 0.0 or self.motion.fault is not None:
             self.motion.stop_at_once()
@@ -349,11 +350,11 @@ class Controller:
         self.watchdogs.clear()
 
     def end_of_frame(self) -> None:
-        """Brake if no thread continues the motion."""
+        """Brake if a thread was killed in a motion that no other thread continues."""
         self.ownership.end_of_frame()
 
     def release(self, thread: Hashable) -> None:
-        """Take the motion from a thread that has ended."""
+        """Take the ownership of the motion from a thread that has ended."""
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:
@@ -394,7 +395,7 @@ class Controller:
         return ''
 
     def power_off(self) -> None:
-        """Cut the power; the arm stays where it is, the program ends."""
+        """Cut the power; the arm stops where it is, and the program ends."""
         self.motion.stop_at_once()
         self.programs.stop()
         self.power.off()
@@ -403,7 +404,7 @@ class Controller:
         """
         Pass an event to the safety system; return the reason of a refusal, else an empty string.
 
-        :param reported: the error code of the protective stop has been sent already.
+        :param reported: whether the error code of the protective stop has been sent already.
         """
         before = self.safety.mode
         refusal = self.safety.step(event, self.time)
@@ -421,7 +422,7 @@ class Controller:
         return ''
 
     def unlock_soon(self) -> None:
-        """Unlock a protective stop as by a line on the primary interface: without unlock delay."""
+        """Unlock a protective stop shortly, as a primary client can: without unlock delay."""
         if self.safety.mode is SafetyMode.PROTECTIVE_STOP:
             self._unlock_at = self.time + UNLOCK_TIME
 
@@ -429,22 +430,22 @@ class Controller:
         """
         Check from now on that an RTDE input is written often enough.
 
-        :param frequency: lowest rate at which it has to be written [Hz].
-        :param action: what happens to the program otherwise: pause, stop or ignore.
-        :raises RuntimeException: the action does not exist.
+        :param frequency: lowest rate of writing [Hz]; 0 ends the check.
+        :param action: 'pause' or 'stop' the program if the input is late, or 'ignore' this.
+        :raises RuntimeException: the action has another value.
         """
         if action not in ('pause', 'stop', 'ignore'):
             raise RuntimeException(f"action is {action!r}; it must be 'pause', 'stop' or 'ignore'")
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window; if too many are open, a window that no program waits for is not kept."""
+        """Show a window; while too many are open, only a blocking window is kept."""
         if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
         self.messages.popup(popup)
 
     def close_popups(self) -> None:
-        """Close all windows; programs that wait for one continue."""
+        """Close all windows; threads that wait for a window continue."""
         for popup in self.popups:
             popup.open = False
         self.popups.clear()

@@ -22,7 +22,7 @@ class Assembly(NamedTuple):
 
 def assemble(config: SimulatorConfig, sockets: ScriptSockets | None = None) -> Assembly:
     """
-    Return a controller and its faults as configured, without network and clock.
+    Return a controller as configured, and an injector without faults; neither has a network.
 
     :param sockets: the sockets of programs; None = in memory, for tests.
     """

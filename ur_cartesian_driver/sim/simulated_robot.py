@@ -48,9 +48,9 @@ T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
 _COMPILE_TIMEOUT = 120.0
-#: Difference between the ports of a script interface and its read-only twin: 30001 and 30011.
+#: Difference between the ports of a script interface (30001) and of its read-only twin (30011).
 READ_ONLY_DISTANCE = 10
-#: The first version without a dashboard.
+#: The first major version without a dashboard.
 POLYSCOPE_X = 10
 
 
@@ -71,7 +71,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotSnapshot:
-    """The simulated robot at one cycle: joints [rad, rad/s], poses of the TCP in the base."""
+    """The state of the simulated robot in one cycle; joints and poses are target values."""
 
     timestamp: float
     q: Vector6
@@ -92,7 +92,7 @@ class RobotSnapshot:
 
 class SimulatedRobot:
     """
-    A simulated robot as a context manager: inside it all ports listen, after it all are closed.
+    A simulated robot as a context manager: inside the ``with`` block, all ports listen.
 
     ::
 
@@ -111,11 +111,11 @@ class SimulatedRobot:
         Make a robot; it runs from `start` to `close`, or during `run`.
 
         :param sockets: the sockets of programs; None = TCP.
-        :param clock: the clock of the cycles; None = a clock with the rate of the configuration.
+        :param clock: the clock for the cycles; None = a clock with the rate of the configuration.
         """
         self.config = config or SimulatorConfig()
         self._loop: asyncio.AbstractEventLoop | None = None
-        #: Called in the robot's thread with a port and the bytes that a program received from it.
+        #: Called in the robot's thread with a peer's port and the bytes received from this peer.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
         impaired = ImpairedSockets(
             sockets or TcpScriptSockets(self._on_socket_data, self.config.host)
@@ -129,7 +129,7 @@ class SimulatedRobot:
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
         self._interpreter = TcpServer('interpreter', lambda: InterpreterSession(self.controller))
         self._robot_api = TcpServer('robot-api', lambda: RobotApiSession(self.controller))
-        #: The script interfaces and their read-only twins, which send the same.
+        #: Script interface -> its read-only twin, which sends the same data.
         self._read_only: dict[TcpServer[Any], TcpServer[Any]] = {
             self._primary: self._read_only_twin('primary', version_frame),
             self._secondary: self._read_only_twin('secondary', version_frame),
@@ -184,7 +184,7 @@ class SimulatedRobot:
         return self
 
     def close(self) -> None:
-        """Disconnect all clients and end the thread; can be called twice."""
+        """Disconnect all clients and end the thread; a second call does nothing."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
@@ -239,7 +239,7 @@ class SimulatedRobot:
             self.controller.sockets.close_all()
             for server in (*self._servers, *self._read_only.values()):
                 await server.close()
-            # Time to accept and disconnect clients that connected at the last moment.
+            # Leave time to accept and disconnect clients that connected at the last moment.
             await asyncio.sleep(0.01)
 
     async def _listen(self) -> None:
@@ -278,7 +278,7 @@ class SimulatedRobot:
         while True:
             await self._clock.next_cycle()
             if self._compiler is not None and isinstance(self._clock, VirtualClock):
-                # The time that this computer takes to compile must not affect a program's start.
+                # A program must start in the same cycle, however long this computer compiles it.
                 await self._compiler.wait_until_idle()
             self.controller.skipped_time = self._clock.skipped
             self.controller.step()
@@ -315,7 +315,7 @@ class SimulatedRobot:
         """
         Call a function with the controller between two cycles, and return its result.
 
-        :raises TimeoutError: the robot's thread did not call it within 10 s.
+        :raises TimeoutError: the robot's thread did not call the function within 10 s.
         """
         loop = self._loop
         if loop is None or _is_running_in(loop):
@@ -376,7 +376,7 @@ class SimulatedRobot:
         """
         Unlock the protective stop, as at the pendant.
 
-        :raises RuntimeError: there is no stop, or it began less than the unlock delay ago.
+        :raises RuntimeError: there is no stop, or the unlock delay since the stop is not over.
         """
         self._safety(SafetyEvent.UNLOCK)
 
@@ -429,7 +429,7 @@ class SimulatedRobot:
         self.call(lambda controller: controller.close_popups())
 
     def lateness(self) -> Lateness | None:
-        """Return how late cycles begin; None on the virtual clock."""
+        """Return the lateness of the cycles; None for any clock other than the real clock."""
         clock = self._clock
         return self.call(lambda _: clock.lateness() if isinstance(clock, RealClock) else None)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The configuration of a simulated robot; frozen, and checked when it is made."""
+"""The configuration of a simulated robot: a frozen dataclass that checks its values."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ from ur_cartesian_driver.sim.state.controller_io import DigitalPort
 #: Joint positions with room to move in all directions, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
-#: From one recording of a UR3 in URSim and one forum thread; movec, movep and optimovel use 1.
+#: Turn ratio of movel, from one recording of a UR3 in URSim and one forum thread; movec, movep and
+#: optimovel use 1.
 TURN_RATIO = 4.0
-#: More simulated seconds per second than any computer can achieve.
+#: Bound on ``rate``: more simulated seconds per second than any computer can achieve.
 MAX_RATE = 1e4
 _PRIMARY_PORT = 30001
 #: Not port 80 as on a real robot, because only root can open it.
@@ -38,12 +39,12 @@ _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorConfig:
     """
-    One simulated robot; the defaults suit tests and first tries.
+    The configuration of one simulated robot; the defaults suit tests and first tries.
 
-    :raises ValueError: a model, version, frequency or power state does not exist.
+    :raises ValueError: a value is unknown or impossible; the text names the field.
     """
 
-    #: One of :data:`ur_cartesian_driver.kinematics.robot_models.MODELS`.
+    #: Model of the robot; one of :data:`ur_cartesian_driver.kinematics.robot_models.MODELS`.
     model: str = 'ur5e'
     #: Address that the servers listen on; by default other machines cannot reach it.
     host: str = '127.0.0.1'
@@ -55,8 +56,8 @@ class SimulatorConfig:
     dashboard_port: int = 29999
     #: Ports of the secondary and real-time interfaces; None = 30002 and 30003 if the primary
     #: interface is on 30001, otherwise any free ports, because a robot on other ports is probably
-    #: not the only one on this computer. The read-only twins of the three interfaces (30011 to
-    #: 30013) listen only if all three are on their standard ports.
+    #: not the only robot on this computer. The read-only twins of primary, secondary and real-time
+    #: interface (30011 to 30013) listen only if all three are on their standard ports.
     secondary_port: int | None = None
     realtime_port: int | None = None
     #: Port of interpreter mode; None = 30020 if the primary interface is on 30001, otherwise any
@@ -73,12 +74,12 @@ class SimulatorConfig:
     #: False = the feature is off in the robot's settings: scripts are accepted, and the dashboard
     #: reports that the robot is not in remote control.
     has_remote_control: bool = True
-    #: Rotation of a movel that takes as long as a metre [rad]; 4 was recorded, the manual has 1.
+    #: Rotation [rad] that takes as long in a movel as a metre; 4 was recorded, the manual has 1.
     turn_ratio: float = TURN_RATIO
     #: Denavit-Hartenberg parameters of this arm; None = the nominal parameters of the model.
     geometry: DhTable | None = None
-    #: Limits of the joints; None = those of the model. The arm keeps tighter limits, and the
-    #: configuration on the primary interface contains them.
+    #: Limits of the joints, where these are tighter than the model's; None = the model's. The arm
+    #: keeps to the limits, and the primary interface reports them.
     joint_limits: JointLimits | None = None
     #: Imperfections of the arm and its controller; None = a perfect arm and controller.
     #: `sim.motion.imperfect_arm.typical_imperfections` returns typical values for a model.
@@ -88,15 +89,15 @@ class SimulatorConfig:
     #: Time after a protective stop during which pendant and dashboard refuse to unlock [s]; 5 s on
     #: a real robot.
     unlock_delay: float = 5.0
-    #: Times from `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten
-    #: times as long.
+    #: Time from `power on` to IDLE, and time from IDLE to RUNNING [s]; a real arm takes about
+    #: ten times as long.
     power_on_time: float = 0.5
     brake_release_time: float = 0.5
     #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
-    #: Behaviour of the robot's clock if this computer was too busy for some cycles: 'skip' adds
-    #: their time, so that the clock keeps real time as on a real robot; 'wait' does not, so that
-    #: motions take their nominal time by the robot's clock, as tests need it.
+    #: Behaviour of the robot's clock if this computer was too busy to begin cycles in time: 'skip'
+    #: adds the lost time, so that the clock keeps real time as on a real robot; 'wait' does not,
+    #: so that motions take their nominal time by the robot's clock, as tests expect.
     when_late: Literal['skip', 'wait'] = 'skip'
     #: Faults, as values of `sim.faults.fault_values` or as text; their times are measured from the
     #: first cycle.
@@ -109,7 +110,7 @@ class SimulatorConfig:
     #: Cycles after which a new thread of a program begins.
     thread_delay: int = 0
     #: Seed of random switches between the threads of a program; None = no random switches, so
-    #: threads switch only when one takes time.
+    #: threads switch only when the running thread calls a function that takes time.
     interleaving_seed: int | None = None
     #: Programs that the dashboard can load: file name -> URScript.
     programs: Mapping[str, str] = field(default_factory=dict)
@@ -166,7 +167,7 @@ class SimulatorConfig:
 
     @property
     def robot_model(self) -> RobotModel:
-        """Return the table row of the model, with the limits of this robot."""
+        """Return the model of the robot, with the limits of this robot."""
         model = robot_model(self.model)
         return model if self.joint_limits is None else model.limited_to(self.joint_limits)
 
@@ -175,7 +176,7 @@ class SimulatorConfig:
         """
         Return major, minor, bugfix, build.
 
-        :raises ValueError: the text is not two to four numbers with dots between them.
+        :raises ValueError: ``polyscope`` is not two to four numbers with dots between them.
         """
         series = 'CB3' if self.robot_model.series == 'CB3' else 'e'
         text = self.polyscope or _DEFAULT_VERSIONS[series]
@@ -220,7 +221,7 @@ class SimulatorConfig:
 
     @property
     def cycle(self) -> float:
-        """Return the controller's cycle [s]: 2 ms, for CB3 models 8 ms."""
+        """Return the controller's cycle [s]; by default 2 ms, or 8 ms for a CB3 model."""
         if self.frequency is not None:
             return 1.0 / self.frequency
         return self.robot_model.control_cycle

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The methods of lists, matrices and structs, which controllers have since PolyScope 5.15.
+The methods of lists, matrices and structs; controllers have these methods since PolyScope 5.15.
 
-Methods such as `append` change the variable on which they are called. A list can grow here beyond
-its capacity, up to the bound of `make_list`.
+Methods such as `append` change the variable on which they are called. Here a list can grow beyond
+its capacity, up to the largest length that `make_list` accepts.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ur_cartesian_driver.urscript.script_values import (
 
 def call_method(target: Value, method: str, arguments: Sequence[Value]) -> Value:
     """
-    Call a method of a value of the language.
+    Call a method of a URScript value.
 
     :raises RuntimeException: the type has no such method, or the arguments do not suit it.
     """
@@ -52,7 +52,7 @@ def _item(value: Value) -> Value:
 
 
 def _place(items: list[Value], index: Value, length: int) -> int:
-    """Return an index, or refuse one that is not within a length."""
+    """Return an index, or refuse an index that is not from 0 to ``length`` - 1."""
     if type(index) is not int or not 0 <= index < length:
         raise RuntimeException(
             f'Index out of range: {to_text(index)} is not within 0..{length - 1} '

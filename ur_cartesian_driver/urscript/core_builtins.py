@@ -4,7 +4,7 @@
 Builtins of every controller that need no robot: mathematics, lists, text.
 
 Parameters are named as in the script manual, because programs can pass arguments by name.
-Outside its domain a function raises an error instead of returning nan.
+For an argument outside its domain, a function raises an error instead of returning nan.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from ur_cartesian_driver.urscript.script_values import (
     make_list as make_list_value,
 )
 
-#: Most rows of a matrix to invert, as the time grows with their cube. The manual gives no limit.
+#: Largest number of rows of a matrix to invert: the time grows with its cube. The manual gives no
+#: limit.
 MAX_INVERSE = 100
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
@@ -107,7 +108,7 @@ def str_empty(str: Value) -> bool:
 
 
 def str_at(src: Value, index: Value) -> str:
-    """Return one character."""
+    """Return the character at an index, from 0."""
     text, position = _string(src), _int(index)
     if not 0 <= position < len(text):
         raise RuntimeException(f'Index out of range: {position} in a string of {len(text)}')
@@ -198,12 +199,12 @@ def pow_(base: Value, exponent: Value) -> float:
 
 
 def ceil(f: Value) -> int:
-    """Return the next int upwards."""
+    """Return the smallest int that is not below a number."""
     return _int_range(math.ceil(_number(f)))
 
 
 def floor(f: Value) -> int:
-    """Return the next int downwards."""
+    """Return the largest int that is not above a number."""
     return _int_range(math.floor(_number(f)))
 
 
@@ -213,7 +214,7 @@ def norm(a: Value) -> float | int:
 
 
 def normalize(v: Value) -> list[float]:
-    """Return the list of length one in the same direction."""
+    """Return the list of numbers in the same direction whose norm is 1."""
     items = _numbers(v)
     length = math.hypot(*items)
     if length == 0:
@@ -225,7 +226,7 @@ def normalize(v: Value) -> list[float]:
 
 
 def size(v: Value) -> int | list[int]:
-    """Return the number of items or characters, or [rows, columns] of a matrix."""
+    """Return the number of items or characters; for a matrix, [rows, columns]."""
     return list(v.shape) if type(v) is Matrix else length(v)
 
 
@@ -239,7 +240,7 @@ def length(v: Value) -> int:
 
 
 def get_list_length(v: Value) -> int:
-    """Return the number of items; the older name of `length`."""
+    """Do the same as `length`, under its older name."""
     return length(v)
 
 
@@ -293,7 +294,7 @@ def inv(m: Value) -> Matrix:
 
 
 def struct(**fields: Value) -> Struct:
-    """Return a struct with these fields."""
+    """Return a struct with the named fields."""
     return check_size(Struct(dict(fields)))
 
 
@@ -304,7 +305,7 @@ def integer_to_binary_list(x: Value) -> list[bool]:
 
 
 def binary_list_to_integer(l: Value) -> int:  # noqa: E741 (the manual's name)
-    """Return the int whose bits are in the list, the lowest first; 32 bits make it signed."""
+    """Return the int whose bits are in the list, the lowest first; the 32nd bit is the sign."""
     if type(l) is not list or len(l) > 32 or any(type(bit) is not bool for bit in l):
         raise RuntimeException('binary_list_to_integer: at most 32 bools are needed')
     unsigned = sum(1 << position for position, bit in enumerate(l) if bit)

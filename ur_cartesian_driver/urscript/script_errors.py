@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The two errors of a program: before it runs, and while it runs.
+The two errors of a program: one before it runs, and one while it runs.
 
-Both have a position in the program's text: the controller reports it to its clients, and people
-need it to find the error.
+Both have a position in the program's text. The controller reports the position to its clients, and
+people need it to find the mistake.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class RuntimeException(Exception):
         self.column = column
 
     def at(self, line: int, column: int) -> RuntimeException:
-        """Return this error with a position; a position that it already has is kept."""
+        """Return this error with a position, unless it already has one."""
         return self if self.line else RuntimeException(self.text, line, column)
 
     def __str__(self) -> str:

@@ -8,10 +8,10 @@ A value is an int, float, bool, str or None of Python; a `list` of values; a `Sc
 Lists, matrices and structs are values, not references: they are copied (`copy`) when they are
 assigned, passed or returned, so a builtin can keep its arguments.
 
-Our decisions where the controller's behaviour is not documented: integers have 32 bits and an
+Where the controller's behaviour is not documented, we have decided: integers have 32 bits and an
 overflow is an error; `/` is always a true division; `%` has the sign of the dividend (as in C);
-True and False are not numbers in arithmetic; values of different types can be compared, and are
-unequal.
+True and False are not numbers in arithmetic; `==` and `!=` accept values of different types, as in
+Python.
 """
 
 from __future__ import annotations
@@ -84,10 +84,10 @@ class RemoteObject(ABC):
 
     @abstractmethod
     def call(self, method: str, arguments: Sequence[Value]) -> Value:
-        """Call a method; a generator that it returns takes frames, as that of a builtin does."""
+        """Call a method; if it returns a generator, the call takes frames, as for builtins."""
 
     def part(self, name: str) -> RemoteObject:
-        """Return an object whose methods are this object's methods `name.method`."""
+        """Return an object whose `method` is the method `name.method` of this object."""
         return _RemotePart(self, name)
 
 
@@ -130,7 +130,7 @@ def copy(value: Value) -> Value:
     return value
 
 
-#: Types whose values have a size.
+#: Types whose values hold other values, and so have a size.
 SIZED = frozenset({list, Matrix, Struct})
 
 
@@ -152,7 +152,7 @@ def work_on(a: Value, b: Value) -> int:
 
 
 def check_size(value: T) -> T:
-    """Return a value that holds others, or refuse one that is too large; nested structs can be."""
+    """Return a value, or refuse a value that holds too many others, as nested structs can."""
     if size_of(value) > MAX_LIST_LENGTH:
         raise RuntimeException(f'more than {MAX_LIST_LENGTH} items are not possible')
     return value
@@ -180,7 +180,7 @@ def make_pose(items: Sequence[Value]) -> ScriptPose:
 
 
 def truth(value: Value) -> bool:
-    """Return a value as a condition: true if non-zero or non-empty."""
+    """Return a value as a condition; 0, None, and an empty string or list are false."""
     if type(value) is bool:
         return value
     if isinstance(value, int | float | str | list):
@@ -288,7 +288,7 @@ def _arithmetic(
 
 
 def _matrix_product(a: Matrix, b: Value) -> Value:
-    """Return matrix times matrix, or matrix times list, which is a list."""
+    """Return the product of two matrices, or of a matrix and a list, which is a list."""
     columns = [b] if type(b) is list else list(zip(*b.rows, strict=True)) if _is_matrix(b) else []
     if not columns:
         raise _unsupported('*', a, b)
@@ -361,12 +361,12 @@ UNARY: dict[str, Callable[[Value], Value]] = {
 
 # Parts of values
 
-#: A step into a value: the indices of `[i]` or `[r, c]`, or the name of a field.
+#: A key of a part of a value: the indices of `[i]` or `[r, c]`, or the name of a field.
 Key = tuple[Value, ...] | str
 
 
 def get_part(container: Value, key: Key) -> Value:
-    """Return `container[key]` or `container.key`; not a copy."""
+    """Return `container[key]` or `container.key` itself, not a copy."""
     if isinstance(key, str):
         if isinstance(container, RemoteObject):
             return container.part(key)
@@ -426,7 +426,7 @@ def _fields(container: Value, name: str) -> dict[str, Value]:
 
 
 def _field(struct: Struct, key: tuple[Value, ...]) -> str:
-    """Return the name of a field that is given by its number."""
+    """Return the name of the field with an index."""
     names = list(struct.fields)
     if len(key) != 1:
         raise RuntimeException('Type error: struct has one index, not two')

@@ -29,7 +29,8 @@ MAX_ROWS = 6000
 #: Largest number of points that are numbered.
 MAX_NUMBERED_POINTS = 12
 _AXES = 'xyz'
-#: Weights of the extents: the flat view is from above, unless the path is mainly vertical.
+#: Weights of the path's extents in x, y and z when two of them are chosen for the flat view: it is
+#: from above, unless the path is mainly vertical.
 _VIEW_WEIGHTS = np.array([1.0, 1.0, 0.4])
 _PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
 #: Events that are marked in all charts.
@@ -50,7 +51,7 @@ def newest_recording(path: Path) -> Path:
     """
     Return the path of a recording; for a directory, the newest one in it.
 
-    :raises OSError: the directory has none.
+    :raises OSError: the directory contains no recording.
     """
     if path.is_dir() and path.suffix != PART_SUFFIX:
         found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
@@ -67,7 +68,7 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
     """
     Draw a recording.
 
-    :param picture: its suffix decides the format.
+    :param picture: the file to write; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the picture cannot be written.
     """
     try:
@@ -111,7 +112,7 @@ def _title(recording: Recording) -> str:
 
 
 def _draw_path(figure: Any, recording: Recording) -> None:
-    """Draw the path in space, and flat: from above, or from the side if mainly vertical."""
+    """Draw the path in space, and flat: from above, or from the side if it is mainly vertical."""
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
@@ -228,7 +229,7 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
 
 
 def _timeline(recording: Recording) -> list[tuple[str, Floats]]:
-    """Return the rows of the chart, each from 0 to 1 over time: outputs, program pauses."""
+    """Return the rows of the timeline, with values from 0 to 1: outputs, program pauses."""
     digital, rows = recording.digital_output, []
     for bit, name in enumerate(OUTPUT_NAMES):
         is_on = (digital >= 0) & (digital >> bit & 1 > 0)

@@ -3,10 +3,11 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-A message is its length, then two pickles. The first, for a receiver that cannot read the second,
-is the notification that refuses the message (None = nobody waits for an answer); the second is one
-of the dataclasses below. Both ends are this package, and no other process can open the pipe, a
-pair of sockets; so pickle is safe here, and it moves the arrays of a large plan as they are.
+On the pipe, a message is its length, then two pickles. The second pickle is the message itself,
+one of the dataclasses below. The first is the notification that refuses the message, for a
+receiver that cannot read the second (None = the message needs no answer). Both ends are this
+package, and no other process can open the pipe, a pair of sockets; so pickle is safe here, and it
+moves the arrays of a large plan without conversion.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Unreadable(DriverError):
         """
         Build the error.
 
-        :param refusal: the notification that refuses the message; None = nobody waits for it.
+        :param refusal: the notification that refuses the message; None = it needs no answer.
         """
         super().__init__(reason)
         self.refusal = refusal
@@ -71,7 +72,7 @@ class TemporaryTcpRestored:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Configure:
-    """The first message: how to reach the robot."""
+    """The first message: the configuration of the robot loop."""
 
     config: DriverConfig
     #: Whether the robot program may be uploaded on the first connection; not if an earlier loop of
@@ -105,7 +106,7 @@ class LiveSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartMotion:
-    """Run these points (84 bytes each)."""
+    """Run a motion, with its encoded records (84 bytes each)."""
 
     motion: int
     job: MotionJob
@@ -155,7 +156,7 @@ class CancelMotion:
     """Stop the motion, if it is still running."""
 
     motion: int
-    #: The motion that preempts it, as part of a sentence; empty = it is cancelled.
+    #: The motion that preempts this one, as part of a sentence; empty = this one is cancelled.
     preempted_by: str = ''
 
 
@@ -179,7 +180,7 @@ class OwnerHeartbeat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shutdown:
-    """Stop the arm and end."""
+    """Stop the arm and end the robot loop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,7 +238,7 @@ class MotionEnded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CallAnswered:
-    """The end of a call."""
+    """The answer to a service call."""
 
     number: int
     answer: ServiceAnswer
@@ -296,7 +297,7 @@ Notification: TypeAlias = (
 
 def refusal_of(message: Request | Notification, reason: str) -> Notification | None:
     """
-    Return the answer to a request that was not carried out; None = nobody waits for an answer.
+    Return the answer to a message that was not carried out; None = it needs no answer.
 
     :param reason: the reason, as a sentence.
     """
@@ -316,7 +317,7 @@ def pack(message: Request | Notification) -> bytes:
     """
     Return a message as bytes, its length first.
 
-    :raises LocalProtocolError: a part of the message cannot be sent to another process.
+    :raises LocalProtocolError: a part of the message cannot be pickled.
     """
     stream = io.BytesIO()  # written once: a long goal has 50 MB, so each copy would take long
     stream.write(bytes(LENGTH.size))
@@ -337,7 +338,7 @@ def unpack(body: bytes) -> Request | Notification:
     """
     Return the message in the bytes that follow the length.
 
-    :raises Unreadable: the bytes are no message, or name objects that this process does not have.
+    :raises Unreadable: the bytes are no pickles, or use classes that this process does not have.
     """
     stream, refusal = io.BytesIO(body), None
     try:
@@ -353,7 +354,7 @@ def receive(pipe: socket.socket) -> Request | Notification | None:
     Wait for the next message.
 
     :param pipe: a blocking socket; its timeout is the longest silence allowed.
-    :returns: None at the end of the pipe, and after a silence.
+    :returns: the message; None if the pipe was closed, or was silent for longer than its timeout.
     """
     head = _read(pipe, LENGTH.size)
     if head is None:

@@ -67,7 +67,7 @@ class DriverConfig(LinkSettings):
         """
         Refuse values that cannot work together.
 
-        :raises ValueError: names the field, its value and the bound.
+        :raises ValueError: a value is outside its bounds; the text names the field and the bound.
         """
         LinkSettings.__post_init__(self)  # super() does not work in a class with slots
         if not self.keep_open_horizon >= 2.0 * self.keep_open_margin:

@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState, STATE_TABLE
 _COUNTER = struct.Struct('<Q')
 #: The number of values in the field types with more than one value.
 _SIZES = {Vector6: 6, Pose: 7}
-#: The flag that there is a state, then all fields of the table.
+#: The data in the memory: a flag whether there is a state, then all fields of the table.
 _DATA = struct.Struct(
     '<?'
     + ''.join(
@@ -34,7 +34,7 @@ _DATA = struct.Struct(
     )
 )
 _SIZE = mmap.PAGESIZE
-#: Represents None.
+#: The six numbers that represent None in an optional field.
 _UNKNOWN = (nan,) * 6
 
 
@@ -105,7 +105,7 @@ class StateMemory:
         self._write(_pack(state))
 
     def read(self) -> RobotState | None:
-        """Return the newest state; None = there is none."""
+        """Return the newest state; None = there is no state."""
         while True:
             (before,) = _COUNTER.unpack_from(self._memory, 0)
             data = self._memory[_COUNTER.size : _COUNTER.size + _DATA.size]
@@ -114,7 +114,7 @@ class StateMemory:
                 return _state(_DATA.unpack(data)) if before else None
 
     def _write(self, data: bytes) -> None:
-        if self._memory.closed:  # sockets that close after the loop still report
+        if self._memory.closed:  # sockets that close after the memory still report states
             return
         self._count += 1
         _COUNTER.pack_into(self._memory, 0, 2 * self._count - 1)

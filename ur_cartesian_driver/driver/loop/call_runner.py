@@ -26,7 +26,7 @@ class CallRunner:
         spawn: Callable[[Coroutine[None, None, None]], None],
     ) -> None:
         """
-        Prepare.
+        Begin with no calls.
 
         :param spawn: runs a coroutine concurrently.
         """
@@ -45,7 +45,7 @@ class CallRunner:
     async def _answer(self, request: CallRobot) -> None:
         try:
             answer = await self._dispatcher.dispatch(request.call)
-        except Exception as error:  # the caller waits for an answer
+        except Exception as error:  # even then the caller must get an answer
             text = f'The driver has a defect, {type(error).__name__}: {error}.'
             self._pipe.log(logging.ERROR, f'{text} The call was {request.call}.')
             answer = failed(text)

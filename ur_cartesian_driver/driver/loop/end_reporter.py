@@ -25,9 +25,9 @@ CODES_WITH_CAUSE = frozenset(
         ErrorCode.EXECUTION_FAILED,
     }
 )
-#: Outcomes whose cause the robot sends on another connection, in the same cycle or soon after; and
-#: how long the report of the end waits for that cause [s].
+#: Outcomes whose cause the robot sends on another connection, in the same cycle or soon after.
 CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
+#: How long the report of such an outcome waits for the cause [s].
 CAUSE_TIMEOUT = 0.05
 #: Reports up to this long before the start of a motion can explain its end [s]: a program fails
 #: some cycles before its sockets close.
@@ -43,7 +43,7 @@ class EndReporter:
         """Begin with nothing to report."""
         self._link, self._pipe, self._recorder = link, pipe, recorder
         self._outputs = outputs
-        #: The end that waits for its cause, or for its outputs; None = there is none.
+        #: The end that waits for its cause or for the write of its outputs; None = no end waits.
         self._pending: MotionEnded | None = None
         #: Only reports since this time can explain the end [s].
         self._since = -inf
@@ -54,11 +54,11 @@ class EndReporter:
 
     @property
     def is_pending(self) -> bool:
-        """Return whether the end of a motion waits for its cause, or for its outputs."""
+        """Return whether the end of a motion waits for its cause or the write of its outputs."""
         return self._pending is not None
 
     def report(self, ended: MotionEnded) -> None:
-        """Report an end once its cause, and whether its outputs are safe, is known."""
+        """Report an end once it is known what caused it, and whether its outputs are safe."""
         self._pending = ended
         self._outputs.when_done(self._report_with_cause)
 

@@ -3,7 +3,8 @@
 """
 Make the machine of a motion, with the feeder of its execution mode.
 
-:data:`FEEDERS` has a row for each mode. Live targets and freedrive are motions of the mode SERVO.
+:data:`FEEDERS` has an entry for each execution mode. Live targets and freedrive have the mode
+SERVO.
 """
 
 from __future__ import annotations
@@ -52,14 +53,14 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
 
 
 def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return the feeder of points: all known, appended, or displaced by offsets."""
+    """Return the feeder for points that are all known, appended, or displaced by offsets."""
     monitor = _monitor(request, config)
     if request.job.offset_band is not None:
         return OffsetPointFeeder(monitor, request.job.offset_band)
     if not request.job.keep_open:
         return PointFeeder(monitor)
-    # The last piece on the wire begins within the horizon of the feeder, and ends within the
-    # horizon of the goal. Once nothing more can come in time, the ending is sent.
+    # The last piece on the wire begins within the horizon of the feeder, and so ends within the
+    # horizon of the goal. Once no more points can come in time, the ending is sent.
     horizon = (1.0 - 1.0 / PIECES_PER_HORIZON) * (request.job.replace_horizon or inf)
     return AppendFeeder(
         monitor,
@@ -113,7 +114,7 @@ def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
 
 
 def is_slow_to_make(request: StartMotion) -> bool:
-    """Return whether making the machine takes long: it does for a calibrated arm's kinematics."""
+    """Return whether making the machine takes long, because it needs a calibrated arm."""
     arm = request.arm
     return arm is not None and arm.geometry != arm.model.geometry
 

@@ -3,9 +3,9 @@
 """
 Run the robot loop in its own process, or in a thread; no other module depends on which.
 
-The process is not forked, because the owner may be a ROS node with many threads. It gets two open
-descriptors, of the pipe and of the shared memory. If the process dies, its sockets close and the
-robot program stops the arm; if the owner dies, the pipe ends and the loop stops the arm.
+The process is not forked, because the owner may be a ROS node with many threads. It inherits two
+open descriptors: of the pipe and of the shared memory. If the process dies, its sockets close and
+the robot program stops the arm; if the owner dies, the pipe closes and the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 
 #: The module that the process runs.
 MODULE = 'ur_cartesian_driver.driver'
-#: A robot loop that sends nothing for this long hangs [s]; it sends a heartbeat every 0.5 s.
+#: A robot loop that sends nothing for this long [s] hangs: it should send a heartbeat every 0.5 s.
 SILENCE_TIMEOUT = 5.0
-#: How long the first message may take [s]: a process first imports all that it needs.
+#: How long the first message of a robot loop may take [s]: a new process first imports modules.
 START_TIMEOUT = 20.0
-#: How long the robot loop may take to stop the arm and end, before it is killed [s].
+#: How long the robot loop may take to stop the arm and end before its process is killed [s].
 JOIN_TIMEOUT = 2.0
 
 
 class LoopHost(Protocol):
-    """Something that runs a robot loop."""
+    """What runs a robot loop: a process or a thread."""
 
-    #: The owner's end of the pipe, blocking; it times out after :data:`START_TIMEOUT`, which the
-    #: owner shortens to :data:`SILENCE_TIMEOUT` with the first message.
+    #: The owner's end of the pipe, a blocking socket. Its timeout is :data:`START_TIMEOUT`; after
+    #: the first message, the owner shortens it to :data:`SILENCE_TIMEOUT`.
     pipe: socket.socket
     #: The owner's view of the newest robot state.
     memory: state_memory.StateMemory
 
     def join(self) -> None:
-        """End the loop, by force if it hangs, and release everything."""
+        """End the loop, killing a process that hangs, and release pipe and memory."""
 
 
 def start(robot_loop: str) -> LoopHost:
@@ -64,7 +64,7 @@ class ProcessHost:
                 pass_fds=(loop_end.fileno(), descriptor),
                 env=_environment(),
                 stdin=subprocess.DEVNULL,
-                # Ctrl-C goes to the owner, which then shuts the loop down.
+                # Only the owner gets a Ctrl-C; it then shuts the loop down.
                 start_new_session=True,
             )
             self.memory = state_memory.StateMemory(descriptor)
@@ -124,7 +124,7 @@ def _environment() -> dict[str, str]:
 
 def main() -> None:
     """Run the loop in this process; the arguments are the two descriptors."""
-    gc.freeze()  # imported objects stay: the collector would scan them in the middle of a motion
+    gc.freeze()  # so that the collector does not scan imported objects in the middle of a motion
     pipe, descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=pipe) as connection:
         asyncio.run(serve(connection, descriptor))

@@ -81,16 +81,16 @@ from ur_cartesian_driver.robot.rtde.register_connection import (
     servo_exchange,
 )
 
-#: Data of this size or more takes longer than a few milliseconds to unpack or prepare [bytes].
+#: Data of this size [bytes] or more takes longer than a few milliseconds to unpack or prepare.
 MIN_THREAD_SIZE = 1 << 18
-#: How long the end of the loop waits until the recording of the last motion is a file [s].
+#: How long to wait at shutdown until the recording of the last motion is complete [s].
 RECORD_TIMEOUT = 1.0
 
 T = TypeVar('T')
 
 
 class MotionRunner:
-    """Runs one motion at a time: events to its machine, and the machine's commands to the link."""
+    """Runs one motion at a time: passes events to its machine, and the commands to the link."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class MotionRunner:
         is_changing_settings: Callable[[], bool],
     ) -> None:
         """
-        Prepare.
+        Begin with no motion.
 
         :param spawn: runs a coroutine concurrently.
         :param is_changing_settings: returns whether TCP or payload are being set.
@@ -137,7 +137,7 @@ class MotionRunner:
     # ---- requests -----------------------------------------------------------------------------
 
     async def start(self, request: StartMotion) -> None:
-        """Start a motion, or refuse it with the reason."""
+        """Start a motion, or refuse it and say why."""
         machine = await run_in_thread_if_large(
             MIN_THREAD_SIZE if is_slow_to_make(request) else len(request.points),
             make_machine,
@@ -152,7 +152,7 @@ class MotionRunner:
             self._pipe.send(MotionEnded(motion=request.motion, outcome=refusal))
             return
         state = self._newest.latest
-        assert state is not None  # else the link is not ready
+        assert state is not None  # without a state the link would not be ready
         points, commands = PointBuffer(request.points), machine.start(state)
         self._record(request, state)
         self._number, self._points, self._machine = request.motion, points, machine
@@ -186,7 +186,7 @@ class MotionRunner:
         )
 
     async def append(self, request: AppendToMotion) -> None:
-        """Offer points to the running motion, if they are meant for it."""
+        """Offer points to the running motion; refuse them if they are for another motion."""
         foreign = await self._foreign_program(request.append_job.job)
         if request.motion != self._number or self._machine is None:
             self._refuse_append(request, 'The goal has ended.')
@@ -201,12 +201,12 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
 
     def set_live_target(self, request: SetLiveTarget) -> None:
-        """Give the running session another target, if the target is meant for it."""
+        """Give the running session another target; ignore a target for another session."""
         if request.motion == self._number and self._machine is not None:
             self._machine.can.steering.set_target(request.T_base_tcp, request.age, _now())
 
     def set_path_offset(self, request: SetPathOffset) -> None:
-        """Give the running motion another path offset, if the offset is meant for it."""
+        """Give the running motion another path offset; ignore an offset for another motion."""
         if request.motion == self._number and self._machine is not None:
             self._machine.can.displacing.set_offset(request.offset, request.age, _now())
 
@@ -218,7 +218,7 @@ class MotionRunner:
             self.handle_event(PreemptRequested(by=by) if by else CancelRequested())
 
     def close(self) -> None:
-        """End the running motion, because the loop ends."""
+        """End the running motion at shutdown."""
         if self.is_running:
             self._finish(Outcome(code=ErrorCode.CANCELLED, text='The driver was shut down.'))
         self._ends.report_pending()
@@ -230,7 +230,7 @@ class MotionRunner:
     # ---- events and commands ------------------------------------------------------------------
 
     def handle_event(self, event: Event) -> None:
-        """Pass an event to the machine, and carry out its commands."""
+        """Pass an event to the running motion's machine, and carry out the machine's commands."""
         if self._machine is not None:
             self._step(self._machine, event)
         elif isinstance(event, StateReceived):
@@ -311,7 +311,7 @@ class MotionRunner:
         self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
 
     def _open_inputs(self, exchange: RegisterExchange) -> None:
-        """Claim the RTDE inputs of the running motion."""
+        """Open a connection that claims the RTDE inputs which the running motion writes."""
         self._inputs = RegisterConnection(exchange)
         self._spawn(
             self._inputs.run(
@@ -322,7 +322,7 @@ class MotionRunner:
         )
 
     def _leave_servo(self) -> None:
-        """Have the robot program leave the servo, and release the inputs."""
+        """Have the robot program leave the servo, and release the RTDE inputs of the motion."""
         if self._inputs is not None:
             self._link.control.send_servo(False)
             self._close_inputs()
@@ -333,7 +333,7 @@ class MotionRunner:
             self._inputs = None
 
     def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
-        """Set the TCP for a goal; the owner remembers it in case this process dies."""
+        """Set the TCP for a goal, and first tell the owner, in case this process dies."""
         assert self._machine is not None
         assert self._machine.temporary_tcp is not None
         temporary_tcp = self._machine.temporary_tcp
@@ -382,12 +382,12 @@ class MotionRunner:
         self._recorder.start(request.job, metadata, state)
 
     def record_state(self, state: RobotState) -> None:
-        """Record a state of the running motion."""
+        """Add a robot state to the recording of the running motion."""
         if self._recorder.is_recording and self._machine is not None:
             self._recorder.add_state(state, *self._machine.motion_status())
 
     def record_signals(self, signals: Signals) -> None:
-        """Record the outputs of the running motion."""
+        """Keep the newest outputs, for the states that are recorded next."""
         self._recorder.add_signals(signals)
 
 
@@ -398,14 +398,14 @@ def _now() -> float:
 def _call_soon(
     loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: object
 ) -> None:
-    """Have the loop call a function, from another thread; ignored if the loop has ended."""
+    """Schedule a function on a loop from another thread; do nothing if the loop has ended."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(function, *arguments)
 
 
 async def run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
     """
-    Call a function, in a thread if it has much to do, because keepalives cannot wait.
+    Call a function; if it handles much data, in a thread, so that keepalives are sent in time.
 
     :param size: amount of data that the function handles [bytes].
     """

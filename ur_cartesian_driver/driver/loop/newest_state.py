@@ -17,15 +17,15 @@ class NewestState:
     Keeps the newest state, and publishes it later.
 
     A packet may lead to a CANCEL, which must not wait for the shared memory. So a state is
-    published after the packet was handled, but before any notification: an owner that gets a
-    notification finds the state that belongs to it.
+    published after the packet was handled, but before any notification is sent: an owner that gets
+    a notification finds the state that belongs to the notification.
     """
 
     def __init__(self, memory: StateMemory, on_publish: Callable[[RobotState], None]) -> None:
         """
-        Prepare.
+        Begin with no state.
 
-        :param on_publish: called once with each state that is published.
+        :param on_publish: called once with each published state.
         """
         self._memory, self._on_publish = memory, on_publish
         self.latest: RobotState | None = None
@@ -50,16 +50,16 @@ class NewestState:
         self._oldest = max(self._oldest, self.latest.state_age)
 
     def clear(self) -> None:
-        """Note that the robot is lost."""
+        """Publish that there is no state, because the robot is disconnected."""
         self._memory.clear()
         self._last_report = inf
 
     def take_gap(self) -> float:
-        """Return the longest pause between two states since the last call [s]."""
+        """Return the longest gap between two published states since the last call [s]."""
         gap, self._longest_gap = self._longest_gap, 0.0
         return gap
 
     def take_oldest(self) -> float:
-        """Return the age of the oldest state since the last call [s]."""
+        """Return the largest age of a state published since the last call [s]."""
         oldest, self._oldest = self._oldest, 0.0
         return oldest

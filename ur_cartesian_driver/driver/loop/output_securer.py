@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Write the outputs of a motion that its robot program cannot set, and report failures."""
+"""Write outputs for a motion whose robot program cannot set them, and report failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.output_writer import write_outputs
 
-#: Period and total time of the retries of a failed write [s]; a later write would be unexpected.
+#: Period and total time of the retries of a failed write [s]; people would not expect a later one.
 RETRY_PERIOD, RETRY_TIMEOUT = 0.25, 5.0
 
 
@@ -41,20 +41,20 @@ class OutputSecurer:
         #: The number of the newest order; older orders end.
         self._newest = 0
         self._is_pending = False
-        #: Values are written one after the other: a late restore must not undo a safe value.
+        #: Allows only one write at a time: a late restore must not undo a safe value.
         self._lock = asyncio.Lock()
-        #: Why outputs of the motion are not safe; empty = no failure is known.
+        #: Why outputs of the motion are not safe, as a sentence; empty = no failure is known.
         self.failure = ''
         self._on_done: Callable[[], None] | None = None
 
     def secure(self, outputs: tuple[SafeOutput, ...]) -> None:
-        """Write the safe values."""
+        """Write the safe values of outputs, with retries after a failure."""
         self._newest += 1
         self._is_pending = True
         self._spawn(self._secure(outputs, self._newest))
 
     def restore(self, outputs: tuple[SafeOutput, ...]) -> None:
-        """Write the values from before a pause."""
+        """Write the values that outputs had before a pause."""
         self._newest += 1
         self._spawn(self._restore(outputs, self._newest))
 
@@ -64,7 +64,7 @@ class OutputSecurer:
         self._is_pending, self.failure = False, ''
 
     def when_done(self, callback: Callable[[], None]) -> None:
-        """Call back after the first attempt to secure outputs; at once if none is under way."""
+        """Call back after the first attempt to secure outputs; at once if none is pending."""
         if self._is_pending:
             self._on_done = callback
         else:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot loop's end of the pipe: notifications to the owner, as far as it reads them."""
+"""The robot loop's end of the pipe, which sends notifications to the owner."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class OwnerPipe:
 
     def __init__(self, writer: asyncio.StreamWriter, before_send: Callable[[], None]) -> None:
         """
-        Prepare.
+        Begin with no dropped notification.
 
         :param before_send: called before each notification is sent.
         """
@@ -51,7 +51,7 @@ class OwnerPipe:
             self._writer.write(pack(notification))
 
     def resend_signals(self) -> None:
-        """Send the newest inputs and outputs, if they were dropped."""
+        """Send the newest inputs and outputs again, if they were dropped."""
         if self._withheld_signals is not None:
             self.send(self._withheld_signals)
 

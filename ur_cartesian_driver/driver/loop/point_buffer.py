@@ -8,7 +8,7 @@ from ur_cartesian_driver.protocol.program.trajectory_points import POINT_SIZE
 
 
 class PointBuffer:
-    """Records by their number in the goal; each is taken once, in order."""
+    """Encoded records by their number in the goal; each record is taken once, in order."""
 
     def __init__(self, data: bytes = b'') -> None:
         """Begin with the first records of a motion."""
@@ -20,7 +20,7 @@ class PointBuffer:
         return len(self._data) // POINT_SIZE
 
     def put(self, behind: int, data: bytes) -> None:
-        """Replace all records after the first ``behind`` records."""
+        """Replace all records after the first ``behind`` records of the goal by new ones."""
         del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 

@@ -6,10 +6,10 @@ The robot loop: one asyncio loop that owns the sockets and the machine of the ru
 The loop never imports ROS. If it runs in its own process, the owner cannot delay a message that
 the robot waits for: receiving a goal of 100,000 points holds Python's interpreter lock for
 seconds. The loop can also run in a thread. A pipe for messages and shared memory for the newest
-robot state connect it to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
+robot state connect the loop to its owner, see :mod:`~ur_cartesian_driver.driver.loop.loop_host`.
 
-When the pipe ends, the loop closes its sockets, and the robot program stops the arm and ends. When
-the owner is silent for too long, the loop stops the arm.
+When the pipe closes, the loop closes its sockets, and the robot program stops the arm and ends.
+When the owner is silent for too long, the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -65,12 +65,12 @@ HEARTBEAT_PERIOD = 0.5
 
 
 class RobotLoop:
-    """Connects the link to the robot, the running motion, and the pipe to the owner."""
+    """Ties together the link to the robot, the running motion, and the pipe to the owner."""
 
     def __init__(
         self, configure: Configure, memory: StateMemory, notify: asyncio.StreamWriter
     ) -> None:
-        """Prepare; :meth:`run` does the work."""
+        """Make the parts of the loop; :meth:`run` runs them."""
         self._config = config = configure.config
         self._newest = NewestState(memory, lambda state: self._motion.record_state(state))
         self._pipe = OwnerPipe(notify, self._newest.publish)
@@ -132,7 +132,7 @@ class RobotLoop:
     # ---- the owner ----------------------------------------------------------------------------
 
     async def _serve_requests(self, requests: asyncio.StreamReader) -> None:
-        """Handle requests until there are no more."""
+        """Handle requests until the owner shuts the loop down or the pipe closes."""
         while True:
             try:
                 (size,) = LENGTH.unpack(await requests.readexactly(LENGTH.size))
@@ -154,7 +154,7 @@ class RobotLoop:
                 self._refuse(refusal_of(request, text), f'{type(request).__name__}: {text}')
 
     def _refuse(self, refusal: Notification | None, line: str) -> None:
-        """Answer a request that was not carried out, if its owner waits, and log why."""
+        """Log why a request was not carried out, and refuse it if it needs an answer."""
         self._pipe.log(logging.ERROR, line)
         if refusal is not None:
             self._pipe.send(refusal)
@@ -256,7 +256,7 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
     Run a robot loop until its owner ends it.
 
     :param pipe: our end of the pair of sockets; the first message on it is the configuration.
-    :param descriptor: the shared memory.
+    :param descriptor: descriptor of the shared memory.
     """
     reader, writer = await asyncio.open_connection(sock=pipe)
     memory = StateMemory(descriptor)
@@ -272,5 +272,5 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
     finally:
         writer.close()
         memory.close()
-        # Accept and close connections that arrived at the last moment.
+        # During this pause, connections that arrived at the last moment are accepted and closed.
         await asyncio.sleep(0.01)

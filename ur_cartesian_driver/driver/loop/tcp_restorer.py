@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Restore the TCP that a goal had replaced, if the goal ended before it could do so itself."""
+"""Restore the original TCP if a goal that had set another TCP ended without restoring it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.robot.link import RobotLink
 
 
 class TcpRestorer:
-    """Tries until the robot no longer reports the temporary TCP; no goal starts before that."""
+    """Retries until the robot no longer reports the temporary TCP; no goal starts before that."""
 
     def __init__(self, link: RobotLink, pipe: OwnerPipe) -> None:
         """Begin with nothing to restore."""
@@ -23,12 +23,12 @@ class TcpRestorer:
         self._pending: TemporaryTcp | None = None
 
     def restore_later(self, temporary_tcp: TemporaryTcp) -> None:
-        """Restore the TCP as soon as the robot program can."""
+        """Restore the original TCP as soon as the robot program can."""
         self._pending = temporary_tcp
         self._link.set_tcp_restore_pending(True)
 
     def retry_now(self) -> None:
-        """Make the next attempt at once, because the robot program has connected or gone."""
+        """Make the next attempt at once, because the robot program has started or ended."""
         if self._pending is not None:
             self._pending.retry_now()
 
@@ -46,7 +46,7 @@ class TcpRestorer:
             self.restore_if_due(state)
 
     def restore_if_due(self, state: RobotState | None) -> None:
-        """Have the robot restore the TCP, if that is pending and the robot can do it now."""
+        """Have the robot restore the TCP, if a restore is pending and due."""
         now = asyncio.get_running_loop().time()
         if (
             self._pending is not None

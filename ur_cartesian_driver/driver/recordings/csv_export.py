@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A recording as comma-separated values: a row for each packet, and the deviation from the plan.
+A recording as comma-separated values: a row for each packet, with its deviation from the plan.
 
 The titles are the names of the columns with their units, in the form that the import reads.
 """
@@ -21,7 +21,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import EXECUTED_DTYP
 _POSE = ('x [m]', 'y [m]', 'z [m]', 'qx', 'qy', 'qz', 'qw')
 _TWIST = ('x [m/s]', 'y [m/s]', 'z [m/s]', 'rx [rad/s]', 'ry [rad/s]', 'rz [rad/s]')
 _WRENCH = ('fx [N]', 'fy [N]', 'fz [N]', 'tx [Nm]', 'ty [Nm]', 'tz [Nm]')
-#: Suffixes of the titles of columns with several numbers, by the end of the column's name.
+#: For columns of several numbers: the suffixes of their titles, by the last word of the name.
 _PARTS = {
     'pose': _POSE,
     'twist': _TWIST,
@@ -34,7 +34,7 @@ _SECONDS = ('time', 'lag', 'buffered')
 
 
 def write_csv(recording: Recording, file: BinaryIO, options: ExportOptions) -> None:
-    """Write all packets."""
+    """Write a title row and a row for each packet."""
     columns: dict[str, NDArray[Any]] = {}
     for name in EXECUTED_DTYPE.names or ():
         values = getattr(recording, name)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of the formats that a recording is exported to."""
+"""The interface of the formats to which recordings are exported."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class ExportOptions:
 
     #: Prefix of the names of frames and joints.
     tf_prefix: str = ''
-    #: To be called after each packet.
+    #: Called by the exporter after each packet.
     progress: Callable[[], object] = lambda: None
 
 
-#: Writes a recording; raises ValueError if it is damaged, ImportError if a package is missing, or
-#: OSError.
+#: Writes a recording to a file. Raises ValueError if the recording is damaged, ImportError if a
+#: package is missing, and OSError if a file cannot be written or read.
 Exporter: TypeAlias = Callable[[Recording, BinaryIO, ExportOptions], None]

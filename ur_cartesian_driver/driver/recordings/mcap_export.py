@@ -3,8 +3,8 @@
 """
 A recording as MCAP with messages of ROS 2, for Foxglove, PlotJuggler, rosbag2 and others.
 
-Topics that the node publishes too have the same names and types here, so one layout serves both.
-Messages carry the times of their packets, counted from the moment at which the recording began.
+Topics that the node publishes too have the same names and types here, so one layout fits both.
+The time of a message is the date and time at which the recording began plus its packet's time.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _INFO, _WARN, _ERROR = 20, 30, 40  # levels of rcl_interfaces/Log
 _WARNINGS = ('cancel', 'safety', 'robot')
 
 _Message: TypeAlias = dict[str, Any]
-#: Log time [ns], topic, type, message.
+#: A message with its log time: log time [ns], topic, type, message.
 _Record: TypeAlias = tuple[int, str, str, _Message]
 
 
@@ -56,7 +56,7 @@ def write_mcap(recording: Recording, file: BinaryIO, options: ExportOptions) -> 
 
     :raises ImportError: the packages for MCAP are not installed.
     :raises OSError: the definition of a message is not installed, or the file cannot be written.
-    :raises ValueError: the recording does not say when it was made.
+    :raises ValueError: the recording is damaged: it has no date, or a time that is not finite.
     """
     try:
         from mcap_ros2.writer import Writer
@@ -93,7 +93,7 @@ def _log_time(record: _Record) -> int:
 
 
 class _Messages:
-    """The messages of a recording, each kind of them in the order of time."""
+    """The messages of a recording; each method yields its messages in the order of time."""
 
     def __init__(self, recording: Recording, tf_prefix: str) -> None:
         self._recording = recording
@@ -141,7 +141,7 @@ class _Messages:
             )
 
     def numbers(self) -> Iterator[_Record]:
-        """Yield columns of single numbers, without repetitions of the same number."""
+        """Yield the columns of single numbers, without repetitions of the same number."""
         found = self._recording
         deviation = found.deviation()
         columns: dict[str, NDArray[Any]] = {
@@ -206,7 +206,7 @@ class _Messages:
                 _transform(header, f'{self._tcp}_target', target_pose),
             ]
             yield time, '/tf', 'tf2_msgs/TFMessage', {'transforms': transforms}
-            if wrench[0] == wrench[0]:  # known
+            if wrench[0] == wrench[0]:  # not NaN, so the wrench is known
                 yield (
                     time,
                     f'{NODE}/wrench',

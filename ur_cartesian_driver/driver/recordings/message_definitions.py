@@ -13,12 +13,13 @@ import re
 
 from ur_cartesian_driver.resources import installed_share
 
-#: Messages of packages that the driver does not need and PyPI does not have; without comments.
+#: Definitions without comments, for messages of packages that the driver does not need and PyPI
+#: does not have.
 _SHORT_DEFINITIONS = {
     'nav_msgs/Path': 'std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n',
     'tf2_msgs/TFMessage': 'geometry_msgs/TransformStamped[] transforms\n',
 }
-#: The type at the beginning of a line that declares a field, without its bounds.
+#: Matches the beginning of a line that declares a field; group 1 is its type, without bounds.
 _FIELD = re.compile(r'^[ \t]*([a-zA-Z][\w/]*)(?:<=\d+)?(?:\[.*?\])?[ \t]+\w', re.MULTILINE)
 _BUILT_IN = re.compile(r'bool|byte|char|float(32|64)|u?int(8|16|32|64)|w?string')
 _SEPARATOR = 80 * '='
@@ -26,10 +27,10 @@ _SEPARATOR = 80 * '='
 
 def message_definition(name: str) -> str:
     """
-    Return the whole definition of a message.
+    Return the definition of a message, with those of the messages that it contains.
 
-    :param name: package and type, ``sensor_msgs/JointState``.
-    :raises OSError: the package of a message is not installed.
+    :param name: package and type, for example ``sensor_msgs/JointState``.
+    :raises OSError: the package of one of these messages is not installed.
     """
     parts = {name: _own_definition(name)}
     waiting = [name]

@@ -37,21 +37,21 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 if TYPE_CHECKING:
     from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: Rows of a buffer, number of buffers, and the longest time until a buffer is written [s]: a
-#: killed process loses the rows of this time.
+#: Rows of a buffer; number of buffers; longest time until a buffer is written [s]: a killed
+#: process loses the rows of at most this time.
 BUFFER_ROWS, BUFFER_COUNT, FLUSH_PERIOD = 256, 8, 0.5
 #: At most this many jobs wait for the disk; further events and pieces of the plan are dropped.
 MAX_PENDING_JOBS = 1000
-#: Pause of the finisher after each small part of a file [s]: while a thread never pauses, other
+#: Pause of the finisher after each small part of a file [s]: if a thread never pauses, the other
 #: threads wait 5 ms and more for the interpreter.
 YIELD_PAUSE = 0.0002
-#: Lines of a plan's report that are kept.
+#: Largest number of lines of a plan's report that are kept.
 MAX_REPORT_LINES = 1000
 MEGABYTE = 1_000_000
 
 
 def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
-    """Return metadata that only the owner of the plan has, as JSON: report and options."""
+    """Return the metadata that only the planning process has, as JSON: report and options."""
     lines = plan.report
     if len(lines) > MAX_REPORT_LINES:
         lines = (*lines[:MAX_REPORT_LINES], f'... and {len(lines) - MAX_REPORT_LINES} more lines')
@@ -77,10 +77,10 @@ def motion_metadata(
     """
     Return the metadata of a motion that begins now.
 
-    :param robot: its model, PolyScope version and serial number.
-    :param parameters: the configuration of the driver, a dataclass.
-    :param plan_metadata_json: the result of :func:`plan_metadata`.
-    :param mode: the kind of a motion without a plan.
+    :param robot: the robot's model, PolyScope version and serial number.
+    :param parameters: the configuration of the driver.
+    :param plan_metadata_json: the result of :func:`plan_metadata`; '' = there is none.
+    :param mode: the kind of a motion without a plan; '' = the motion has a plan.
     """
     known = json.loads(plan_metadata_json) if plan_metadata_json else {}
     planning = known.pop('planning', {})
@@ -111,25 +111,26 @@ class Recorder:
 
     def __init__(self, directory: str, max_size: float, warn: Callable[[str], None]) -> None:
         """
-        Prepare; nothing happens before :meth:`start`.
+        Keep the settings; no file is made before :meth:`start`.
 
         :param directory: directory of the files; empty = nothing is recorded.
         :param max_size: largest size of all files together [MB]; the oldest files are removed.
-        :param warn: called with a sentence, on a thread of the recorder.
+        :param warn: called with the sentence of each warning, on a thread of the recorder.
         """
         self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
         self._last_warning = ''
-        #: The writer writes while a motion runs; the finisher then makes one file, slowly.
+        #: Writes the folder of a motion while the motion runs; None = not started yet.
         self._writer: _Worker | None = None
+        #: Slowly makes one file from the folder after the motion; None = not started yet.
         self._finisher: _Worker | None = None
         self._is_closing = False
-        #: The folder of the running motion; only the writer uses it, except ``lost_rows``.
+        #: The folder of the running motion; only the writer uses it, apart from ``lost_rows``.
         self._folder: RecordingFolder | None = None
         # Buffers for rows: the buffer being filled, the bytes used in it, and the free buffers.
         self._buffer, self._used = bytearray(), 0
         self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
-        #: Start of the motion by the controller's clock; since then, the time of the newest packet
-        #: and the time at which the buffer has to be written [s].
+        #: Start of the motion by the controller's clock; the newest packet's time since then; the
+        #: time since then at which the buffer has to be written [s].
         self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
         #: The previous goal's count of begun points, while the robot still reports it.
@@ -228,7 +229,7 @@ class Recorder:
             self._flush(folder)
 
     def add_signals(self, signals: Signals) -> None:
-        """Note the newest outputs, for the packets that follow."""
+        """Keep the newest outputs, for the packets that are recorded next."""
         out = signals.outputs
         flags = (*out.standard, *out.configurable, *out.tool)
         self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
@@ -241,7 +242,7 @@ class Recorder:
             self._submit(folder, lambda: folder.write_event(event))
 
     def end(self, outcome: Outcome) -> None:
-        """End the recording; its file follows soon after."""
+        """End the recording; other threads then make its file."""
         if (folder := self._folder) is None:
             return
         self._flush(folder)
@@ -262,7 +263,7 @@ class Recorder:
             )
 
     def close(self, timeout: float) -> None:
-        """Wait up to ``timeout`` [s] for the writer; an unfinished recording stays a folder."""
+        """Wait for each worker up to ``timeout`` [s]; an unfinished recording stays a folder."""
         if (folder := self._folder) is not None:
             self._flush(folder)
             self._folder = None
@@ -290,7 +291,7 @@ class Recorder:
             self._free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.submit(write)  # at most as many jobs as buffers
+            self._writer.submit(write)  # at most as many such jobs wait as there are buffers
 
     def _submit(
         self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
@@ -314,7 +315,7 @@ class Recorder:
             sleep(YIELD_PAUSE)
 
     def _warn_once(self, sentence: str) -> None:
-        """Warn once, not with each motion."""
+        """Warn, unless the last warning was the same."""
         if sentence != self._last_warning:
             self._last_warning = sentence
             self._warn(sentence)

@@ -30,17 +30,17 @@ from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
 
 
 class _NoRecording(ValueError):
-    """A file of another kind."""
+    """The file is not a recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordedDeviation:
     """Distance of the tool from the planned path, one row for each of the n packets."""
 
-    #: (n,) distance of the measured pose [m], [rad].
+    #: (n,) distance [m] and angle [rad] of the measured pose from the path.
     position: Floats
     angle: Floats
-    #: (n,) distance of the controller's own target [m], [rad].
+    #: (n,) distance [m] and angle [rad] of the controller's own target from the path.
     target_position: Floats
     target_angle: Floats
     #: (n,) planned time, at full speed, of the place that the target has reached [s].
@@ -63,39 +63,39 @@ class Recording:
     events: list[Event] = field(repr=False)
     #: (n,) controller's clock from the start of the motion [s].
     time: Floats = field(repr=False)
-    #: (n, 7) measured pose, and the controller's target.
+    #: (n, 7) measured pose; pose of the controller's target.
     actual_pose: Floats = field(repr=False)
     target_pose: Floats = field(repr=False)
-    #: (n, 6)
+    #: (n, 6) measured twist; twist of the controller's target.
     actual_twist: Floats = field(repr=False)
     target_twist: Floats = field(repr=False)
-    #: (n, 6) [rad], [rad/s]
+    #: (n, 6) measured and target joint positions [rad]; measured and target velocities [rad/s].
     actual_q: Floats = field(repr=False)
     target_q: Floats = field(repr=False)
     actual_qd: Floats = field(repr=False)
     target_qd: Floats = field(repr=False)
-    #: (n, 6) [N], [Nm] at the TCP in base axes; NaN = unknown.
+    #: (n, 6) force [N] and torque [Nm] at the TCP in base axes; NaN = unknown.
     wrench: Floats = field(repr=False)
-    #: (n,) lag behind the newest set-point, and motion time that the robot has received and not
-    #: yet run [s]; NaN = unknown.
+    #: (n,) time by which the arm lags the newest set-point [s]; motion time that the robot has
+    #: received and not yet run [s]; NaN = unknown.
     lag: Floats = field(repr=False)
     buffered: Floats = field(repr=False)
-    #: (n,) 0 to 1: speed scaling by causes other than the slider, and the slider.
+    #: (n,) speed scaling by causes other than the slider, 0 to 1; the slider, 0 to 1.
     speed_scaling: Floats = field(repr=False)
     slider: Floats = field(repr=False)
-    #: (n, 2) [A] or [V]; NaN = unknown.
+    #: (n, 2) standard analog outputs [A] or [V]; NaN = unknown.
     analog_output: Floats = field(repr=False)
-    #: (n,) bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
+    #: (n,) digital outputs as bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
     digital_output: Int32s = field(repr=False)
-    #: (n,) number of motions that the robot program has begun, and the goal's point to which the
-    #: arm moves; -1 = unknown.
+    #: (n,) number of motions that the robot program has begun; the goal's point to which the arm
+    #: moves, -1 = unknown.
     points_begun: Int32s = field(repr=False)
     waypoint: Int32s = field(repr=False)
-    #: (n,) mode numbers of the controller.
+    #: (n,) numbers of the controller's robot mode, safety mode and runtime state.
     robot_mode: Int32s = field(repr=False)
     safety_mode: Int32s = field(repr=False)
     runtime_state: Int32s = field(repr=False)
-    #: The plan's samples: (m,) times [s], (m, 7) poses, (m,) the goal's point that each leads to.
+    #: The plan's samples: (m,) times [s]; (m, 7) poses; (m,) the goal's point to which each leads.
     planned_time: Floats = field(repr=False)
     planned_pose: Floats = field(repr=False)
     planned_point: Int32s = field(repr=False)
@@ -107,8 +107,8 @@ class Recording:
 
         :param path: a file ``.npz``, or the folder ``.part`` of a motion that is running or whose
             process was killed.
-        :param max_rows: most packets to read: of a longer recording only every second, third, ...
-            packet is read; 0 = all.
+        :param max_rows: largest number of packets to read: of a longer recording only every
+            second, third, ... packet is read; 0 = all packets.
         :raises OSError: the file does not exist, or cannot be read.
         :raises ValueError: the file is not a recording, or is damaged.
         """
@@ -117,13 +117,13 @@ class Recording:
             found = _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
         except (OSError, _NoRecording):
             raise
-        except Exception as error:  # NumPy, zipfile, zlib and json each raise their own
+        except Exception as error:  # NumPy, zipfile, zlib and json each raise their own errors
             raise ValueError(f'{path} is damaged: {error}') from error
         found._check_columns(path)
         return found
 
     def _check_columns(self, path: Path) -> None:
-        """Refuse columns of different lengths or wrong types: the file was changed."""
+        """Refuse columns of different lengths or wrong types, which a changed file may have."""
         for names, rows in (
             (_EXECUTED_COLUMNS, len(self.time)),
             (_PLANNED_COLUMNS, len(self.planned_time)),
@@ -163,7 +163,7 @@ class Recording:
 
     @property
     def points(self) -> Floats:
-        """(k, 7) the planned poses at the goal's points; at a blended corner, its middle."""
+        """(k, 7) the planned poses at the goal's points, or in the middle of their blends."""
         last = np.flatnonzero(np.diff(self.planned_point, append=-1))
         return np.asarray(self.planned_pose[last])
 
@@ -173,8 +173,8 @@ class Recording:
 
         The target is followed along the path, only forwards; the measured pose is compared with
         the nearest place on the path around the target. So a path that crosses itself is followed
-        in the right order, and a robot that is slowed down is not off the path. Without a plan, as
-        for live targets, the numbers are NaN.
+        in the right order, and a robot that is slowed down is not off the path. For a recording
+        without a plan (of live targets), the numbers are NaN, and the waypoints -1.
         """
         rows = np.full((len(self.time), 6), np.nan)
         if len(self.planned_time) > 1:
@@ -190,7 +190,7 @@ class Recording:
         )
 
     def _compare(self, tracker: PathTracker, rows: Floats) -> None:
-        """Fill in the columns of a deviation."""
+        """Fill in the rows of a deviation, one for each packet."""
         elapsed, max_speed_before = 0.0, 0.0
         for i in range(len(rows)):
             twist = tuple(self.target_twist[i].tolist())

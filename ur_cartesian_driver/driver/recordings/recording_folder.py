@@ -24,12 +24,12 @@ from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.joint_spline import SAME_TIME
 
-#: Names of recordings; other files in the directory are left alone.
+#: Matches the names of recordings; other files in the directory are left alone.
 _RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
 
 
 def recording_name(metadata: dict[str, Any]) -> str:
-    """Return the name of a recording, from its time and kind; names sort by time."""
+    """Return the name of a recording, made of time, mode and points; names sort by time."""
     begun = datetime.fromisoformat(metadata['created'])
     return (
         f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
@@ -38,7 +38,7 @@ def recording_name(metadata: dict[str, Any]) -> str:
 
 
 class RecordingFolder:
-    """Writes one motion; after a failure it ignores the rest."""
+    """Writes the recording of one motion; after a failure, nothing more is written."""
 
     def __init__(
         self,
@@ -48,9 +48,10 @@ class RecordingFolder:
         warn: Callable[[str], None],
     ) -> None:
         """
-        Prepare; nothing is written before :meth:`open`.
+        Keep the settings; nothing is written before :meth:`open`.
 
-        :param max_size: largest size of all recordings together [bytes]; a motion may use half.
+        :param max_size: largest size of all recordings together [bytes]; a motion may use half
+            of it.
         :param warn: called with a sentence when something is wrong.
         """
         self._directory, self._metadata = directory, metadata
@@ -62,11 +63,12 @@ class RecordingFolder:
         self.lost_rows = 0
 
     def open(self) -> None:
-        """Make the files."""
+        """Make the folder and its files."""
         self._directory.mkdir(parents=True, exist_ok=True)
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
-        # The lock shows that this process writes the folder; it ends with the process.
+        # The lock shows that this process writes the folder; the system releases the lock when
+        # the process ends.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
@@ -89,7 +91,7 @@ class RecordingFolder:
         """
         Append samples of the planned path, which replace all samples after a time [s].
 
-        Only samples of the last call can be replaced: a goal with keep_open drops its ending.
+        Only samples of the previous call can be replaced, such as a dropped ending (keep_open).
         """
         kept_samples = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
         rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
@@ -118,7 +120,7 @@ class RecordingFolder:
         enforce_quota(self._directory, self._max_size, yield_cpu)
 
     def abandon(self) -> None:
-        """Leave the folder as it is."""
+        """Close the files, and leave the folder as it is."""
         self._close_files()
 
     def run_guarded(self, work: Callable[[], None]) -> None:
@@ -186,7 +188,7 @@ def enforce_quota(
 
 
 def _is_written(folder: Path) -> bool:
-    """Return whether a process writes the folder; True if that cannot be known."""
+    """Return whether a process writes the folder; True if the lock cannot be checked."""
     try:
         with open(folder / disk.EXECUTED_FILE, 'rb') as rows:
             fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)

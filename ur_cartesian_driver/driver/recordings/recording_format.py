@@ -3,10 +3,10 @@
 """
 The format of a recording on disk: columns and files.
 
-While a motion runs there is a folder ``NAME.part``, whose files are complete at every moment: rows
-in growing ``.npy`` files, events in JSON lines. So the files can be read even if the process was
-killed. When the motion has ended, the folder becomes one file ``NAME.npz``, with an array for each
-column. Memory does not grow with the length of the motion.
+While a motion runs there is a folder ``NAME.part``, whose files are valid at every moment: growing
+``.npy`` files with the rows, and JSON lines with the events. So the files can be read even if the
+process was killed. When the motion has ended, the folder becomes one file ``NAME.npz``, with an
+array for each column. Memory does not grow with the length of the motion.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ EXECUTED_DTYPE = np.dtype(
         ('runtime_state', '<i4'),
     ]
 )
-#: The same for :mod:`struct`, which fills a row faster than numpy does.
+#: The same columns for :mod:`struct`, which fills a row faster than numpy does.
 EXECUTED_STRUCT = struct.Struct(
     '<'
     + ''.join(
@@ -63,27 +63,28 @@ EXECUTED_STRUCT = struct.Struct(
         for name in EXECUTED_DTYPE.names or ()
     )
 )
-#: Columns that older recordings do not have: they are read as NaN.
+#: Columns that older recordings do not have; missing columns are read as NaN.
 ADDED_COLUMNS = ('wrench',)
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 
-#: End of a folder's name, and the files in it.
+#: Suffix of a folder's name.
 PART_SUFFIX = '.part'
+#: Names of the files in a folder.
 METADATA_FILE, EVENTS_FILE = 'metadata.json', 'events.jsonl'
 EXECUTED_FILE, PLANNED_FILE = 'executed.npy', 'planned.npy'
 #: How many rows are processed together, which holds the interpreter for 0.1 ms.
 CHUNK = 512
-#: How many events are kept; a path of a million points has a million, all of which are in the
-#: column ``waypoint``.
+#: How many detected events are kept. A path of a million points has a million events, but the
+#: column ``waypoint`` shows them too.
 MAX_EVENTS = 10_000
-#: Longest text of an event; whole sentences are in the metadata.
+#: Largest number of characters in the text of an event; the metadata has the whole outcome.
 MAX_EVENT_TEXT = 120
 
 #: Time since the start [s], kind of event, and a few words.
 Event: TypeAlias = tuple[float, str, str]
 
-#: The digital outputs by bit.
+#: The names of the digital outputs, by bit.
 OUTPUT_NAMES = (
     *(f'standard digital output {i}' for i in range(8)),
     *(f'configurable digital output {i}' for i in range(8)),
@@ -110,9 +111,10 @@ class GrowingArray:
         """
         Append rows.
 
-        They become part of the array only when all are written: a failed write changes nothing.
+        The rows become part of the array only when all of them are written: a failed write changes
+        nothing.
 
-        :raises OSError: the disk is full, for example.
+        :raises OSError: the file cannot be written, for example because the disk is full.
         """
         start = len(_npy_header(self._dtype, (self.count,)))
         self.file.seek(start + self.count * self._dtype.itemsize)
@@ -148,7 +150,7 @@ def detect_events(
     rows: NDArray[np.void], yield_cpu: Callable[[], None] = lambda: None
 ) -> list[Event]:
     """
-    Return the changes from packet to packet: points begun, outputs, slider, program, modes.
+    Return the changes from packet to packet as events: points, outputs, slider, program, modes.
 
     :param rows: rows of the type :data:`EXECUTED_DTYPE`, which may be a memory-mapped file.
     :param yield_cpu: called often, so that other threads can run.
@@ -226,7 +228,7 @@ def merge_events(
 
 
 def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
-    """Return events as the members of a file."""
+    """Return events as the arrays of a file ``NAME.npz``."""
     return {
         'event_time': np.array([time for time, _, _ in events], dtype='<f8'),
         'event_kind': np.array([kind for _, kind, _ in events], dtype='<U16'),

@@ -25,16 +25,16 @@ _ACCEPTS_POINTS = frozenset(
 
 
 class AppendedRecords(Phrasing, Reporting):
-    """Counts the records that are sure to run, and the rests for lack of more records."""
+    """Counts the records that will certainly run, and the arm's stops for lack of more."""
 
     def __init__(self, monitor: GoalMonitor) -> None:
-        """Begin with the first points of a goal."""
+        """Begin with the records of the goal's first points."""
         self._monitor = monitor
         #: Whether more points may come.
         self.is_open = True
-        #: How many records run no matter what is appended: all but the ending.
+        #: How many records will run whatever is appended: all except the ending.
         self.committed = monitor.job.points - monitor.job.ending_records
-        #: How often the motion was brought to rest, and the point after which it last rested.
+        #: How often the motion was brought to rest; the point after which it last came to rest.
         self._stop_count = self._last_stop_point = 0
         self._is_resting = False
 
@@ -42,9 +42,9 @@ class AppendedRecords(Phrasing, Reporting):
         self, append_job: AppendJob, state: GoalState, *, sent: int = 0, sent_until: float
     ) -> AnswerAppend:
         """
-        Accept all points of a request, or none.
+        Accept all points of a request, or none, and return the answer.
 
-        :param sent: how many records can no longer be replaced.
+        :param sent: how many records of the goal can no longer be replaced.
         :param sent_until: the time until which the motion can no longer be replaced [s].
         """
         answer = partial(AnswerAppend, number=append_job.number)
@@ -69,10 +69,10 @@ class AppendedRecords(Phrasing, Reporting):
 
     def supply(self, state: GoalState, *, runs_out: bool, has_more: bool) -> Meaning:
         """
-        Return the signal for running out of points, or for points that came at rest.
+        Return the signal about points: they run out, come while the arm rests, or end.
 
-        :param runs_out: nothing but the ending is left to send.
-        :param has_more: there is a motion after the ending.
+        :param runs_out: whether only the ending is left to send.
+        :param has_more: whether the goal has a motion after the ending.
         """
         if state is GoalState.MOVING and runs_out:
             return GoalSignal.STARVING, ''
@@ -81,14 +81,14 @@ class AppendedRecords(Phrasing, Reporting):
         if not has_more:
             return NO_MEANING if self.is_open else (GoalSignal.NO_MORE_POINTS, '')
         packet = self._monitor.latest
-        # Packets may be late: the next motion begins only when one reports the arm at rest.
+        # Packets may be late: the next motion begins only once a packet reports the arm at rest.
         if packet is None or not is_at_rest(packet):
             return NO_MEANING
         moved = self._monitor.rest_offset(packet)
         return (GoalSignal.APPENDED, '') if moved is None else (GoalSignal.DEVIATION, moved)
 
     def run_out(self) -> int:
-        """Commit the ending, because nothing came in time; return the number of records."""
+        """Commit the ending because no points came in time; return the new ``committed``."""
         self._stop_count += 1
         self._last_stop_point = self._monitor.records.points - 1
         self.committed = self._monitor.records.total
@@ -111,7 +111,7 @@ class AppendedRecords(Phrasing, Reporting):
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The line about rests for lack of points."""
+        """The line about the stops for lack of points; empty if there were none."""
         if not self._stop_count:
             return ()
         times = how_often(self._stop_count)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The feeder of a goal, which sends its motion to the robot, and the capabilities of feeders.
+The feeder, which sends the motion of a goal to the robot, and the capabilities of feeders.
 
 A :class:`~.goal_machine.GoalMachine` knows the state of a goal. It asks its :class:`Feeder` for
 commands, and the feeder never changes the state.
@@ -9,11 +9,12 @@ commands, and the feeder never changes the state.
 Motions differ greatly: points on a socket, set-points through registers, a person who guides the
 arm. One base class with a hook for each difference would leave most hooks empty in most feeders.
 So a feature of only some motions is a *capability*: a small class from which the feeder, or one of
-its :attr:`~Feeder.parts`, inherits. The machine looks all of them up once (:class:`Capabilities`).
-The methods of the classes below are right for a motion without the capability.
+its :attr:`~Feeder.parts`, inherits. The machine looks up the capabilities once
+(:class:`Capabilities`). The methods of a capability class are the defaults for feeders without it.
 
-To add a capability, write its class here and its line in :class:`Capabilities`, use it in the
-machine, and inherit it in the feeder or part that has it. The other feeders stay as they are.
+To add a capability, write its class here, add a line to :class:`Capabilities`, use it in the
+machine, and let the feeder or part that has it inherit from the class. The other feeders need no
+change.
 """
 
 from __future__ import annotations
@@ -43,13 +44,13 @@ class Feeder(ABC):
     parts: tuple[object, ...] = ()
 
     def __init__(self, monitor: GoalMonitor) -> None:
-        """Prepare; nothing is sent yet."""
+        """Keep the monitor of the goal; nothing is sent yet."""
         self.monitor = monitor
 
     @abstractmethod
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
         """
-        Return the commands at the beginning of a state: START or CANCEL, for example.
+        Return the commands on entering a state, for example START or CANCEL.
 
         :param packet: the newest packet of the robot.
         """
@@ -57,10 +58,10 @@ class Feeder(ABC):
     @abstractmethod
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
         """
-        Return the next piece of the motion, in answer to a packet of the robot.
+        Return the commands that send the next piece of the motion after a packet of the robot.
 
-        Packets of the robot's state come in MOVING only, after the machine has acted on them;
-        packets of its registers come in every state, before the machine acts on them.
+        State packets are passed in MOVING only, after the machine has acted on them; register
+        packets are passed in every state, before the machine acts on them.
 
         :param now: time of a steady clock [s].
         """
@@ -74,7 +75,7 @@ class Feeder(ABC):
 class Prepared:
     """The robot has to be prepared before the motion."""
 
-    #: The name of the motion, for the refusal when another client has the robot's inputs.
+    #: The name of the motion, for the refusal if another client holds the robot's RTDE inputs.
     motion = ''
 
     def prepare(self) -> list[GoalCommand]:
@@ -85,13 +86,13 @@ class Prepared:
         """
         Return why the motion cannot begin yet, as a clause, or ''.
 
-        :param packet: the newest packet of the robot, None before the first.
+        :param packet: the newest packet of the robot; None before the first packet.
         """
         return ''
 
 
 class Appendable:
-    """The client appends points while the goal runs, or replaces the tail of its motion."""
+    """The client can append points while the goal runs, or replace the tail of the motion."""
 
     #: How long a goal waits at rest for more points [s]; 0 = without limit.
     append_timeout = 0.0
@@ -101,7 +102,7 @@ class Appendable:
         return [AnswerAppend(number=append_job.number, refusal='The goal is not open.')]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal for running out of points, or for points that came at rest."""
+        """Return the signal about points: they run out, come while the arm rests, or end."""
         return NO_MEANING
 
 
@@ -202,7 +203,7 @@ class Streaming:
 
 
 class Phrasing:
-    """The outcome is worded differently than for points."""
+    """The texts of the outcome differ from those for motions sent as points."""
 
     def success_text(self) -> str:
         """Return the sentence for a success; '' = the sentence about points."""
@@ -218,12 +219,12 @@ class Reporting:
 
     @property
     def report(self) -> tuple[str, ...]:
-        """The further lines."""
+        """The further lines of the report."""
         return ()
 
 
 class Capabilities:
-    """The capabilities of a feeder; the ones that it lacks do nothing."""
+    """The capabilities of a feeder; each one that it lacks has its default methods."""
 
     def __init__(self, feeder: Feeder) -> None:
         """Look up the capabilities of the feeder and its parts."""

@@ -26,7 +26,7 @@ class SendControl(GoalCommand):
 
     action: TrajectoryAction
     count: int = 0
-    #: For START: offsets that arrive through registers displace the path.
+    #: For START: whether offsets that arrive through registers displace the path.
     takes_offsets: bool = False
 
 
@@ -54,7 +54,7 @@ class RestoreTcp(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendSafeOutputs(GoalCommand):
-    """Send outputs and their safe values to the robot program, or have it set them."""
+    """Have the robot program store the safe values of outputs, set them, or forget them."""
 
     action: SafeOutputsAction
     token: int
@@ -63,7 +63,7 @@ class SendSafeOutputs(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecureOutputs(GoalCommand):
-    """Write the safe values of outputs to the robot: its program is paused or gone."""
+    """Write the safe values of outputs to the robot, because its program is paused or gone."""
 
     outputs: tuple[SafeOutput, ...]
 
@@ -96,7 +96,7 @@ class AnswerAppend(GoalCommand):
     number: int
     #: Why the points are refused, as a sentence; '' = they are accepted.
     refusal: str = ''
-    #: Points planned from rest would be accepted: the ending has been sent.
+    #: Whether points planned from rest would be accepted, because the ending has been sent.
     replan_from_rest: bool = False
     #: If a new tail begins too early: the earliest time at which it would be accepted [s].
     earliest_cut: float | None = None
@@ -124,14 +124,14 @@ class EnterServo(GoalCommand):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WriteInputs(GoalCommand):
-    """Write the claimed RTDE inputs, in the order of their recipe in ``registers``."""
+    """Write the claimed RTDE inputs, in the order of their recipe (module ``registers``)."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveServo(GoalCommand):
-    """Have the robot program brake and stop reading, and release the inputs."""
+    """Have the robot program brake the arm and stop reading its RTDE inputs; release them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The state machine that takes one goal through the robot program.
+The state machine of one goal, from its start to its outcome.
 
-It sends nothing and reads no clock. The owner of the sockets calls :meth:`GoalMachine.start` once
-and then :meth:`GoalMachine.step` with every event, and carries out the commands that they return,
-until one of them is :class:`~.goal_commands.Finish`.
+The machine sends nothing and reads no clock. The owner of the sockets calls
+:meth:`GoalMachine.start` once and then :meth:`GoalMachine.step` with every event, and carries out
+the returned commands, until one of them is :class:`~.goal_commands.Finish`.
 
 Each event becomes a signal, the signal selects a transition in the table of
 :mod:`~.goal_transitions`, and entering the new state yields commands. :mod:`~.goal_monitor`
@@ -57,7 +57,7 @@ from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
 
-#: Packets of the robot's registers.
+#: The events that carry a packet of the robot's registers.
 _REGISTERS = (events.ServoReceived, events.OffsetReceived)
 
 
@@ -73,7 +73,7 @@ class MotionStatus(NamedTuple):
 
 
 class GoalMachine:
-    """Takes one goal through the table of states."""
+    """Takes one goal through the table of transitions."""
 
     def __init__(
         self,
@@ -84,12 +84,12 @@ class GoalMachine:
         max_state_age: float = 0.0,
     ) -> None:
         """
-        Prepare; nothing happens before :meth:`start`.
+        Keep the settings; no command is given before :meth:`start`.
 
         :param feeder: sends the motion of this goal.
         :param feedback_period: time between two progress reports [s].
-        :param resume_after_stop: a protective or safeguard stop pauses the goal until somebody
-            unlocks the robot and plays its program; if False, it ends the goal.
+        :param resume_after_stop: whether a protective or safeguard stop only pauses the goal,
+            until somebody unlocks the robot and plays its program; if False, it ends the goal.
         :param max_state_age: the goal ends when the newest state of the robot is older than this
             [s]; 0 = no limit.
         """
@@ -97,8 +97,8 @@ class GoalMachine:
         self.feeder = feeder
         #: The capabilities of the feeder.
         self.can = Capabilities(feeder)
-        #: The TCP that was set for this goal, if any. The owner of the sockets restores it if it
-        #: is not ``is_restored`` when the goal ends.
+        #: The TCP that was set for this goal, if any. If its ``is_restored`` is False when the
+        #: goal ends, the owner of the sockets restores the original TCP.
         self.temporary_tcp: TemporaryTcp | None = None
         self._monitor = feeder.monitor
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
@@ -110,7 +110,7 @@ class GoalMachine:
         self._deadline = inf
         #: In SETTLING: the time by which the controller's target must be at the last point [s].
         self._arrival_due = inf
-        #: The outcome, as far as it is decided.
+        #: The code and the text of the outcome, as far as they are decided.
         self._code: ErrorCode | None = None
         self._text = ''
         self._has_moved = False
@@ -118,12 +118,12 @@ class GoalMachine:
 
     @property
     def job(self) -> MotionJob:
-        """The motion that was appended last, or the first one."""
+        """The job that was appended last, or the goal's first job if nothing was appended."""
         return self._monitor.job
 
     def start(self, packet: RobotState) -> list[GoalCommand]:
         """
-        Return the commands that start the motion, or those that prepare it.
+        Return the commands that prepare the motion, or start it if nothing must be prepared.
 
         :param packet: the newest packet of the robot.
         """
@@ -135,13 +135,13 @@ class GoalMachine:
             self.temporary_tcp = TemporaryTcp(job.T_flange_active, job.T_flange_tcp)
             commands.append(SetTemporaryTcp(T_flange_tcp=job.T_flange_tcp))
         elif not self._guard and not self.can.preparation.explain_not_ready(packet):
-            # Any time will do here: MOVING has no deadline.
+            # The time does not matter here, because MOVING has no deadline.
             commands += self._apply(GoalSignal.ARMED, '', -inf)
         return commands
 
     def step(self, event: events.Event | AppendJob, now: float) -> list[GoalCommand]:
         """
-        Return the commands that answer an event, or points that were appended.
+        Return the commands with which the machine answers an event or appended points.
 
         :param now: time of a steady clock [s].
         """
@@ -166,7 +166,7 @@ class GoalMachine:
         signal, text = self._interpret(event, now)
         if signal is not None:
             commands += self._apply(signal, text, now)
-        # A CANCEL does not wait for a progress report: the next packet brings one.
+        # No progress report delays a CANCEL; the next packet brings the report.
         sends_cancel = signal is not None and self.state is GoalState.CANCELLING
         if isinstance(event, events.StateReceived) and not sends_cancel:
             commands += self._after_packet(event, now)
@@ -265,7 +265,7 @@ class GoalMachine:
         return GoalSignal.DEVIATION, fault
 
     def _check_packet(self, packet: RobotState, now: float) -> Meaning:
-        """Return the signal of a packet in the present state if nothing has stopped the robot."""
+        """Return the signal of a packet in the present state; nothing has stopped the robot."""
         if self.state in RUNNING_STATES:
             fault = self._monitor.find_fault(
                 packet, may_stand_still=self.can.streaming.is_read(now)
@@ -285,7 +285,11 @@ class GoalMachine:
         return (signal, text) if signal is not None else self.can.appending.supply(self.state)
 
     def _is_armed(self, packet: RobotState) -> bool:
-        """Return whether the robot is ready and has the goal's TCP, at the start of the plan."""
+        """
+        Return whether the robot is prepared for the motion.
+
+        A TCP that was set for the goal must be active, and be at the start of the plan.
+        """
         tcp = self.temporary_tcp
         return (
             (tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None))
@@ -294,7 +298,7 @@ class GoalMachine:
         )
 
     def _is_restored(self) -> bool:
-        """Return whether the robot has its own TCP back and has confirmed the outputs."""
+        """Return whether the robot has its original TCP back and has confirmed the outputs."""
         tcp = self.temporary_tcp
         return (tcp is None or tcp.is_restored) and self._guard.is_confirmed(self._packet)
 
@@ -318,14 +322,15 @@ class GoalMachine:
         return self.state in RUNNING_STATES and self._monitor.awaits_count()
 
     def _check_deadline(self, now: float) -> Meaning:
-        """Return the signal of a deadline that has passed."""
+        """Return the signal if the deadline of the present state has passed, else none."""
         if now < self._deadline:
             return NO_MEANING
         if self.state not in RUNNING_STATES:
             return missed_deadline(
                 self.state, self._monitor, self.can, self.temporary_tcp, self._guard
             )
-        # Only an early CANCELED sets a deadline here; it takes effect if nothing has begun.
+        # In these states only an early CANCELED sets a deadline: if no point has begun by then,
+        # the CANCELED takes effect.
         self._deadline = inf
         return (
             RESULT_SIGNALS[events.TrajectoryResult.CANCELED]
@@ -336,19 +341,19 @@ class GoalMachine:
     # ---- from signals to commands -------------------------------------------------------------
 
     def _apply(self, signal: GoalSignal, text: str, now: float) -> list[GoalCommand]:
-        """Make the transition that the table gives; nothing else changes the state."""
+        """Make the transition in the table, and return its commands; only this sets the state."""
         transition = TRANSITIONS[self.state][signal]
         before, self.state = self.state, transition.state
         if transition.code is not None:
-            if before is GoalState.PROGRAM_LOST:  # this is why the program ended
+            if before is GoalState.PROGRAM_LOST:  # the new text says why the program ended
                 text = f'{text}; before that, {self._text}'
             if self._code is ErrorCode.CONNECTION_LOST and signal is GoalSignal.UNCONFIRMED:
-                self._text = f'{self._text}; {text}'  # the lost connection explains it
+                self._text = f'{self._text}; {text}'  # the lost connection is the cause
             else:
                 self._code, self._text = transition.code, text
         if self.state is before:
             return []
-        # A program that leaves the motion's mode with its outputs still armed would set them.
+        # A program that leaves the motion's mode while its safe outputs are armed would set them.
         disarms_first = self.state is GoalState.RESTORING and self._succeeds() and self._guard
         commands = [] if disarms_first else self.feeder.enter(self.state, self._packet)
         return commands + self._enter(self.state, signal, now)
@@ -361,7 +366,7 @@ class GoalMachine:
         return [] if signal is None else self._apply(signal, text, now)
 
     def _enter(self, state: GoalState, signal: GoalSignal, now: float) -> list[GoalCommand]:
-        """Set the deadline of a state, and return the machine's own commands."""
+        """Set the deadline of a state, and return the commands in addition to the feeder's."""
         match state:
             case GoalState.MOVING:
                 self._deadline, self._has_moved = inf, True
@@ -394,7 +399,7 @@ class GoalMachine:
         """
         Return how late the last point was reached, as a clause, or ''.
 
-        :param tolerance: allowed delay [s]; negative = any.
+        :param tolerance: allowed delay [s]; negative = any delay.
         """
         if self.job.due is None or tolerance < 0.0:
             return ''
@@ -408,7 +413,7 @@ class GoalMachine:
         )
 
     def _enter_restoring(self, now: float) -> list[GoalCommand]:
-        """Restore the TCP, release the outputs; a goal that has neither ends at once."""
+        """Restore the TCP and release the outputs; a goal that set neither ends at once."""
         self._is_decided = True
         if self.temporary_tcp is None and not self._guard:
             return self._apply(GoalSignal.RESTORED, '', now)
@@ -424,12 +429,12 @@ class GoalMachine:
         """Write the safe outputs of a failed goal, unless the program has confirmed them."""
         if self._succeeds() or (self._is_decided and self._guard.is_safe(self._packet)):
             return []
-        # In RESTORING the program has been told already.
+        # On entering RESTORING, the machine has already released the outputs.
         release = [] if self._is_decided else self._guard.release(succeeded=False)
         return [*release, *self._guard.secure()]
 
     def _end(self, signal: GoalSignal) -> list[GoalCommand]:
-        # After RESTORING no motion is left that could go on.
+        # Once RESTORING was entered, no motion is left that could go on.
         if signal in STOP_PROGRAM_AFTER and not self._is_decided:
             return [StopProgram(reason=self._text), *self._finish()]
         return self._finish()
@@ -447,7 +452,7 @@ class GoalMachine:
         return commands
 
     def _progress(self) -> list[GoalCommand]:
-        """Return a report, if the newest packet is about the TCP of the goal."""
+        """Return a progress report; nothing if there is no progress or another TCP is active."""
         packet, tcp = self._monitor.latest, self.temporary_tcp
         if packet is None or not self.can.streaming.has_progress:
             return []

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Compare each packet of the robot with the plan of a goal: progress, and faults.
+Compare each packet of the robot with the plan of a goal, to find its progress and faults.
 
 The monitor finds faults and decides nothing: the table of :mod:`~.goal_transitions` gives the
 consequence of each fault in each state.
@@ -27,9 +27,10 @@ from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
 
-#: How far the arm may be from the start of the plan when the robot is armed [m], [rad].
+#: The largest distance [m] and angle [rad] of the arm from the start of the plan, and of the
+#: controller's target from a place where the arm has waited.
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
-#: How far the controller's own target may be from the plan [m], [rad].
+#: The largest distance [m] and angle [rad] of the controller's own target from the plan.
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 
 
@@ -40,12 +41,12 @@ class GoalMonitor:
         self, job: MotionJob, max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION
     ) -> None:
         """
-        Prepare.
+        Begin before the first packet.
 
-        :param max_plan_deviation: how far the controller's own target may be from the plan [m],
-            [rad]; 0 = no limit.
+        :param max_plan_deviation: the largest distance [m] and angle [rad] of the controller's
+            own target from the plan; 0 = no limit.
         """
-        #: The motion, with the part that was appended last, and all its records.
+        #: The job that was appended last, or the first job; the records of the whole goal.
         self.job, self.records = job, WireRecords(job)
         self._start = pose_from_row(job.reference.poses[0])
         self._tracker = PathTracker(job.reference)
@@ -57,27 +58,28 @@ class GoalMonitor:
         self._standstill = Standstill(job.reference, job.output_delay)
         self._max_plan_deviation = max_plan_deviation
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
-        #: Whether the robot program has read START: it has begun a point, or the target moves.
+        #: Whether the robot program is known to have read START: it has begun a point, or the
+        #: target has moved.
         self._has_begun = False
-        #: How many motions of the goal the robot has begun: in total, and in trajectories before
-        #: the present one.
+        #: How many motions of the goal the robot has begun: in total; and in the trajectories
+        #: before the present one.
         self._motions_begun = self._motions_before = 0
-        #: The count reported for the previous goal (None = no trajectory was started), and whether
-        #: the robot may still report that count.
+        #: The count reported before START (None = no trajectory of this goal was started yet);
+        #: whether the robot may still report that count.
         self._stale_begun: int | None = None
         self._awaits_count = False
-        #: How long the program has been running its newest motion [s], and that motion's number.
+        #: How long the program has been running its newest motion [s]; that motion's number.
         self._running_time, self._running = 0.0, 0
-        #: The newest packet; None before the first.
+        #: The newest packet; None before the first packet.
         self.latest: RobotState | None = None
         self._applied_offset = NO_OFFSET
-        #: Scaled time: time since the start, as the controller's clock ran [s]; and the part of it
-        #: before the motion began.
+        #: Scaled time: time since the start, as the controller's clock ran [s]; the part of that
+        #: time before the motion began [s].
         self.scaled_time = self.start_delay = 0.0
         #: How long the slider or a pause held up the controller's clock before the newest packet
         #: [s], whether or not the arm moved.
         self.held_time = 0.0
-        #: How fast the time of the motion ran before the newest packet, 0 to 1.
+        #: Speed of the motion's clock just before the newest packet: 0 = stopped, 1 = real time.
         self.rate = 0.0
 
     # ---- progress -----------------------------------------------------------------------------
@@ -93,7 +95,7 @@ class GoalMonitor:
         self._stale_begun, self._awaits_count = stale_begun, True
         self._motions_begun = self._motions_before = self.records.motions_before(sent)
         self._standstill.restart()
-        self.scaled_time = self._tracker.time()  # waiting at rest is no delay of the motion
+        self.scaled_time = self._tracker.time()  # the wait at rest is no delay of the motion
 
     def update(
         self,
@@ -124,7 +126,7 @@ class GoalMonitor:
             self._running_time, self._running = 0.0, self._motions_begun
         self._track(before, state, passed, behind)
         waits = self._has_begun and self._tracker.waits
-        # The program waits in real time, and reports no scaling while it does not move the arm.
+        # A wait of the program takes real time, but the reported speed scaling is 0 meanwhile.
         held = state.target_speed_fraction <= 0.0 or not playing
         self.rate = state.effective_speed or float(waits and not held)
         elapsed = passed * self.rate
@@ -144,23 +146,23 @@ class GoalMonitor:
     def _track(
         self, before: RobotState | None, state: RobotState, passed: float, behind: int
     ) -> None:
-        """Find the position on the path."""
+        """Find the position of the controller's target on the path."""
         begun, fastest = self._motions_begun, tracker_speed(state.target_tcp_twist)
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
-        if before is not None:  # the tool may have braked since
+        if before is not None:  # the tool may have braked since that packet
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
         running = self.records.running_waypoints(begun, behind)
         if running is not None and running[1] < running[0] and self._press() is not None:
-            # However far the tool gives way in its press, it has passed the previous point.
+            # The press may hold the tool off its path, but the previous point has been passed.
             self._tracker.pass_stop(running[1])
         self._tracker.update(self._tracked(state.target_tcp_pose), 2.0 * passed * fastest, running)
 
     def finish(self, time: float = inf) -> None:
-        """Move on to the end of the path, or to a rest at a planned time [s], as reported."""
+        """Set the position to the end of the path, or to a rest at a planned time [s]."""
         self._tracker.finish(time)
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Append a job, whose records follow the first ``records_before`` of the goal."""
+        """Append a job, whose records follow the first ``records_before`` records of the goal."""
         self._tracker.append(job.reference, self.records.end_time(records_before))
         self.records.append(job, records_before)
         self.job = job
@@ -196,14 +198,14 @@ class GoalMonitor:
         )
 
     def script_call(self) -> tuple[float, str]:
-        """Return the timeout of the running script function [s], and its place; 0 s = none."""
+        """Return the timeout [s] and the place of the running script function; 0 = none runs."""
         if not self.job.script_calls:
             return 0.0, ''
         record = self.records.begun_records(self._motions_begun) - 1
         return self.job.script_calls.get(record, (0.0, ''))
 
     def _input_wait(self) -> tuple[float, str]:
-        """Return the timeout of the wait for an input [s], and its failure clause; 0 s = none."""
+        """Return the timeout [s] and failure clause of a running wait for an input; 0 = none."""
         running = None
         if self.job.input_waits:
             running = self.records.running_waypoints(self._motions_begun)
@@ -215,7 +217,7 @@ class GoalMonitor:
         self, *, buffered: float, lag: float, at_end: bool, waits: bool = False
     ) -> Progress:
         """
-        Return a report about the newest packet.
+        Return a progress report from the newest packet.
 
         :param buffered: motion time that the robot has received and not yet run [s].
         :param lag: the time by which the arm lags the newest set-point [s].
@@ -262,7 +264,7 @@ class GoalMonitor:
         return self.script_call()[1] or f'on the way to point {self.waypoint()}'
 
     def contact_clause(self, state: RobotState) -> str:
-        """Return where the tool touched, as the beginning of a sentence."""
+        """Return the place where the tool touched, as the beginning of a sentence."""
         x, y, z = state.actual_tcp_pose.position
         place = self._tracker.place()
         return (
@@ -271,7 +273,7 @@ class GoalMonitor:
         )
 
     def missing_input(self) -> str:
-        """Return the input for which the program waited in vain, as a clause; '' = unknown."""
+        """Return a clause about the input that did not come in time; '' = unknown."""
         return self._input_wait()[1]
 
     # ---- faults -------------------------------------------------------------------------------
@@ -280,7 +282,7 @@ class GoalMonitor:
         """
         Return the fault of a motion, with a clause for the outcome's text, or None.
 
-        :param may_stand_still: a still arm is no fault.
+        :param may_stand_still: whether a still arm is no fault.
         """
         if clause := self._plan_deviation(state) or self._late_call() or self._wrong_speed(state):
             return GoalSignal.DEVIATION, clause
@@ -293,11 +295,11 @@ class GoalMonitor:
         return None
 
     def start_offset(self, state: RobotState) -> str | None:
-        """Return how far the arm is from the start of the plan, as a clause, or None."""
+        """Return a clause if the arm is away from the start of the plan, else None."""
         return _offset_clause(self._start, state.actual_tcp_pose)
 
     def rest_offset(self, state: RobotState) -> str | None:
-        """Return how far the target is from where the arm should wait, as a clause, or None."""
+        """Return a clause if the target is away from the place where the arm waits, else None."""
         return _offset_clause(self._tracker.pose(), state.target_tcp_pose)
 
     def missed_end(self, state: RobotState) -> str:
@@ -375,14 +377,14 @@ class GoalMonitor:
     # ---- the planned pose of a tool that may give way -----------------------------------------
 
     def _press(self) -> PressWindow | None:
-        """Return the press at the position of the target, or None."""
+        """Return the press at the present path position, or None."""
         if not self.job.presses:
             return None
         time = self._tracker.time()
         return next((press for press in self.job.presses if press.contains(time)), None)
 
     def _desired(self, state: RobotState) -> Pose:
-        """Return the planned pose of the tool near the present path position."""
+        """Return the planned pose near the present path position, with the path offset."""
         planned = self._tracker.desired(
             self._tracked(state.actual_tcp_pose), state.target_tcp_twist
         )
@@ -390,7 +392,7 @@ class GoalMonitor:
         return Pose(add(planned.position, shift), planned.quaternion) if any(shift) else planned
 
     def _tracked(self, pose: Pose) -> Pose:
-        """Return a pose without offset and yield, except the yield that may be progress."""
+        """Return a pose without path offset and yield, except yield that may be progress."""
         pose, press = self._undisplaced(pose), self._press()
         if press is None or self._tracker.time() > press.end:
             return pose
@@ -400,7 +402,7 @@ class GoalMonitor:
         )
 
     def _stiff(self, pose: Pose) -> Pose:
-        """Return a pose as it would be without the offset and the yield."""
+        """Return a pose as it would be without the path offset and the yield of the press."""
         pose, press = self._undisplaced(pose), self._press()
         return pose if press is None else press.without_yield(self._tracker.pose(), pose)
 
@@ -409,7 +411,7 @@ class GoalMonitor:
         return Pose(subtract(pose.position, shift), pose.quaternion) if any(shift) else pose
 
     def _retracted(self, pose: Pose, planned: Pose) -> Pose:
-        """Return the planned pose, allowing for the retraction after contact."""
+        """Return the planned pose, or an earlier one if the tool retracts after contact."""
         press = self._press()
         if press is None or not press.ends_at_contact:
             return planned

@@ -4,44 +4,46 @@
 The states of a goal while the robot program runs it, and the table of transitions.
 
 :data:`TRANSITIONS` gives for each state and signal (:class:`~.outcome_codes.GoalSignal`) the next
-state, and the code of the outcome if it is decided there.
+state, and the error code if the signal decides the outcome of the goal.
 
 * **ARMING**: every goal begins here. If it moves a frame other than the robot's TCP, the command
-  that sets the TCP has been sent: nothing moves until the robot reports that TCP, at the start of
-  the plan. Motions through RTDE registers also wait for the robot's inputs and for the answer of
-  the robot program. If there is nothing to prepare, ARMED follows at once.
+  that sets the TCP has been sent: nothing moves until the robot reports that TCP and is at the
+  start of the plan. Motions through RTDE registers also wait for the robot's inputs and for the
+  answer of the robot program. If there is nothing to prepare, ARMED follows at once.
 * **MOVING**: the robot program runs points. Its result SUCCESS leads to SETTLING. A cause that
   stops the arm by itself (safety, connection) ends the goal at once, because the robot program
   would not read our CANCEL; our own reasons to stop (cancel, preemption, tolerance) lead to
   CANCELLING.
 * **RUNNING_OUT**: no more points came in time for an open goal (keep_open). The ending, which
   brings the arm to rest at or after the last known point, has been sent, with the number of
-  records. Points that come now wait for the program's SUCCESS, and continue from rest.
+  records. Points that come now wait for the program's SUCCESS, and are executed from rest.
 * **AWAITING_POINTS**: the arm rests after the ending, and the program has no trajectory. APPENDED
-  starts the next trajectory; NO_MORE_POINTS (the client closed the goal) leads to SETTLING. After
-  ``keep_open_timeout`` without either the goal ends as CANCELLED: abandoned, nothing failed.
+  starts the next trajectory; NO_MORE_POINTS (the client closed the goal) leads to SETTLING. If
+  neither comes within ``keep_open_timeout``, the goal was abandoned, and ends as CANCELLED.
 * **SETTLING**: the program has reported the last point as reached. The arm has to come to rest
-  inside the goal tolerance, within the goal's time tolerance. If the controller's target is
-  elsewhere, the program skipped motions (DEVIATION).
+  inside the goal tolerance, within the goal's time tolerance. If the controller's target is not
+  at the last point, the program skipped motions (DEVIATION).
 * A goal that ends when the tool touches (CONTACT) succeeds without SETTLING: the program has
   moved the arm back to the place of contact.
 * **CANCELLING**: CANCEL has been sent. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
-  the program read CANCEL; it is not the answer: CANCELED still follows.
-* **COMING_TO_REST**: the program has answered; the arm is coming to rest.
+  the program read CANCEL; this is not the answer to CANCEL: CANCELED still follows.
+* **COMING_TO_REST**: the program has answered CANCELED; the arm is coming to rest.
 * **RESTORING**: the outcome is decided, and nothing moves; the command that restores the original
   TCP has been sent. The outcome waits until the robot reports that TCP, so that the next goal
-  finds it, and until the program confirms the safe outputs. Without either, the goal ends at once.
-* **PROGRAM_LOST**: the robot program is gone. Often it ends because of the safety system, the
-  power or the whole controller, and the effects may be reported in any order; so for a moment a
-  deeper reason can still replace this one.
+  finds it, and until the program confirms the safe outputs. A goal that set no TCP and has no safe
+  outputs ends at once.
+* **PROGRAM_LOST**: the robot program is gone. Often the cause is a safety stop, a power cut or a
+  dead controller, and all of these may be reported in any order; so for a moment a deeper reason
+  can still replace this one.
 * **ENDED**: the outcome has been reported. Later events are ignored.
 
-Nearly every state has a deadline (:mod:`~.missed_deadlines`). Without an answer in CANCELLING or
-COMING_TO_REST the robot program is ended. A paused program reads nothing: if the arm is at rest,
-the goal ends with the code already decided (UNANSWERED); if the arm may still move, the goal fails
-(UNCONFIRMED). If the TCP is not set in time, the goal ends before anything moves; if it is not
-restored in time, the owner of the sockets restores it later (``temporary_tcp`` of the machine).
+Nearly every state has a deadline (:mod:`~.missed_deadlines`). If CANCEL is not answered in time,
+or the arm does not come to rest after the answer, the driver ends the robot program. A paused
+program cannot answer: if the arm is at rest, the goal ends with the code already decided
+(UNANSWERED); if the arm may still move, the goal fails (UNCONFIRMED). If the TCP is not set in
+time, the goal ends before anything moves; if the original TCP is not restored in time, the owner
+of the sockets restores it later (``temporary_tcp`` of the machine).
 MOVING and RUNNING_OUT have no deadline, because a speed slider at zero is no error; but if the arm
 stands still for ``STANDSTILL_TIMEOUT`` and nothing holds it, a command or a result was lost
 (STANDSTILL). If RTDE packets are too old or stop coming, the motion cannot be monitored: the goal
@@ -102,19 +104,19 @@ STOP_PROGRAM_AFTER = frozenset(
 
 
 class Transition(NamedTuple):
-    """The next state, and the code of the outcome if it is decided here."""
+    """The next state, and the error code if the transition decides the outcome."""
 
     state: GoalState
     code: ErrorCode | None = None
 
 
 def _to(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transition]:
-    """Return table rows whose signals leave the outcome as it is."""
+    """Return table entries for signals that leave the outcome as it is."""
     return {signal: Transition(state) for signal in signals}
 
 
 def _decide(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transition]:
-    """Return table rows whose signals decide the outcome."""
+    """Return table entries for signals that decide the outcome."""
     return {signal: Transition(state, signal.code) for signal in signals}
 
 
@@ -122,7 +124,8 @@ _STOPS = (GoalSignal.PROTECTIVE_STOP, GoalSignal.EMERGENCY_STOP, GoalSignal.CONN
 _RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE, GoalSignal.CONTACT)
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
 
-#: The arm stops by itself: a deeper reason, which replaces an outcome that waits for the stop.
+#: Transitions if the arm stops by itself: this deeper reason replaces an outcome that is already
+#: decided and waits for the stop.
 _ON_STOP = {
     **_decide(GoalState.ENDED, *_STOPS),
     **_decide(GoalState.PROGRAM_LOST, GoalSignal.PROGRAM_STOPPED),
@@ -195,7 +198,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = {
 }
 
 
-# As plain numbers, because every packet is checked and operations on flags are slow.
+# These are plain numbers because every packet is checked and operations on flags are slow.
 _EMERGENCY_STOPS = int(
     SafetyStatus.EMERGENCY_STOPPED
     | SafetyStatus.ROBOT_EMERGENCY_STOPPED
@@ -208,7 +211,7 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
     | SafetyStatus.FAULT
 )
 NO_STOP = SafetyStatus(0)
-#: Stops after which the robot resumes its program once somebody unlocks it and plays it.
+#: Stops after which the robot goes on once somebody unlocks it and plays its program.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
 #: An arm is at rest if the target speed of every joint is below this [rad/s].
 REST_SPEED = 1e-3

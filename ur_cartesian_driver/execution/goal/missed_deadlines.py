@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The signal of a goal whose time in its present state is up, and the reason in words."""
+"""The signal for a goal whose deadline in its present state has passed, and the reason."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def missed_deadline(
     guard: OutputGuard,
 ) -> Meaning:
     """
-    Return the signal, with a clause for the outcome's text.
+    Return the signal for a missed deadline, with a clause for the outcome's text.
 
     :param state: any state with a deadline, except those in which the program runs points.
     """

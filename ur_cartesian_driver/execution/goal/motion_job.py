@@ -44,20 +44,21 @@ from ur_cartesian_driver.motion.plan.primitive import (
 class MotionJob:
     """The part of a plan that a goal machine needs."""
 
-    #: How many records there are on the wire: motions and outputs.
+    #: How many records the job has on the wire: motions and outputs.
     points: int
     reference: ReferencePath
-    #: Expected time at full speed [s].
+    #: Expected time from the start of the goal to the end of the motion, at full speed [s].
     duration: float
     #: When the last point is due [s]; None = the goal gives no times.
     due: float | None = None
-    #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
+    #: How long after the end of the motion the last output is switched [s]; part of ``due``.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
-    #: The robot's TCP at planning, the TCP that the plan needs (None = the same), and the
-    #: controlled frame relative to the latter.
+    #: The robot's TCP at the time of planning.
     T_flange_active: Pose = IDENTITY
+    #: The TCP that the plan needs; None = ``T_flange_active``.
     T_flange_tcp: Pose | None = None
+    #: The controlled frame relative to the TCP that the plan needs.
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
@@ -74,13 +75,14 @@ class MotionJob:
     #: (records,) index of the waypoint to which each record leads or belongs; empty = record i is
     #: the motion to waypoint i.
     waypoint: Int32s = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    #: (records,) mask of the motions, which the robot program counts; empty = all are.
+    #: (records,) mask of the records that are motions, which the robot program counts; empty = all
+    #: records are motions.
     is_motion: Flags = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     #: (records,) when each record is planned to end [s]; an output ends with its motion. Empty =
     #: when the reference path arrives at the waypoint of the record.
     end_times: Floats = field(default_factory=lambda: np.empty(0))
-    #: (records,) when the robot program asks for the next record [s]: when this one ends, or when
-    #: its blend begins. Empty = at ``end_times``.
+    #: (records,) when the robot program asks for the record after each record [s]: when the record
+    #: ends, or when the blend at its end begins. Empty = at ``end_times``.
     request_times: Floats = field(default_factory=lambda: np.empty(0))
     #: Whether points may be appended (keep_open).
     keep_open: bool = False
@@ -90,10 +92,10 @@ class MotionJob:
     ending_records: int = 0
     #: Whether the robot program does anything at points while the arm stands still.
     has_stops: bool = False
-    #: By waypoint: the timeout of its input [s], and the clause for an input that did not come.
+    #: By waypoint: the timeout [s] of its wait for an input, and the clause if no input came.
     input_waits: Mapping[int, tuple[float, str]] = field(default_factory=dict)
-    #: By record number: the time allowed for a function of the prelude [s], and a clause that says
-    #: where the program is meanwhile.
+    #: By record number: the time allowed for its function of the prelude [s], and a clause that
+    #: says where the program is while the function runs.
     script_calls: Mapping[int, tuple[float, str]] = field(default_factory=dict)
     #: The parts of the path where the tool may give way.
     presses: tuple[PressWindow, ...] = ()
@@ -123,7 +125,7 @@ class MotionJob:
 
     @property
     def own_program_needs(self) -> str:
-        """The feature that only our robot program has, as part of a sentence; '' = none."""
+        """A feature of the job that needs our own robot program, for a sentence; '' = none."""
         if self.following_outputs:
             return 'outputs that follow the speed (proportional_outputs)'
         if not self.is_motion.all():
@@ -143,8 +145,8 @@ class AppendJob:
 
     #: The number by which the answer is matched.
     number: int
-    #: How many records of the goal stay, before the appended ones; planned records after them are
-    #: dropped.
+    #: How many records of the goal stay; the appended records follow them, and replace any later
+    #: ones that were planned before.
     records_before: int
     #: The appended records, with times since the start of the goal; the reference path continues
     #: the records that stay. None = the client closes the goal, which gets no more points.
@@ -163,7 +165,8 @@ def job_from_plan(
     """
     Return the job of a plan.
 
-    :param start_time: when its first segment begins [s]; not 0 for appended points.
+    :param start_time: when the plan's first segment begins, since the start of the goal [s]; not
+        0 for appended points.
     :param ending_records: see :class:`MotionJob`.
     :param spline: the joint spline of a part that does not begin at rest.
     """
@@ -232,7 +235,7 @@ def _script_calls(
     """Return ``script_calls`` of the job."""
     return {
         int(first_records[row]): (
-            # Its delayed outputs are part of the same motion.
+            # The delayed outputs of the call are part of the same motion.
             stop.timeout + _longest_delay(rows, row),
             f'in {stop.text} at point {rows.waypoints[row]}',
         )
@@ -242,7 +245,7 @@ def _script_calls(
 
 
 def _press_windows(plan: Plan) -> Iterator[PressWindow]:
-    """Yield the times at which the tool may give way on the reference path."""
+    """Yield a window for each press: its times on the reference path, and its bounds."""
     reference, goal = plan.reference, plan.goal
     rows = np.searchsorted(reference.point, np.arange(len(goal.waypoints)), side='right') - 1
     times = [*reference.time[rows].tolist(), inf]
@@ -272,9 +275,10 @@ def _longest_delay(rows: PlannedRows, row: int) -> float:
 
 
 def _blend_lead_times(rows: PlannedRows) -> Floats:
-    """Return upper bounds of the times from the start of a blend to the end of its motion [s]."""
+    """Return for each motion an upper bound of the time from its blend's start to its end [s]."""
     radii = blend_radii(rows.primitives)
-    # The tool is slower in the segment than in its blend, unless it brakes before the blend.
+    # On average the tool is slower in the segment than in its blend; if it brakes before the
+    # blend, the time in the blend entry is longer.
     share = radii / np.maximum(np.maximum(rows.lengths, radii), 1e-300)
     times: Floats = np.maximum(rows.durations * share, rows.blend_entries[:, -1])
     return times

@@ -57,10 +57,10 @@ class GoalSignal(Enum):
     TIMEOUT = 'the time of a state without a code is up', None
 
 
-#: The signal of an event with a clause for the outcome's text; no signal = nothing follows.
+#: The signal of an event (None = the event has no effect), and a clause for the outcome's text.
 Meaning: TypeAlias = tuple[GoalSignal | None, str]
 NO_MEANING: Meaning = (None, '')
-#: The signal of a faulty motion with a clause for the outcome's text.
+#: The signal of a fault, and a clause for the outcome's text.
 Fault: TypeAlias = tuple[GoalSignal, str]
 
 #: The signal of each result of the robot program, with a clause for the outcome's text.

@@ -3,10 +3,10 @@
 """
 The outputs of a goal that have to be safe whenever its motion does not go on as planned.
 
-The robot program gets the safe values before the motion; its thread that stops the arm also sets
-the outputs. A program that is paused or gone runs no thread: then the driver writes the values to
-the robot. Only confirmed orders are relied on: the program confirms by a token, the driver's write
-by the outputs that it changed.
+The robot program gets the safe values before the motion; the thread of the program that stops the
+arm also sets the outputs. A program that is paused or gone runs no thread: then the driver writes
+the values to the robot. An order takes effect here only once it is confirmed: the robot program
+confirms with a token, the driver's write with the list of outputs that it has changed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MOVABLE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 
 
 class OutputGuard:
-    """Tracks whether the robot program has the values, and what a pause has changed."""
+    """Tracks whether the robot program has the values, and which outputs a pause has changed."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class OutputGuard:
         following: frozenset[int] = frozenset(),
     ) -> None:
         """
-        Prepare; without outputs the guard does nothing.
+        Keep the outputs of a goal; without outputs the guard does nothing.
 
         :param packet: the newest packet of the robot.
         :param following: analog outputs that the robot program itself writes again after a pause.
@@ -44,11 +44,11 @@ class OutputGuard:
         self._outputs, self._following = outputs, following
         self._token = packet.safe_outputs_token
         self._is_held = False
-        #: Whether the write for this pause, or for the end, has been ordered.
+        #: Whether the driver's write was ordered, in this pause or at the end of the goal.
         self._is_ordered = False
-        #: The outputs that the write has changed, with their previous values.
+        #: The outputs that the driver's write has changed, with their previous values.
         self._changed: tuple[SafeOutput, ...] = ()
-        #: Whether the driver has begun to restore outputs, which may end after the goal does.
+        #: Whether the driver was told to restore outputs, which it may finish after the goal ends.
         self._has_restored = False
 
     def __bool__(self) -> bool:
@@ -58,11 +58,15 @@ class OutputGuard:
     # ---- the robot program --------------------------------------------------------------------
 
     def arm(self) -> list[GoalCommand]:
-        """Give the values to the robot program."""
+        """Return the command that gives the safe values to the robot program."""
         return self._order(SafeOutputsAction.ARM)
 
     def release(self, *, succeeded: bool) -> list[GoalCommand]:
-        """End the goal: after a success leave the outputs as they are, else make them safe."""
+        """
+        Return the command at the end of the goal.
+
+        After a success the outputs stay as they are, else the robot program makes them safe.
+        """
         return self._order(SafeOutputsAction.DISARM if succeeded else SafeOutputsAction.SET)
 
     def is_confirmed(self, packet: RobotState | None) -> bool:
@@ -70,7 +74,7 @@ class OutputGuard:
         return not self or (packet is not None and packet.safe_outputs_token == self._token)
 
     def is_safe(self, packet: RobotState | None) -> bool:
-        """Return whether the outputs are safe for good, after :meth:`release`."""
+        """Return whether after :meth:`release` the outputs are safe and will stay so."""
         return self.is_confirmed(packet) and not self._has_restored
 
     def _order(self, action: SafeOutputsAction) -> list[GoalCommand]:
@@ -83,7 +87,7 @@ class OutputGuard:
     # ---- the driver ---------------------------------------------------------------------------
 
     def secure(self) -> list[GoalCommand]:
-        """Write the values to the robot, once per pause and once at the end."""
+        """Return the command to write the safe values, once per pause and once at the end."""
         if self._is_ordered or not self:
             return []
         self._is_ordered = True
@@ -106,7 +110,7 @@ class OutputGuard:
         return self._restore() if goes_on else []
 
     def take(self, event: OutputsSecured) -> None:
-        """Note the result of the write."""
+        """Note which outputs the driver's write has changed."""
         self._changed = event.changed
 
     def fault(self) -> str:

@@ -16,8 +16,8 @@ from ur_cartesian_driver.execution.goal.goal_transitions import is_at_rest
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: How much a reported TCP may differ from the one that was sent [m], [rad]: the resolution of the
-#: wire on each axis.
+#: The largest distance [m] and angle [rad] of a reported TCP from the one that was sent: values
+#: on the wire have a resolution of 1e-6.
 TCP_RESOLUTION = 2e-6
 #: How long the robot may take to report a TCP that a command has set [s]; after that the command
 #: is considered lost.
@@ -27,7 +27,7 @@ MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
 
 def same_tcp(a: Pose, b: Pose) -> bool:
-    """Return whether two TCPs are the same to the resolution of the wire."""
+    """Return whether two TCPs are the same within the resolution of the wire."""
     return a.distance_to(b) <= TCP_RESOLUTION and a.angle_to(b) <= TCP_RESOLUTION
 
 
@@ -83,7 +83,7 @@ class TemporaryTcp:
         return True
 
     def retry_now(self) -> None:
-        """Allow the next try at once, because something has changed and it may succeed."""
+        """Allow the next try at once, because a change of the robot may let it succeed."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def report(self, packet: RobotState | None) -> str:

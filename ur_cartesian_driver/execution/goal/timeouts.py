@@ -4,23 +4,24 @@
 
 from __future__ import annotations
 
-#: Longest time from CANCEL to the answer, and from there to standstill [s]: the arm brakes within
-#: a second from full speed, and discarding the points in flight takes 0.5 s at most.
+#: Longest time from CANCEL to its answer, and again from the answer to standstill [s]: the arm
+#: brakes within a second from full speed, and the program discards the points in flight within
+#: 0.5 s.
 STOP_TIMEOUT = 3.0
 #: How long the robot may take to report a TCP that was set, to confirm the outputs of a goal, or
 #: to get ready for set-points [s]: longer than the time after which a silent RTDE connection is
-#: given up, so that users hear of the connection if it is the reason.
+#: given up, so that the outcome names the connection if that is the reason.
 ARMING_TIMEOUT = 1.2
 #: How long the robot program may take to confirm that the outputs of a goal are safe [s]; after
 #: that the driver writes them itself.
 SAFE_OUTPUTS_TIMEOUT = 0.2
-#: How long the program may take to begin its first point anyway after an early CANCELED [s].
+#: How long after an early CANCELED the program may still begin its first point [s].
 EARLY_CANCELED_TIMEOUT = 1.0
 #: How long to wait for a deeper reason after the robot program has ended [s]: connections that
 #: die together are reported some cycles apart.
 CAUSE_TIMEOUT = 0.1
 
-#: The clause for a motion that did not get the RTDE inputs.
+#: The clause for a motion for which the robot did not grant its RTDE inputs.
 NO_INPUTS = (
     f'the robot did not give its RTDE inputs within {ARMING_TIMEOUT:g} s; nothing was moved'
 )

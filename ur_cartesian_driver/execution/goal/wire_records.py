@@ -3,8 +3,8 @@
 """
 The records of a goal on the wire, and the points that they belong to.
 
-A goal counts points, the wire counts records, and the robot program counts the motions that it
-has begun. These differ: a spline has several motions between two points, an output that is
+A goal numbers points, the wire numbers records, and the robot program counts the motions that it
+has begun. The numbers differ: a spline has several motions between two points, an output that is
 switched during a motion is a record but no motion, and a first point at time 0 has no record.
 """
 
@@ -26,7 +26,7 @@ class WireRecords:
         self._request_times = array('d', job.request_times.tobytes())
         #: The numbers of the records that are motions.
         self._motions = _motions(job, 0)
-        #: How many records, and motions, were forgotten.
+        #: How many records were forgotten; how many of those were motions.
         self._first = self._first_motion = 0
 
     @property
@@ -55,8 +55,8 @@ class WireRecords:
         Return the points to which the newest begun motion and the one before it lead.
 
         :param motions: how many motions have begun; None is returned for 0.
-        :param lag_motions: by how many motions the target may lag: "the one before it" is earlier
-            by as many. Its point is -1 if there is no such motion.
+        :param lag_motions: by how many motions the controller's target may lag: "the one before
+            it" is earlier by this number. Without such a motion, its point is -1.
         """
         if motions <= self._first_motion:
             return None
@@ -84,13 +84,13 @@ class WireRecords:
         return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
     def count_until(self, time: float) -> int:
-        """Return the number of records up to the first one that ends at a time [s] or later."""
+        """Return how many records come up to and including the one that runs at a time [s]."""
         return min(self.total, self._first + bisect_left(self._end_times, time) + 1)
 
     # ---- open goals ---------------------------------------------------------------------------
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Put a job's records after the first ``records_before``, and drop those it replaces."""
+        """Put a job's records after the first ``records_before``, in place of any later ones."""
         kept = records_before - self._first
         for values, new in (
             (self._waypoints, job.waypoint),

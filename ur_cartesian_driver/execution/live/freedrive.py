@@ -25,7 +25,7 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
     stream: FreedriveStream
 
     def __init__(self, monitor: GoalMonitor, settings: ServoSettings) -> None:
-        """Prepare; the arm cannot be guided yet."""
+        """Set up the stream; the arm cannot be guided yet."""
         super().__init__(monitor, FreedriveStream(settings))
 
     @property
@@ -34,9 +34,9 @@ class FreedriveFeeder(ServoFeeder, Phrasing):
         return self.stream.is_active
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
-        """Return the meaning of the servo's phase after a packet."""
+        """Return the meaning of a failure of freedrive, else of the servo's phase."""
         if isinstance(event, ServoReceived) and self.stream.failure:
-            # The program ends freedrive by itself if it is about to end.
+            # A program that is about to end first ends freedrive by itself.
             signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_active else GoalSignal.FAILURE
             return signal, self.stream.failure
         return super().interpret(event, state)
@@ -50,7 +50,7 @@ class FreedriveStream(ServoStream):
     """The registers of the buffered servo, with the mode TEACH instead of set-points."""
 
     def __init__(self, settings: ServoSettings) -> None:
-        """Wait for the first packet."""
+        """Begin before the first packet; freedrive is not requested yet."""
         super().__init__(_ZeroSetpoints(), settings)
         self._begun = False
         self._requested_at = 0.0
@@ -64,7 +64,7 @@ class FreedriveStream(ServoStream):
         self._begun = True
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
-        """Process a packet; return the inputs to write, None = nothing."""
+        """Process a packet; return the inputs to write, None = write nothing."""
         if self._begun and self._requested_at == 0.0:
             self._requested_at = now
         is_teaching = feedback.mode == ServoMode.TEACH
@@ -86,7 +86,7 @@ class FreedriveStream(ServoStream):
 
 
 class _ZeroSetpoints:
-    """Fills the joint registers, which are not read in freedrive."""
+    """Fills the joint registers, which the robot program does not read in freedrive."""
 
     done = False
 

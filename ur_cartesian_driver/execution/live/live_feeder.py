@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a session of live targets: a servo goal without a plan.
+The feeder of a session of live targets: a servo goal without a plan.
 
-The session begins, is cancelled and ends like any other goal, so all that can happen to a goal is
-handled already.
+The session begins, is cancelled and ends like any other goal, so the goal machine already handles
+all that can happen to a session.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: No limit: the arm follows the targets, and there is no plan to deviate from.
+#: The ``max_plan_deviation`` of a session: no limit, because there is no plan to deviate from.
 ANY_DEVIATION = (0.0, 0.0)
 
 
@@ -28,7 +28,7 @@ class LiveFeeder(ServoFeeder, Phrasing):
     def __init__(
         self, monitor: GoalMonitor, targets: LiveTargets, settings: ServoSettings
     ) -> None:
-        """Prepare; the arm is at rest."""
+        """Set up the stream; the arm is at rest."""
         super().__init__(monitor, ServoStream(targets, settings), targets)
         self.targets = targets
 

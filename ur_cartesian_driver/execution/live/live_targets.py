@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The targets of a live session, which may come late, out of order, or no longer.
+The targets of a live session, which may come late, come out of order, or stop coming.
 
 The newest target is the one with the newest stamp, in whatever order the targets arrive. The arm
 follows it until it is ``max_age`` old, then brakes and waits at rest for a newer target. When no
@@ -56,7 +56,7 @@ class LiveTargets(Steerable, Ageing, Reporting):
         self.freshness, self._warnings = Freshness(settings.max_age), RareWarnings()
         self._last_came = inf
         self._is_over = self._was_blocked = False
-        # The first wording of each reason.
+        # The first text of each reason for a stop; the key is the reason without its numbers.
         self._reasons: dict[str, str] = {}
 
     def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:

@@ -6,9 +6,9 @@ Generate the motion from the present pose to the newest target, one set-point pe
 A target from a sensor arrives at any time, jumps, and may be anywhere. The motion of the arm must
 not jump: the tool goes straight towards the newest target with bounded speed and acceleration,
 brakes in time to arrive at rest, and never goes where it could not stop. To ensure this, each
-cycle checks two poses: the next pose, and the pose where the tool would come to rest if it braked
-from there. If the latter is out of reach, beyond a joint limit, too near to a singularity or
-behind a workspace plane, the arm brakes instead, along a path that earlier cycles have checked.
+cycle checks the pose at which the tool would come to rest if it braked after its next step. If
+that pose is out of reach, beyond a joint limit, too near to a singularity or behind a workspace
+plane, the arm brakes now, along a path that earlier cycles have checked.
 
 Speed and acceleration are bounded as the lengths of vectors, linear and angular, so the direction
 of the target does not matter (doc/architecture.md says why ruckig, which bounds each axis, is not
@@ -46,7 +46,7 @@ from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOL
 #: A stopped arm goes on only if it can move at least this far [m], [rad]; otherwise it would
 #: jitter at a bound.
 _MIN_RESTART_MOTION = (0.002, 0.01)
-#: Coming nearer to a bound by less than this is rounding [rad], [m].
+#: Approaching a bound by less than this is taken for rounding [rad], [m].
 _ROUNDING = 1e-9
 #: How far joints stay away from the ends of their ranges [rad].
 LIMIT_MARGIN = 0.01
@@ -62,10 +62,12 @@ class LiveLimits:
     """
     Bounds on the motion of the tool and the joints, and on their positions.
 
-    :raises ValueError: a bound on speed or acceleration is not positive.
+    :raises ValueError: a bound on speed or acceleration is not positive, or one on the tool is
+        not finite.
     """
 
-    #: Bounds on the tool [m/s], [m/s^2], [rad/s], [rad/s^2].
+    #: Bounds on the tool: linear velocity [m/s] and acceleration [m/s^2]; angular velocity [rad/s]
+    #: and acceleration [rad/s^2].
     linear_velocity: float = 0.25
     linear_acceleration: float = 1.0
     angular_velocity: float = 1.0
@@ -92,7 +94,7 @@ class OnlineTrajectoryGenerator:
     """
     Follows targets, beginning at rest; its owner calls :meth:`step` once in each cycle.
 
-    :param arm: nominal or calibrated.
+    :param arm: the arm, nominal or calibrated.
     :param T_flange_tcp: the TCP that moves to the targets.
     :param q: joint positions at the start [rad].
     """
@@ -100,15 +102,15 @@ class OnlineTrajectoryGenerator:
     def __init__(self, arm: Arm, T_flange_tcp: Pose, q: Joints, limits: LiveLimits) -> None:
         """Begin at rest with no target."""
         self.limits = limits
-        #: Largest speed and acceleration, linear and angular.
+        #: The largest speed and acceleration of the tool: linear, then angular.
         self._bounds = (
             (limits.linear_velocity, limits.linear_acceleration),
             (limits.angular_velocity, limits.angular_acceleration),
         )
-        #: The newest set-point: joints [rad] and TCP pose.
+        #: The newest set-point: joint positions [rad]; TCP pose.
         self.q = q
         self.T_base_tcp = arm.forward(q) @ T_flange_tcp
-        #: Speed of the tool at the newest set-point [m/s], [rad/s], base axes.
+        #: Velocity of the tool at the newest set-point, base axes: linear [m/s]; angular [rad/s].
         self.linear: Vector3 = ZERO3
         self.angular: Vector3 = ZERO3
         #: Why the arm does not go to its target, as a clause; '' = it does.
@@ -118,11 +120,11 @@ class OnlineTrajectoryGenerator:
         #: The pose to which the tool goes; None = it brakes or rests.
         self.target: Pose | None = None
         self._bounds_check = _BoundsCheck(arm, T_flange_tcp, limits)
-        # The joint positions at which the tool would come to rest, from the last cycle.
+        # The joint positions, found in the last cycle, at which the tool would come to rest [rad].
         self._q_stop = q
         #: Length of the last cycle [s].
         self._dt = 0.0
-        # Whether the target has changed since the arm was stopped.
+        # Whether the target has changed since a bound stopped the arm.
         self._is_target_new = False
 
     def reset(self, q: Joints) -> None:
@@ -133,7 +135,7 @@ class OnlineTrajectoryGenerator:
 
     @property
     def at_rest(self) -> bool:
-        """Return whether the newest set-point does not move."""
+        """Return whether the tool has no velocity at the newest set-point."""
         return self.linear == ZERO3 and self.angular == ZERO3
 
     @property
@@ -147,7 +149,7 @@ class OnlineTrajectoryGenerator:
         )
 
     def set_target(self, T_base_tcp: Pose) -> None:
-        """Go to another target from now on; its quaternion has length 1."""
+        """Go to another target from now on; its quaternion must have length 1."""
         self._is_target_new |= T_base_tcp != self.target
         self.target = T_base_tcp
 
@@ -160,9 +162,10 @@ class OnlineTrajectoryGenerator:
         """
         Return the next set-point [rad].
 
-        :param dt: nominal time to it [s].
+        :param dt: nominal time from the last set-point to this one [s].
         """
-        # The last speed was chosen for the last cycle; in a shorter one it could not be braked.
+        # The last speed was chosen so that the arm can brake in cycles of the last length; in
+        # shorter cycles it could not.
         change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_target_new and self.at_rest:
             self._is_target_new = False
@@ -202,7 +205,7 @@ class OnlineTrajectoryGenerator:
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
         """Take a step, shortened if the joints are not fast enough."""
         pose, q = self._next_pose(linear, angular, dt)
-        if q is None:  # the pose was checked before: happens by rounding only
+        if q is None:  # only by rounding, because earlier cycles have checked the way
             reason = explain_unreachable(self._arm, pose @ self._T_tcp_flange)
             self.blocked = self.blocked or reason or 'the joint positions jump'
             self.linear = self.angular = ZERO3

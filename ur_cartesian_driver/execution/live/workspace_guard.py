@@ -4,8 +4,8 @@
 Keep an arm that follows live targets away from workspace planes and from itself.
 
 A check takes longer than a control cycle, but is needed only near a bound: no part of the arm
-moves farther than the sum of the joints' turns times its largest distance from an axis. So each
-check also gives how far the joints may turn before the next check.
+moves farther than the sum of the joints' turns times the largest distance of any part from an
+axis. So each check also gives how far the joints may turn before the next check.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.geometry.workspace import Plane
 
 #: More than the thickness of any link [m].
 _THICKNESS = 0.3
-#: Coming nearer by less than this is rounding [m].
+#: Approaching a bound by less than this is taken for rounding [m].
 _ROUNDING = 1e-9
 
 
@@ -44,10 +44,10 @@ class LiveWorkspace:
 
 
 class WorkspaceGuard:
-    """Checks one arm with one tool."""
+    """Checks the bounds of the workspace for one arm with one tool."""
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, workspace: LiveWorkspace) -> None:
-        """Prepare bodies and planes."""
+        """Compute the collision bodies and the planes."""
         self._arm, self._tcp, self._workspace = arm, T_flange_tcp, workspace
         self._bodies = bodies = CollisionBodies(arm, T_flange_tcp, workspace.tool_radius)
         planes = workspace.planes
@@ -68,7 +68,7 @@ class WorkspaceGuard:
             + workspace.tool_radius
             + _THICKNESS
         )
-        #: Joint positions of the last check [rad], and how much nearer the bounds could be [m].
+        #: The joint positions of the last check [rad], and the smallest slack found there [m].
         self._last_check: tuple[Joints, float] = ZERO6, 0.0
 
     def violation(self, q: Joints, q_now: Joints) -> str:

@@ -22,9 +22,9 @@ class JointToleranceCheck:
     """Compares packets with the tolerances of a goal; without limits it costs nothing."""
 
     def __init__(self, tolerances: JointTolerances | None) -> None:
-        """Prepare the tolerances of a joint goal; None = there are none."""
+        """Keep the tolerances of a joint goal; None = it has no tolerances."""
         self._tolerances = tolerances or JointTolerances(end=ZERO6)
-        #: Whether there is any limit on the path, and at the end.
+        #: Whether there is any limit on the path; whether there is any at the end.
         self.has_path = bool(self._tolerances.path)
         self._has_goal = bool(self._tolerances.goal)
 
@@ -42,7 +42,7 @@ class JointToleranceCheck:
 
 
 def _violation(bounds: JointErrorBounds, q: Vector6, qd: Vector6, state: RobotState) -> str | None:
-    """Return a clause about the joint with the largest ratio of error to limit, if above 1."""
+    """Return a clause about the largest ratio of error to limit; None = no ratio is above 1."""
     return excess_clause(
         (quantity, f'of {joint}', unit, error, limit)
         for quantity, unit, limits, errors in (

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find where the controller is on the planned path, and where the tool should be.
+Find the controller's position on the planned path, and the desired pose of the tool.
 
-The reference path is compared as a geometric line, so a robot that was slowed down, or that has
+Poses are compared with the path as a geometric line, so a robot that was slowed down, or that has
 its own speed profile, is not off the path.
 
 Progress is measured by the controller's target, which has no noise and cannot be pushed: if the
@@ -12,9 +12,9 @@ the pose on the path nearest to the tool, at most a plausible lag ahead of or be
 The controller goes on while somebody pushes the arm along its path, so a push beyond the lag is an
 error too.
 
-All of this runs between a packet and a CANCEL, and most packets concern one or two edges of the
-path. Few edges are computed in plain floats: calling numpy costs more than computing with seven
-numbers.
+All of this runs between a packet and a CANCEL, so it must be fast. Most packets concern only one
+or two edges of the path. A few edges are computed in plain floats: calling numpy costs more than
+computing with seven numbers.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ from ur_cartesian_driver.motion.plan.plan import ReferencePath
 METRES_PER_RADIAN = 0.1
 #: How much farther the target may have come than its speed explains [m].
 SEARCH_MARGIN = 0.005
-#: The same in planned time [s]: where set-points turn back, a lagging servo turns back early.
+#: The search reaches at least this far ahead in planned time [s]: where set-points turn back, a
+#: lagging servo turns back early.
 SEARCH_TIME = 0.1
-#: A position farther on than the speed explains is chosen only if it is nearer by this [m]:
-#: where a path turns back, both branches are equally near.
+#: A position farther on than the speed explains is chosen only if it is nearer to the target by
+#: this distance [m]: where a path turns back, both branches are equally near.
 CLEARLY_NEARER = 0.0005
 #: How far the tool may be ahead of or behind its target: this time at the target's speed [s], plus
 #: this distance [m]. Position controllers of arms lag by some cycles.
@@ -54,7 +55,7 @@ SAME_PLACE = 2e-5
 AT_END = 0.999
 #: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0
-#: At most this many edges are searched one by one.
+#: Up to this many edges are searched one by one; more edges are searched with arrays.
 MAX_SCALAR_EDGES = 8
 #: How many edges are cached as plain floats.
 MAX_CACHED_EDGES = 256
@@ -71,7 +72,7 @@ class PathPosition(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A row of the path and the next one, as poses and in the tracker's coordinates."""
+    """The edge from a row of the path to the next, as poses and in the tracker's coordinates."""
 
     start: Pose
     end: Pose
@@ -81,7 +82,7 @@ class Edge(NamedTuple):
     length_squared: float
 
     def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
-        """Return the nearest fraction of the edge, and the distance there."""
+        """Return the fraction of the edge that is nearest to a point, and its distance."""
         # Seven numbers written out take half the time of loops over them.
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
@@ -103,12 +104,12 @@ class PathTracker:
     so a straight line in these coordinates is a straight line of the tool with a steady turn. The
     search reaches as far as the target can have come since the last packet, and farther only if
     the path is clearly nearer there. If the robot program reports to which point it is moving, the
-    search ends there. So a path that crosses itself or turns back is followed in the right order.
+    search ends at that point. So a path that crosses itself or turns back is followed in order.
     """
 
     def __init__(self, path: ReferencePath) -> None:
         """
-        Prepare a path.
+        Begin at the start of a path.
 
         :param path: the plan's reference; it is not changed.
         """
@@ -118,14 +119,14 @@ class PathTracker:
         self.residual = inf
 
     def _load(self, path: ReferencePath) -> None:
-        """Prepare the arrays that are searched."""
+        """Compute the arrays for the search."""
         self.path = path
         self._rows = np.array(path.poses)
         self._rows[:, 3:] *= (
             2.0 * METRES_PER_RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
         )
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
-        # Searching an ``array`` is faster: it yields no numpy scalars.
+        # An ``array`` is searched faster than a numpy array: its items are plain numbers.
         self._arc = array('d', np.concatenate(([0.0], np.cumsum(steps))).tobytes())
         self._time = array('d', path.time.astype(np.float64).tobytes())
         self._points = array('i', path.point.tobytes())
@@ -169,8 +170,8 @@ class PathTracker:
     def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
         """Return the rows between which the target may be."""
         if running is not None:
-            # The program runs the motion begun last, or is in the blend that leads to it: all
-            # before that was passed, perhaps between two packets.
+            # The program runs the motion begun last, or is in the blend that leads to it: the path
+            # before that blend was passed, perhaps between two packets.
             passed = bisect_left(self._points, running[1]) - 1
             if passed > self.path_position.row:
                 self.path_position = PathPosition(passed, 0.0)
@@ -188,9 +189,9 @@ class PathTracker:
         self, target: Pose, first: int, end: int, limit: float = inf
     ) -> tuple[PathPosition, float]:
         """
-        Return the nearest position on some edges, and its distance.
+        Return the position nearest to the target between two rows, and its distance.
 
-        :param limit: the length of the path at which the search ends [m].
+        :param limit: the distance along the path from its start at which the search ends [m].
         """
         nearest = self.path_position, inf
         while end > first:
@@ -216,7 +217,7 @@ class PathTracker:
         return nearest
 
     def _next_wait(self, first: int, end: int) -> int:
-        """Return the first row at which the plan waits, or the end of the rows."""
+        """Return the first row from ``first`` on at which the plan waits; ``end`` if none does."""
         k = bisect_left(self._waits, first)
         return min(self._waits[k], end) if k < len(self._waits) else end
 
@@ -233,7 +234,7 @@ class PathTracker:
         self.path_position = _position(row, fraction)
 
     def finish(self, time: float = inf) -> None:
-        """Move on to the end of the path, or to its position at a time [s]."""
+        """Move on to the end of the path, or to the path's position at a planned time [s]."""
         row = max(bisect_right(self._time, time + SAME_TIME) - 1, 0)
         self.path_position = PathPosition(row, 0.0)
 
@@ -245,7 +246,7 @@ class PathTracker:
 
     def append(self, path: ReferencePath, since: float) -> None:
         """
-        Append a path that replaces the old one after a time [s]; forget the rows far behind.
+        Append a path that replaces the old one after a time [s]; forget rows far behind the arm.
 
         If the arm is already past that time, both paths are the same up to the arm.
         """
@@ -274,7 +275,7 @@ class PathTracker:
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """
-        Return the planned pose that is nearest to the tool, around the target's position.
+        Return the planned pose nearest to the tool, of those around the target's position.
 
         :param actual: pose of the TCP in base.
         :param twist: twist of the target, whose speed bounds the lag.
@@ -314,12 +315,12 @@ class PathTracker:
 
     def is_within(self, distance: float, angle: float) -> bool:
         """
-        Return whether the target is surely within a distance [m] and angle [rad] of the path.
+        Return whether the target is certainly within a distance [m] and angle [rad] of the path.
 
         A radian weighs :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
         used, because the straight line between two quaternions is not quite the turn from one to
-        the other; if they are so far apart that this matters, the line is farther than that from
-        every unit quaternion.
+        the other; if the two are so far apart that this matters, the line is far from every unit
+        quaternion, and the residual is large.
         """
         return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 
@@ -426,13 +427,13 @@ class PathTracker:
     def _nearest_of_many(
         self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
     ) -> tuple[PathPosition, float]:
-        """Return the same as :meth:`_nearest`, with arrays, which are faster for many edges."""
+        """Do the same as :meth:`_nearest` by arrays, which are faster for many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1 : end + 1] - start
         away = np.array(point) - start
         length_squared = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
-        with np.errstate(over='ignore'):  # for absurd reported positions an end is the nearest
+        with np.errstate(over='ignore'):  # absurd reported positions: an edge's end is nearest
             fraction = np.divide(
                 along, length_squared, out=np.ones_like(along), where=length_squared > 0.0
             )
@@ -457,6 +458,6 @@ def _continuous_signs(quaternions: Floats) -> Floats:
 
 
 def tracker_speed(twist: Vector6) -> float:
-    """Return how fast a twist moves in the coordinates of :class:`PathTracker` [m/s]."""
+    """Return the speed of a twist in the coordinates of :class:`PathTracker` [m/s]."""
     x, y, z, rx, ry, rz = twist
     return hypot(x, y, z) + METRES_PER_RADIAN * hypot(rx, ry, rz)

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The checks of a motion while the tool presses.
+The checks of a motion during and after a press.
 
 Along compliant axes the arm gives way to contact, so deviations along them are left out of the
 other checks; a separate bound limits them. Whether a controller adds this yield to its target is
 not published, so target and actual pose are treated alike. After a press the arm goes straight
-from its present place to the next point; until it arrives, the same axes are left out.
+from its present place to the next point; until it is there, these deviations are left out too.
 """
 
 from __future__ import annotations
@@ -25,24 +25,26 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: How much the tracker's time may differ from that of a point at which the arm stands still [s].
+#: How much the tracker's time may differ from the time of a point where the arm stands still [s].
 POINT_TIME_TOLERANCE = 0.01
 _YIELDS = (('m', 'along', 'max_yield'), ('rad', 'about', 'max_yield_angle'))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressWindow:
-    """The part of a path on which the tool may give way, and along which axes."""
+    """A part of a path on which the tool may give way along some axes."""
 
-    #: Planned times at which the press begins and ends, and the tool is back on its path [s].
+    #: Planned time at which the press begins [s].
     begin: float
+    #: Planned time at which the press ends [s].
     end: float
+    #: Planned time at which the tool is back on its path after the press [s].
     release: float
-    #: 1.0 for each compliant axis.
+    #: 1.0 for each compliant axis, 0.0 for each other axis.
     compliant: Vector6
     #: Orientation of the press axes in base; None = the axes of the tool.
     q_base_task: Quaternion | None
-    #: How far the tool may give way [m], [rad].
+    #: The largest shift [m] and turn [rad] by which the tool may give way.
     max_yields: tuple[float, float]
     #: Whether the tool retracts along its path to the place of contact, where the goal ends.
     ends_at_contact: bool = False
@@ -69,7 +71,7 @@ class PressWindow:
         """
         Return a pose as it would be if the tool had not given way.
 
-        :param share: the share of the yield that is kept.
+        :param share: the fraction of the yield that is kept.
         """
         q_base_task = self._axes(planned)
         shift, turn = self._errors(planned, pose)
@@ -81,12 +83,12 @@ class PressWindow:
 
     def compliant_share(self, planned: Pose, direction: Vector3) -> float:
         """
-        Return the share of a deviation along compliant axes to treat as progress, 0 to 1.
+        Return the fraction of a deviation along compliant axes to treat as progress, 0 to 1.
 
-        Where the path leads along these axes, progress cannot be distinguished from yield, so all
-        of the deviation is treated as progress.
+        On a path along these axes, progress cannot be distinguished from yield, so the whole
+        deviation is treated as progress.
 
-        :param direction: direction of the path in base, a unit vector; zeros if it only turns.
+        :param direction: direction of the path in base, a unit vector; zeros for a pure turn.
         """
         x, y, z = rotate(conjugate(self._axes(planned)), direction)
         a, b, c = self.compliant[:3]
@@ -94,7 +96,7 @@ class PressWindow:
         return along * along
 
     def stiff_state(self, planned: Pose, state: RobotState) -> RobotState:
-        """Return a packet whose actual motion equals its target along compliant axes."""
+        """Return a packet in which the actual motion has no error along compliant axes."""
         q_base_task = self._axes(planned)
         target, actual = state.target_tcp_acceleration, state.actual_tcp_acceleration
         return replace(
@@ -112,7 +114,7 @@ class PressWindow:
         return planned.quaternion if self.q_base_task is None else self.q_base_task
 
     def _errors(self, planned: Pose, pose: Pose) -> tuple[Vector3, Vector3]:
-        """Return the shift and turn of a pose from the planned one, along and about the axes."""
+        """Return the shift and turn from the planned pose to a pose, in the press axes."""
         to_task = conjugate(self._axes(planned))
         turn = multiply(pose.quaternion, conjugate(planned.quaternion))
         return (
@@ -121,7 +123,7 @@ class PressWindow:
         )
 
     def _stiff(self, vector: Vector3, first: int, share: float = 0.0) -> Vector3:
-        """Return an error whose parts along compliant axes are reduced to a share of them."""
+        """Return an error with its components on compliant axes scaled by ``share``."""
         x, y, z = vector
         a, b, c = (1.0 - free * (1.0 - share) for free in self.compliant[first : first + 3])
         return (a * x, b * y, c * z)

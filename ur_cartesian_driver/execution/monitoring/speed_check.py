@@ -19,11 +19,11 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 
-#: The peak of a motion from rest to rest is at most twice its average.
+#: The peak speed of a motion from rest to rest is at most twice its average speed.
 PEAK_TO_MEAN = 2.0
 #: Speeds that are always harmless [m/s], [rad/s].
 MIN_SPEED_LIMITS = (0.02, 0.1)
-#: Longest duration as a multiple of the planned one, and the time to begin, which is added [s].
+#: The longest duration is this multiple of the planned one, plus this time to begin [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
 #: The remedy for a robot program that reads the points in another wire dialect.
 REMEDY = 'set wire_dialect to the version of that program'
@@ -51,7 +51,7 @@ class SpeedCheck:
         Return the bound on speed or duration that is exceeded, as a clause, or None.
 
         :param twist: twist of the controller's own target.
-        :param elapsed: time since the start in which the controller's clock ran [s].
+        :param elapsed: time since the start, as the controller's clock ran [s].
         :param planned: planned time of the present position on the path [s].
         """
         speeds = hypot(*twist[:3]), hypot(*twist[3:])

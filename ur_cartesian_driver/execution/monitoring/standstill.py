@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Check that the controller's target does not stand still for long with nothing holding it."""
+"""Check that the controller's target does not stand still for long while nothing holds it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeStat
 STANDSTILL_TIMEOUT = 2.0
 #: How much longer than planned the target may stand still when the plan itself waits [s].
 STANDSTILL_MARGIN = 1.0
-#: Path rows whose numbers differ by less are the same pose, at which the plan waits [m], [1].
+#: Two path rows are the same pose, at which the plan waits, if no number differs by this [m], [1].
 SAME_POSE = 1e-9
 
 
@@ -24,13 +24,14 @@ class Standstill:
         """Find the longest planned standstill of the target."""
         #: Whether the target has stood still for longer than the plan explains.
         self.is_long = False
-        #: How long the target has stood still [s]; the same in scaled time, and its bound.
+        #: How long the target has stood still: in real time; in scaled time; the longest scaled
+        #: time that the plan explains [s].
         self._time = self._scaled_time = self._timeout = 0.0
         self.extend(path, output_delay)
 
     def extend(self, path: ReferencePath, output_delay: float) -> None:
         """
-        Take in an appended path.
+        Allow for the planned waits of a path, which may be an appended one.
 
         :param output_delay: how long after the end of the motion the last output is switched [s].
         """

@@ -45,7 +45,7 @@ class ToleranceQuantity:
     name: str
     unit: str
     limits: Callable[[Tolerance], Vector3]
-    #: The error, from the planned pose, the robot's packet and the rotation base to goal frame.
+    #: Returns the error, given planned pose, robot packet and rotation from base to goal frame.
     error: Callable[[Pose, RobotState, Quaternion], Vector3]
 
 
@@ -56,10 +56,10 @@ class ToleranceCheck:
         self, tolerance: Tolerance, T_base_frame: Pose, T_tcp_controlled: Pose = IDENTITY
     ) -> None:
         """
-        Prepare a tolerance.
+        Select the quantities that have a limit.
 
-        :param tolerance: zero and negative mean no limit; defaults were filled in before.
-        :param T_base_frame: frame of the goal; all but the orientation is compared along its axes.
+        :param tolerance: the limits; 0 or negative = no limit. Defaults were filled in before.
+        :param T_base_frame: frame of the goal; all errors except orientation are in its axes.
         :param T_tcp_controlled: the frame that is compared, relative to the TCP.
         """
         self._q_frame_base = conjugate(T_base_frame.quaternion)
@@ -76,9 +76,10 @@ class ToleranceCheck:
 
     def violation(self, desired: Pose, state: RobotState) -> str | None:
         """
-        Return a clause that names an axis outside its limit, value and limit; or None.
+        Return a clause with an axis outside its limit, its error and its limit; or None.
 
-        Of several axes the one with the largest ratio of error to limit is named. NaN is outside.
+        Of several axes the one with the largest ratio of error to limit is named. A NaN error is
+        outside every limit.
 
         :param desired: planned pose of the TCP in base.
         """
@@ -98,7 +99,7 @@ def excess_clause(errors: Iterable[tuple[str, str, str, float, float]]) -> str |
     """
     Return a clause about the error with the largest ratio to its limit, if that exceeds 1.
 
-    A NaN is treated as the largest error; of several the first is named.
+    A NaN is treated as the largest error; of several NaN the first is named.
 
     :param errors: quantity, axis or joint, unit, error and limit; a limit <= 0 = no limit.
     """
@@ -128,7 +129,11 @@ def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> 
 
 
 def _rate(name: str, unit: str, field: str, first: int) -> ToleranceQuantity:
-    """Return the quantity of half a twist or acceleration; NaN if the robot reports none."""
+    """
+    Return the quantity for the linear or angular half of a twist or acceleration.
+
+    Its error is NaN if the robot reports no such value.
+    """
 
     def limits(tolerance: Tolerance) -> Vector3:
         values: Vector6 = getattr(tolerance, field)

@@ -14,17 +14,17 @@ WARNING_PERIOD = 2.0
 
 class Freshness:
     """
-    Selects the values to use, of values that come at any time and in any order.
+    Selects which values to use when they come at any time and in any order.
 
     All times are of one steady clock.
 
-    :param max_age: how old a value may be to be used [s].
+    :param max_age: the largest age at which a value is used [s].
     """
 
     def __init__(self, max_age: float) -> None:
         """Begin with no value."""
         self.max_age = max_age
-        #: How many values were accepted, and how many were dropped: out of order or too old.
+        #: How many values were accepted; how many were dropped, out of order or too old.
         self.accepted = self.dropped = 0
         self._stamp = -inf
 
@@ -43,7 +43,7 @@ class Freshness:
         return True
 
     def is_stale(self, now: float) -> bool:
-        """Return whether the newest value is too old, or there is none."""
+        """Return whether the newest value is too old, or no value has come."""
         return now - self._stamp > self.max_age
 
 

@@ -4,8 +4,9 @@
 The offsets that a client requests for a path: the newest one, its age, and a report of all.
 
 An offset may come at any time, jump, be too old or too large. The newest one is used, cut to the
-limits of the goal; where the path is not open to offsets it is zero, and when it is stale the goal
-says whether it holds or fades. Other classes move the tool to the offset.
+limits of the goal. Where the path is not open to offsets, zero is used instead. When the newest
+offset is stale, the goal decides whether the tool stays at that offset or goes back to its path.
+Other classes move the tool to the offset.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ class OffsetRequests(Displaceable, Ageing, Reporting):
     def target(self, time: float) -> Vector3:
         """Return the offset to which the tool should move, at a time of the motion [s]."""
         if not self._band.opens(time):
-            if self._is_stale:  # after a corner it would mean another direction
+            if self._is_stale:  # after a corner the same offset would have another direction
                 self._newest = ZERO3
             return ZERO3
         return ZERO3 if self._is_stale and self._fades else self._newest

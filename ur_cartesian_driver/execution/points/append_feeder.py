@@ -1,18 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a goal to which points are appended while it runs (keep_open).
+The feeder of a goal to which points are appended while it runs (keep_open).
 
-Its trajectory is a stream, which came with URCL 2.14: the robot program reads points until it is
-sent their number. Three rules hold whatever is appended:
+The trajectory of the goal is a stream (possible since URCL 2.14): the robot program reads points
+until it is told how many there are. Three rules hold whatever is appended:
 
 * The program never waits for a point while the arm moves: it would fail, or stop the arm abruptly.
   So every append is planned with an *ending* that brings the arm to rest (the last motion, without
-  a blend; after a spline a braking piece), and the ending is held back. If nothing else has come
-  ``margin`` before the program would ask for the next point, the ending is sent, and the stream is
-  closed with the number of its records.
-* Records that were sent are final, so few are sent ahead: only ``horizon`` seconds of motion. A
-  program that is cancelled has to read all of them.
+  a blend; after a spline a braking piece), and the ending is held back. If no more points have
+  come by ``margin`` seconds before the program would ask for the next one, the ending is sent, and
+  the stream is closed with the number of its records.
+* Records that were sent are final, and a program that is cancelled has to read all of them. So
+  only ``horizon`` seconds of motion are sent ahead.
 * Memory does not grow: records that were sent, and the path behind the arm, are forgotten.
 
 Only goals with keep_open have the states RUNNING_OUT and AWAITING_POINTS
@@ -44,7 +44,7 @@ class AppendFeeder(PointFeeder, Appendable):
         self, monitor: GoalMonitor, *, horizon: float, margin: float, timeout: float
     ) -> None:
         """
-        Prepare the records that are known so far.
+        Begin with the records that are known so far; nothing is sent yet.
 
         :param horizon: how far ahead of the arm motion is sent to the robot program [s].
         :param margin: the stream is closed this long before the robot program would ask for a
@@ -55,16 +55,17 @@ class AppendFeeder(PointFeeder, Appendable):
         self._horizon, self._margin, self.append_timeout = horizon, margin, timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended,)
-        #: How many records were sent before this stream, and whether its length was sent.
+        #: How many records of the goal were sent before the present stream.
         self._stream_first_record = 0
+        #: Whether the length of the present stream was sent.
         self._is_stream_end_sent = False
-        #: When the stream was begun, by the robot's clock [s].
+        #: When the present stream was begun, by the robot's clock [s].
         self._stream_start_time = 0.0
 
     # ---- points that come ---------------------------------------------------------------------
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Accept all points or none; send the records that are due."""
+        """Accept all points or none; return the answer, and the records that are due."""
         sent = self._window.sent
         answer = self._appended.append(
             append_job, state, sent=sent, sent_until=self.monitor.records.end_time(sent)
@@ -74,7 +75,7 @@ class AppendFeeder(PointFeeder, Appendable):
         return [answer, *self._release()]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal for running out of points, or for points that came at rest."""
+        """Return the signal about points: they run out, come while the arm rests, or end."""
         return self._appended.supply(
             state,
             runs_out=self._is_running_out(),
@@ -114,7 +115,7 @@ class AppendFeeder(PointFeeder, Appendable):
         return []
 
     def _release(self) -> list[GoalCommand]:
-        """Send the records up to the horizon, without the ending; close a complete stream."""
+        """Send the records up to the horizon, except the ending; close a complete stream."""
         ahead = self.monitor.records.count_until(self.monitor.time() + self._horizon)
         begun, limit = self.monitor.records_begun(), min(ahead, self._appended.committed)
         commands = self._window.release(begun, limit)

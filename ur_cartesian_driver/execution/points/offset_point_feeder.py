@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a goal whose points the robot runs while offsets displace its path.
+The feeder of a goal whose points the robot runs while offsets displace its path.
 
-In addition to the points, each packet of the robot is answered with the offset to reach. The robot
-program moves towards it within the bounds of the goal, cycle by cycle, so neither the network nor
-this computer can make the offset jump; the controller adds it to its motion, and reports it. The
-time of the motion follows the progress of the arm on its path.
+In addition to sending points, the feeder answers each packet about the offset with the offset to
+reach. The robot program moves towards this offset within the bounds of the goal, cycle by cycle,
+so neither the network nor this computer can make the offset jump; the controller adds the present
+offset to its motion, and reports it. The offset to reach, and its axes, are taken at the planned
+time of the arm's position on the path.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from ur_cartesian_driver.motion.plan.offset_band import (
 )
 from ur_cartesian_driver.motion.state.robot_state import RobotState
 
-#: How far our first sequence number is beyond the last one that the robot has read: more than the
-#: numbers that a lost client may have written and the robot has not read.
+#: By how much our first sequence number exceeds the last one that the robot has read: more than
+#: the count of numbers that a lost client may have written and the robot has not read.
 SEQUENCE_GAP = 1000
 #: If the robot has read a number beyond this, ours begin at 0, long before the register overflows.
 MAX_SEQUENCE = 2**30
@@ -47,11 +48,11 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
     _takes_offsets = True
 
     def __init__(self, monitor: GoalMonitor, band: OffsetBand) -> None:
-        """Prepare; the inputs are not claimed yet."""
+        """Begin before the RTDE inputs are claimed."""
         super().__init__(monitor)
         self._band, self._requests = band, OffsetRequests(band)
         self.parts = (self._requests,)
-        #: Our sequence numbers: the first, and the last; None = nothing was written.
+        #: Our first sequence number (None = no packet came yet); our last sequence number.
         self._first: int | None = None
         self._sequence = 0
         self._moves = self._is_closed = False
@@ -62,7 +63,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         return [OpenOffsets()]
 
     def explain_not_ready(self, packet: RobotState | None) -> str:
-        """Return a clause if the inputs are not there yet, else ''."""
+        """Return a clause if the robot has not granted the RTDE inputs yet, else ''."""
         return NO_INPUTS if self._first is None else ''
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
@@ -75,7 +76,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         return commands
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Answer a packet about the offset with a write, a packet of the state with points."""
+        """Answer a packet about the offset with a write, and a state packet with points."""
         if not isinstance(event, OffsetReceived):
             return super().feed(event, now)
         if self._is_closed:
@@ -88,7 +89,7 @@ class OffsetPointFeeder(PointFeeder, Prepared, Displaced):
         if self._first is None:
             self._sequence = last + SEQUENCE_GAP if 0 <= last < MAX_SEQUENCE else 0
             self._first = self._sequence + 1
-        elif self._first <= last <= self._sequence:  # else the number is of an earlier goal
+        elif self._first <= last <= self._sequence:  # else the number is from an earlier goal
             self._applied = AppliedOffset(feedback.shift, feedback.offset)
             self._requests.note_applied(feedback.offset)
 

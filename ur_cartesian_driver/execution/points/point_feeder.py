@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Feeds a goal whose points are all known: START with their number, then the points."""
+"""The feeder of a goal whose points are all known: START with their number, then the points."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 class PointFeeder(Feeder):
     """Sends records as fast as the send window permits."""
 
-    #: Whether the robot program displaces the path by offsets that arrive through registers.
+    #: Whether offsets that the robot program gets through registers displace the path.
     _takes_offsets = False
 
     def __init__(self, monitor: GoalMonitor) -> None:
-        """Prepare the records of the goal."""
+        """Begin with no record sent."""
         super().__init__(monitor)
         self._window = SendWindow()
 
@@ -40,7 +40,7 @@ class PointFeeder(Feeder):
         return []
 
     def feed(self, event: Event, now: float) -> list[GoalCommand]:
-        """Return the records that the send window permits."""
+        """Return the command that sends the records that the send window permits."""
         return self._release()
 
     def _release(self) -> list[GoalCommand]:

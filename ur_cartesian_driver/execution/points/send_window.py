@@ -14,9 +14,9 @@ class SendWindow:
     """
     Releases records so that at most ``size`` are sent and not yet begun.
 
-    The robot program reads and discards everything that was sent when a goal is cancelled
-    (10 points in each step of the controller), so the window bounds the time of a cancel: 500
-    points cost 0.1 s. They are also far more than the robot can run in its 0.5 s read timeout.
+    When a goal is cancelled, the robot program reads and discards everything that was sent (10
+    points in each step of the controller), so the window bounds the time of a cancel: 500 points
+    cost 0.1 s. So many points are also far more than the robot can run in its 0.5 s read timeout.
     """
 
     size: int = 500
@@ -29,7 +29,7 @@ class SendWindow:
         Return the command that sends the records that fit into the window, or none.
 
         :param begun: how many records the robot has begun.
-        :param limit: how many records may be sent in total, no matter how many have begun.
+        :param limit: how many records may be sent in total, even if more fit into the window.
         """
         self.begun = max(self.begun, begun)
         return self.send(min(limit, self.begun + self.size))

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a goal with keep_open through the buffered servo.
+The feeder of a goal with keep_open through the buffered servo.
 
 The driver makes the set-points, and only set-points already made are final: the rest of the curve,
 even its ending, can be replaced at once. A goal whose set-points reach the ending comes to rest
@@ -33,11 +33,11 @@ from ur_cartesian_driver.motion.state.robot_state import RobotState
 
 
 class AppendServoFeeder(ServoFeeder, Appendable):
-    """Streams a curve to which points are appended, and whose tail is replaced."""
+    """Streams a curve to which points can be appended, and whose tail can be replaced."""
 
     def __init__(self, monitor: GoalMonitor, settings: ServoSettings, timeout: float) -> None:
         """
-        Prepare the first points.
+        Begin with the spline of the first points.
 
         :param timeout: how long the goal waits at rest for more points [s]; 0 = without limit.
         """
@@ -47,13 +47,13 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self.append_timeout = timeout
         self._appended = AppendedRecords(monitor)
         self.parts = (self._appended, *self.parts)
-        #: The motion that begins where the arm comes to rest, and the planned time of that rest
-        #: [s]; inf = the ending can still be replaced.
+        #: The motion that begins where the arm comes to rest; None = no points came for it.
         self._next_spline: JointSpline | None = None
+        #: The planned time at which the arm comes to rest [s]; inf = the ending can be replaced.
         self._stop_time = inf
 
     def append(self, append_job: AppendJob, state: GoalState) -> list[GoalCommand]:
-        """Accept all points or none."""
+        """Accept all points or none; return the answer."""
         self._notice_ending()
         answer = self._appended.append(append_job, state, sent_until=self._source.time)
         job = append_job.job
@@ -69,7 +69,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         return [answer]
 
     def supply(self, state: GoalState) -> Meaning:
-        """Return the signal for running out of points, or for points that came at rest."""
+        """Return the signal about points: they run out, come while the arm rests, or end."""
         self._notice_ending()
         return self._appended.supply(
             state, runs_out=self._stop_time < inf, has_more=self._next_spline is not None
@@ -90,7 +90,7 @@ class AppendServoFeeder(ServoFeeder, Appendable):
         self._spline = self._source.spline
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Rest after the ending, and go on with the points that came meanwhile."""
+        """Note the rest after the ending, or go on with the points that came meanwhile."""
         if state is GoalState.AWAITING_POINTS:
             self._appended.rest(self._stop_time)
         elif state is GoalState.MOVING and self._next_spline is not None:

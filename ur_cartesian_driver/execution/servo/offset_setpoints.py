@@ -61,12 +61,12 @@ class BoundedOffset:
     def __init__(self, band: OffsetBand) -> None:
         """Begin on the path, at rest."""
         self._band = band
-        #: The offset along, across and normal to the path [m], and its speed [m/s].
+        #: The offset along, across and normal to the path [m]; its speed on these axes [m/s].
         self.value: Vector3 = ZERO3
         self.speed: Vector3 = ZERO3
 
     def step(self, target: Vector3, dt: float = STEP) -> None:
-        """Move towards a target within the limits, for one step of time [s]."""
+        """Move towards a target within the limits, for a time ``dt`` [s]."""
         if target == self.value and self.speed == ZERO3:
             return
         a, b, c = (
@@ -103,13 +103,13 @@ class OffsetSetpoints(Displaced):
         self._setpoints, self._band, self._arm = setpoints, band, arm
         self.requests = OffsetRequests(band)
         self._offset = BoundedOffset(band)
-        #: Time of the motion, and of the offset, which moves in whole steps [s].
+        #: Time of the motion [s]; time up to which the offset has moved, in whole steps [s].
         self._time = self._used = 0.0
         self._joints = setpoints.next(0.0)
         self._before = ZERO3
-        #: How far the joints of the newest set-point are from the path [rad].
+        #: How far the joints of the newest set-point are from those on the path [rad].
         self._change: Vector6 = ZERO6
-        # The newest set-points: joints, shift in the base, offset in the frame of the path.
+        # The newest set-points: joints, shift in base axes, offset in the frame of the path.
         self._history: Floats = np.zeros((HISTORY, 12))
         self._count = self._seen = 0
 
@@ -121,7 +121,7 @@ class OffsetSetpoints(Displaced):
         return self._setpoints.done
 
     def next(self, dt: float) -> Joints:
-        """Return the joint positions [rad] that follow after a time of the motion [s]."""
+        """Return the joint positions [rad] after a further time ``dt`` of the motion [s]."""
         on_path = self._setpoints.next(dt)
         if dt <= 0.0:
             return self._joints if self._count else on_path
@@ -131,7 +131,7 @@ class OffsetSetpoints(Displaced):
             self._before = self._offset.value
             self._offset.step(self.requests.target(self._time))
         value = self._offset.value
-        if self._used > self._time + _ROUNDING:  # the motion is between two steps, as when held
+        if self._used > self._time + _ROUNDING:  # the motion's time is between two whole steps
             back = (self._used - self._time) / STEP
             value = add(value, scale(subtract(self._before, value), back))
         self._joints = self._displaced(on_path, value)
@@ -158,7 +158,7 @@ class OffsetSetpoints(Displaced):
         """
         Return the offset that the controller's target has now.
 
-        It is the offset of the set-point nearest to the target, never of one passed before.
+        This is the offset of the set-point nearest to the target, of those not passed before.
         """
         if not self._count:
             return NO_OFFSET

@@ -3,18 +3,18 @@
 """
 The clock of streamed set-points, which runs as fast as the robot carries them out.
 
-It uses both feedbacks of the manufacturer's guide: the effective speed shows at once how fast
-the robot's time runs; L, the motion time in flight, accumulates the remaining error::
+The clock uses both feedback values of the manufacturer's guide: the effective speed shows at once
+how fast the robot's time runs; L, the motion time in flight, accumulates the remaining error::
 
     rate = effective_speed + (target - L) / T        0 <= rate <= MAX_RATE, slew-limited
 
 L is the motion time in the robot's buffer, which the robot reports, plus the time of set-points
-that it had not read when it made the report. So the delay of the wire does not look like a
-missing lag, and the loop (an integrator with a proportional gain) does not oscillate.
+that the robot had not read when it made the report. So the delay of the wire does not make L look
+too small, and the loop (an integrator with a proportional gain) does not oscillate.
 
-With s for the true speed, L changes by ``rate - s``. The clock keeps L within ``max_lag`` at any
-rate: everything in flight fits into the buffer even if the robot reads all of it at once and
-carries out nothing. So the buffer cannot overflow.
+With s for the true speed, the derivative of L is ``rate - s``. The clock keeps L within
+``max_lag`` at any rate: everything in flight fits into the buffer even if the robot reads all of
+it at once and carries out nothing. So the buffer cannot overflow.
 """
 
 from __future__ import annotations

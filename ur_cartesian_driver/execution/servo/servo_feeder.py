@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feeds a goal through the buffered servo: the robot gets set-points instead of points.
+The feeder of a goal through the buffered servo: the robot gets set-points instead of points.
 
-A source makes a set-point for each packet of the robot (:mod:`~.servo_stream`). In the states of a
-goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) that means:
+A source makes a set-point for each packet of the robot (:mod:`~.servo_stream`). The states of the
+goal (:mod:`~ur_cartesian_driver.execution.goal.goal_transitions`) then mean:
 
 * in ARMING the inputs of the robot are claimed, the divergence thresholds are written and the
   robot program has to answer. If the inputs belong to another client, or the program does not
@@ -66,7 +66,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def __init__(self, monitor: GoalMonitor, stream: ServoStream, *parts: object) -> None:
         """
-        Prepare; the inputs are not claimed yet.
+        Begin before the RTDE inputs are claimed.
 
         :param stream: the stream of set-points, from the goal's spline or another source.
         :param parts: objects with further capabilities of this motion.
@@ -106,7 +106,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         )
 
     def _joint_distance(self, packet: RobotState, knot: int) -> float:
-        """Return the largest joint distance from a knot of the spline [rad]; 0 = no spline."""
+        """Return the largest joint distance of the target from a knot [rad]; 0 = no spline."""
         if self._spline is None:
             return 0.0
         q, _, _ = self._spline.at(float(self._spline.times[knot]))
@@ -115,14 +115,14 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
     # ---- the motion ---------------------------------------------------------------------------
 
     def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
-        """Begin the set-points in MOVING, and end them when the goal ends."""
+        """Begin the set-points in MOVING, and end them when the goal stops or ends."""
         match state:
             case GoalState.MOVING:
                 self.monitor.start(0)
                 self._has_filled = False
                 self.stream.begin()  # the next packet is answered with the first set-point
             case GoalState.RESTORING:
-                # Nothing is written in RESTORING, and the program must not wait for writes.
+                # No inputs are written in RESTORING, so the program must not wait for a write.
                 return self._leave()
             case GoalState.CANCELLING | GoalState.PROGRAM_LOST:
                 # A program that is started after this must not find set-points in the inputs.
@@ -132,7 +132,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return []
 
     def _leave(self) -> list[GoalCommand]:
-        """Leave the servo, once."""
+        """Return the commands that leave the servo; none from the second call on."""
         if self._has_left:
             return []
         self._has_left = True
@@ -163,7 +163,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
 
     def interpret(self, event: Event, state: GoalState) -> Meaning | None:
         """Return the meaning of the servo's phase after a packet."""
-        if isinstance(event, TrajectoryEnded):  # of an earlier goal
+        if isinstance(event, TrajectoryEnded):  # the result of an earlier goal
             return NO_MEANING
         if not isinstance(event, ServoReceived):
             return None
@@ -213,7 +213,7 @@ class ServoFeeder(Feeder, Prepared, Interpreting, Streaming):
         return self.stream.lag
 
     def reports(self) -> list[GoalCommand]:
-        """Return the state of the servo."""
+        """Return the report of the servo's state."""
         packet = self.monitor.latest
         error = UNKNOWN6 if packet is None else subtract6(packet.target_q, packet.actual_q)
         report = self.stream.report(error)

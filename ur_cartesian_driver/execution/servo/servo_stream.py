@@ -4,21 +4,21 @@
 Set-points through RTDE registers, packet by packet: the driver's side of the buffered servo.
 
 Each packet of the robot is answered by one write with a new sequence number, which shows the robot
-program that the client is alive; most of them carry a set-point. The phases, whose transitions are
+program that the client is alive; most writes carry a set-point. The phases, whose transitions are
 in :data:`TRANSITIONS`:
 
 * **OPENING**: the inputs are requested. The first packets show the control step of the robot, and
   the sequence number that it read last, perhaps of an earlier client; ours continue after it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
-  asked to read the inputs (a program made after the guide always reads them). The program has
+  asked to read the inputs (a program that follows the guide always reads them). The program has
   answered when it has read one of our sequence numbers.
 * **READY**: the program reads the inputs. Nothing moves before :meth:`ServoStream.begin`.
 * **FILLING**: mode SERVO; set-points repeat the present position until enough motion time is in
   flight.
 * **SERVOING**: set-points come from the source, at the rate of the clock (:mod:`~.servo_clock`).
-* **HOLDING**: the buffer ran empty, because nothing came through for longer than was in flight.
-  The arm stops at the last set-point; it is repeated until the buffer is full again, then the
-  motion continues slowly and speeds up.
+* **HOLDING**: the buffer ran empty, because no write came through for longer than the motion time
+  in flight. The arm stops at the last set-point; this set-point is repeated until the buffer is
+  full again, then the motion continues slowly and speeds up.
 * **DRAINING**: the source is at its end; the last set-point is repeated.
 * **ARRIVED**: all set-points were carried out. If the source goes on, the stream begins again as
   after READY.
@@ -143,7 +143,7 @@ class ServoSettings:
     """
     Settings of the streaming.
 
-    :raises ValueError: the values contradict each other.
+    :raises ValueError: ``target_lag`` is outside its range or does not fit into the buffer.
     """
 
     #: Motion time to keep in flight [s]: gaps in the packets up to this long do not stop the arm.
@@ -178,7 +178,7 @@ class _Setpoint(NamedTuple):
     sequence: int
     #: The time of the stream at which the set-point ends [s].
     state_time: float
-    #: The time of the source [s].
+    #: The time of the source at the set-point [s].
     source_time: float
 
 
@@ -186,7 +186,7 @@ class ServoStream:
     """Streams the set-points of one source; see the module's description."""
 
     def __init__(self, source: SetpointSource, settings: ServoSettings) -> None:
-        """Wait for the first packet."""
+        """Begin before the first packet."""
         self.phase = ServoPhase.OPENING
         self._source = source
         self.settings = settings
@@ -194,22 +194,23 @@ class ServoStream:
         self._times: list[float] = []
         self._latest: ServoFeedback | None = None
         self._sequence = 0
-        #: Our first sequence number, the first with mode SERVO, and the first with IDLE again.
+        #: Our first sequence number; the first with mode SERVO; the first with IDLE after that.
         self._first = self._first_servo = self._first_idle = 0
         self._joints: Vector6 = source.next(0.0)
         self._fill_target = START_FILL * settings.target_lag
-        #: Time of the stream at the newest set-point, and at the last one that the robot has read.
+        #: Time of the stream [s]: at the newest set-point; at the last one that the robot read.
         self._state_time = self._read_time = 0.0
         #: Motion time in the robot's buffer [s].
         self.buffered = 0.0
-        #: Set-points that the robot has not read yet, and set-points not carried out yet.
+        #: Set-points that the robot has not read yet.
         self._unread: deque[_Setpoint] = deque()
+        #: Set-points that the robot has not carried out yet.
         self._unfinished: deque[_Setpoint] = deque()
-        #: Time of the source at the newest set-point, and at the last one carried out [s].
+        #: Time of the source [s]: at the newest set-point; at the last one carried out.
         self.source_time = self.motion_time = 0.0
-        #: Rate of the motion relative to the set-points, 0 to 1.
+        #: Rate of the motion's time relative to the stream's time, 0 to 1.
         self._motion_rate = 1.0
-        #: Whether the motion is held at its place on the path, and its delay by being held [s].
+        #: Whether the motion is held at its place on the path; its total delay by being held [s].
         self.is_held, self.held_time = False, 0.0
         self._recovers = False
         self._last_write = -inf
@@ -267,7 +268,7 @@ class ServoStream:
         """Make the arm follow the set-points from now on."""
         self._apply(ServoEvent.BEGUN)
         self._first_servo = self._sequence + 1
-        # The source may have moved meanwhile, and the first write may precede its next set-point.
+        # The source may have been reset since, and the first write may precede its next set-point.
         self._joints = self._source.next(0.0)
 
     def stop(self) -> tuple[float, ...] | None:

@@ -29,7 +29,7 @@ class SetpointSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether the last positions were those of the end, where the arm comes to rest."""
+        """Whether the positions returned last are those of the end, where the arm rests."""
 
 
 class SplineSetpoints:
@@ -55,7 +55,7 @@ class SplineSetpoints:
         self._rows, self._row = [], 0
 
     def next(self, dt: float) -> Vector6:
-        """Return the joint positions a time [s] after the last ones [rad]."""
+        """Return the joint positions [rad] that follow the last ones after ``dt`` [s]."""
         if dt <= 0.0:
             return self._current
         if abs(dt - self._step) > _TIME_TOLERANCE or self._row >= len(self._rows):

@@ -16,7 +16,7 @@ class WaitForArm(Stallable, Ageing, Reporting):
     """
     Holds the set-points while the arm is off its path, for a limited time.
 
-    Only the robot's time while its program plays is measured: in a pause the arm cannot come back.
+    Only time in which the robot's program plays is measured: in a pause the arm cannot come back.
     """
 
     def __init__(self, monitor: GoalMonitor, stream: ServoStream) -> None:
@@ -25,12 +25,12 @@ class WaitForArm(Stallable, Ageing, Reporting):
         self._timeout = monitor.job.stall_timeout
         self._since = self._timestamp = 0.0
         self._count, self._longest = 0, 0.0
-        #: The delay of the motion that is already part of its start delay [s].
+        #: The delay by holding that is already part of the monitor's ``start_delay`` [s].
         self._held_time = 0.0
         self._unsaid: list[GoalCommand] = []
 
     def wait_out(self, fault: Fault | None, packet: RobotState) -> Fault | None:
-        """Hold the motion, and hide the fault, while a violation does not last too long."""
+        """Hold the motion and hide the fault during a violation, up to the stall timeout."""
         stream = self._stream
         was_held = stream.is_held
         stream.is_held = fault is not None and fault[0] is GoalSignal.VIOLATION

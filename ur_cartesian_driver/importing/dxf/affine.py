@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Maps of space that keep lines straight: object coordinate systems, blocks, units."""
+"""Affine maps: the object coordinate systems, placed blocks and units of a drawing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import cross, norm, unit, Vecto
 
 @dataclass(frozen=True, slots=True)
 class Affine:
-    """An affine map: the axes and the origin of a coordinate system, given in another one."""
+    """An affine map: the axes and the origin of one coordinate system, given in another."""
 
     x: Vector3 = (1.0, 0.0, 0.0)
     y: Vector3 = (0.0, 1.0, 0.0)
@@ -64,12 +64,12 @@ def shifted(by: Vector3) -> Affine:
 
 
 def turned(angle: float) -> Affine:
-    """Return the rotation about z."""
+    """Return the rotation about z by an angle [rad]."""
     return Affine((cos(angle), sin(angle), 0.0), (-sin(angle), cos(angle), 0.0))
 
 
 def object_axes(extrusion: Vector3) -> Affine:
-    """Return the object coordinate system of an extrusion (DXF's arbitrary axis algorithm)."""
+    """Return the object axes of an extrusion direction (DXF's arbitrary axis algorithm)."""
     z = unit(extrusion)
     is_near_z = abs(z[0]) < 1.0 / 64.0 and abs(z[1]) < 1.0 / 64.0
     x = unit(cross((0.0, 1.0, 0.0) if is_near_z else (0.0, 0.0, 1.0), z))

@@ -3,9 +3,9 @@
 """
 Contours: stretches whose ends meet, whatever their order and direction in the file.
 
-A contour continues where exactly two ends meet, and ends where three or more do, so that it does
-not depend on the order of the file. Its direction is that of its first stretch in the file; a
-closed contour also begins with that stretch.
+A contour continues where exactly two ends meet, and ends where three or more meet. So the order of
+the file does not determine which stretches a contour has. It determines only the direction: that
+of the contour's first stretch in the file, with which a closed contour also begins.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ur_cartesian_driver.importing.dxf.dxf_terms import LeftOut
 from ur_cartesian_driver.importing.dxf.entity_curves import Stretch
 from ur_cartesian_driver.motion.geometry.vectors import norm, subtract, Vector3
 
-# As shares of the distance within which ends meet:
-#: Two stretches whose points are this near each other are one stretch that was drawn twice.
+# Both numbers are fractions of the distance within which ends meet.
+#: Stretches whose points are this near each other are one stretch that was drawn twice.
 _SAME = 0.1
-#: The ends of stretches that are shorter than that distance have to be this near to meet.
+#: Where a stretch is shorter than that distance, only ends this near each other meet.
 _NEARER = 1e-3
 #: The index of a stretch, and 0 for its start or 1 for its end.
 _End = tuple[int, int]
@@ -33,7 +33,7 @@ def contours(
     """
     Yield contours in the order of their first stretches.
 
-    :param distance: ends that are as near as this meet [m].
+    :param distance: ends within this distance [m] of each other meet.
     """
     stretches = _without_copies(stretches, _SAME * distance, left_out)
     partners = _partners(stretches, distance, left_out)
@@ -51,7 +51,7 @@ def contours(
 
 
 def _follow(end: _End, partners: dict[_End, _End]) -> tuple[list[_End], bool]:
-    """Return the ends at which a contour enters its stretches after one, and whether it closes."""
+    """Return where a contour enters each stretch that follows an end, and whether it closes."""
     first = end[0]
     found: list[_End] = []
     while (entered := partners.get(end)) is not None:
@@ -65,7 +65,7 @@ def _follow(end: _End, partners: dict[_End, _End]) -> tuple[list[_End], bool]:
 def _without_copies(
     stretches: Sequence[Stretch], distance: float, left_out: LeftOut
 ) -> list[Stretch]:
-    """Return the stretches that are no copy of an earlier one, in either direction."""
+    """Return the stretches that do not repeat an earlier one, forwards or backwards."""
     kept: list[Stretch] = []
     places = _places(_ends(stretches), distance)
     like: dict[tuple[int, int, int], list[Stretch]] = {}
@@ -102,7 +102,7 @@ def _partners(
     places = _places(_ends(stretches), distance)
     gaps = [_distance(s.points[0], s.points[-1]) for s in stretches]
     open_ones = [i for i, gap in enumerate(gaps) if gap > _NEARER * distance]
-    # All ends of short stretches are near each other, so only ends that coincide meet.
+    # Both ends of a short stretch are near each other, so only ends that coincide meet there.
     short = {places[2 * i] for i in open_ones if places[2 * i] == places[2 * i + 1]}
     close = [(i, side) for i in open_ones for side in (0, 1) if places[2 * i + side] in short]
     nearer = _places([stretches[i].points[-side] for i, side in close], _NEARER * distance)
@@ -124,7 +124,7 @@ def _partners(
 
 
 def _places(points: Sequence[Vector3], distance: float) -> list[int]:
-    """Return a number for each point, the same for points that a chain of near points connects."""
+    """Return a number for each point; points connected by a chain of near points share one."""
     numbers: dict[Vector3, int] = {}
     for point in points:
         numbers.setdefault(point, len(numbers))
@@ -136,7 +136,7 @@ def _places(points: Sequence[Vector3], distance: float) -> list[int]:
             i = root[i]
         return i
 
-    # Cells are twice the distance wide: near points share a cell, or are in its nearer neighbours.
+    # Cells are twice the distance wide: a near point is in the same cell or in a nearer neighbour.
     cells: dict[tuple[int, ...], list[Vector3]] = {}
     for point, number in numbers.items():
         scaled = [value / (2.0 * distance) for value in point]

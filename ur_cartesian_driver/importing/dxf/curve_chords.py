@@ -4,15 +4,16 @@
 Chords of curves: lines that lie within a tolerance of rational Bézier curves.
 
 The bound is proven, not sampled. A curve lies in the convex hull of its control points, so it is
-no farther from its chord than they are. If the control points advance along the chord, so does the
-curve, because it meets a plane no more often than its control polygon; then each point of the
-chord has a point of the curve beside it, and the bound holds in both directions. (G. Farin, Curves
-and Surfaces for CAGD: both properties hold for positive weights.) Each curve is halved until every
-piece is within a small share of the tolerance.
+no farther from its chord than these points. If the control points advance along the chord, so does
+the curve, because a plane meets the curve no more often than the control polygon; then each point
+of the chord has a point of the curve beside it, and the bound holds in both directions. (G.
+Farin, Curves and Surfaces for CAGD: both properties hold for positive weights.) Each curve is
+halved until every piece is within a small fraction of the tolerance of its chord.
 
-Then each chord, greedily, spans as many pieces as the rest of the tolerance allows. A polyline is
-farthest from a line at one of its points, and its projection covers the whole line. A chord ends
-where the curve turns back by more than the tolerance.
+Then pieces are merged greedily: each chord spans as many as the remaining tolerance allows. Only
+the ends of pieces are checked, because a polyline is farthest from a line at one of its points,
+and its projection covers the whole line. A chord ends where the curve turns back by more than the
+remaining tolerance.
 
 Curves are arrays (m, n + 1, 4): m curves of degree n with control points (w x, w y, w z, w).
 """
@@ -26,12 +27,12 @@ import numpy as np
 from ur_cartesian_driver.importing.simplification import farthest_row
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 
-#: The share of the tolerance for the pieces; a smaller one takes more time and saves few chords.
+#: Fraction of the tolerance for the pieces; a smaller one takes more time and saves few chords.
 _FINE = 1.0 / 8.0
-#: Up to this many pieces in a chord are tried for all points at once; few chords have more.
+#: Chords of up to this many pieces are tried for all points at once; few chords have more.
 _WINDOW = 10
 _MAX_PIECES = 200_000
-#: Rounding errors of lengths along a chord [m].
+#: Rounding errors [m] of lengths along a chord.
 _ROUNDING = 1e-12
 
 
@@ -40,7 +41,7 @@ def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
     Return the Bézier curves of a B-spline, one for each knot span that is not empty.
 
     :param controls: (n, 4) weighted control points.
-    :raises ValueError: degree, knots and points do not make a spline in one piece.
+    :raises ValueError: degree, knots and control points do not define one continuous spline.
     """
     if degree < 1:
         raise ValueError(f'its degree is {degree}')
@@ -60,7 +61,7 @@ def spline_curves(degree: int, knots: Floats, controls: Floats) -> Floats:
     rows = spans[:, None] + np.arange(-degree, 1)
     curves = np.empty((len(spans), degree + 1, 4))
     for k in range(degree + 1):
-        # Control point k is the blossom with k arguments at the span's end, the rest at its start.
+        # Control point k is the blossom with k arguments at the span's end, others at its start.
         points = controls[rows]
         for r in range(1, degree + 1):
             at = knots[spans + 1 if r <= k else spans]
@@ -83,7 +84,7 @@ def ellipse_curves(a: Floats, b: Floats, centre: Floats, begin: float, sweep: fl
     for i in range(count):
         for k, (t, w) in enumerate(((0.0, 1.0), (0.5, weight), (1.0, 1.0))):
             angle = begin + (i + t) * step
-            # The tangents meet at the middle control point: centre + (point of the arc) / w.
+            # The end tangents meet at the middle control point: centre + (middle - centre) / w.
             curves[i, k, :3] = w * centre + cos(angle) * a + sin(angle) * b
             curves[i, k, 3] = w
     return curves
@@ -93,8 +94,8 @@ def chords(curves: Floats, tolerance: float) -> Floats:
     """
     Return the ends (k, 3) of chords of consecutive curves.
 
-    :param tolerance: the largest distance of the curves from the chords, and of the chords from
-        the curves [m].
+    :param tolerance: the largest distance [m] of the curves from the chords, and of the chords
+        from the curves.
     :raises ValueError: there would be too many chords.
     """
     fine = _FINE * tolerance
@@ -127,9 +128,10 @@ def _chord_errors(curves: Floats) -> Floats:
 
 def _beside(windows: Floats) -> tuple[Floats, Floats]:
     """
-    Measure points (m, k, 3) against the line from the first, which has to be 0, to the last.
+    Measure rows of points (m, k, 3) against the line from a row's first point to its last.
 
-    :returns: distances from the line, and lengths along it, each (m, k).
+    :param windows: the rows; the first point of each has to be 0.
+    :returns: the distances from the line, and the lengths along it, each (m, k).
     """
     chord = windows[:, -1:]
     length = np.sqrt(np.einsum('mij,mij->mi', chord, chord))
@@ -140,7 +142,7 @@ def _beside(windows: Floats) -> tuple[Floats, Floats]:
 
 
 def _halved(curves: Floats, which: Flags) -> Floats:
-    """Return the curves in order, the marked ones as two halves (de Casteljau)."""
+    """Return the curves in order, with each marked curve split into two halves (de Casteljau)."""
     halves = curves[which]
     left, right = np.empty_like(halves), np.empty_like(halves)
     for k in range(curves.shape[1]):
@@ -153,7 +155,7 @@ def _halved(curves: Floats, which: Flags) -> Floats:
 
 
 def _merged(points: Floats, tolerance: float) -> list[int]:
-    """Return the rows of the points to keep; the others are near the lines between these."""
+    """Return the rows of the points to keep; all others are near the lines between these."""
     last = len(points) - 1
     reach = np.minimum(np.arange(1, len(points) + 1), last)
     rows = np.arange(len(points))
@@ -177,7 +179,7 @@ def _merged(points: Floats, tolerance: float) -> list[int]:
 
 
 def _are_straight(windows: Floats, tolerance: float) -> Flags:
-    """Return for each row of points (m, k, 3) whether all are near the line from first to last."""
+    """Return whether each row of points (m, k, 3) is near its chord and never turns back far."""
     off, along = _beside(windows - windows[:, :1])
     back = (np.maximum.accumulate(along, axis=1) - along).max(axis=1)
     straight: Flags = (off.max(axis=1) <= tolerance) & (back <= tolerance)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A drawing: its header, layers, blocks and entities, and which of the entities are visible."""
+"""A drawing: its header, layers, blocks and entities, and the choice of visible entities."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _SECTIONS = (
     *('HEADER', 'CLASSES', 'TABLES', 'BLOCKS', 'ENTITIES', 'OBJECTS', 'THUMBNAILIMAGE'),
     'ACDSDATA',
 )
-#: Records that are among entities only if the file was cut.
+#: Kinds of records that occur among entities only if the file was cut.
 _NO_ENTITIES = ('TABLE', 'ENDTAB', 'LAYER', 'BLOCK', 'ENDBLK', 'BLOCK_RECORD', 'DICTIONARY')
-#: Largest number of placed entities of blocks, and deepest nesting of blocks.
+#: Largest number of entities placed by blocks, and deepest nesting of blocks.
 _MAX_PLACED, _MAX_DEPTH = 100_000, 64
-#: Below this bound, products with coordinates of a file do not overflow.
+#: Maps whose axes and origin are shorter than this do not make coordinates overflow.
 _MAX_SCALE = 1e60
 
 
@@ -46,7 +46,7 @@ class DrawingBlock:
 
 @dataclass(slots=True)
 class Drawing:
-    """Records by their names in upper case: CAD programs ignore the case."""
+    """Records by name; the names are in upper case, because CAD programs ignore the case."""
 
     header: dict[str, Record] = field(default_factory=dict)
     layers: dict[str, Record] = field(default_factory=dict)
@@ -99,7 +99,7 @@ def read_drawing(file: Path, left_out: LeftOut) -> Drawing:
 
 def _section(record: Record, before: set[str], left_out: LeftOut) -> str:
     """Return the name of the section that a record begins."""
-    # Header variables follow in the same record, with codes of their own.
+    # The first code 2: the header variables, in the same record, may have that code as well.
     name = next((value for code, value in record.tags if code == _NAME), '').upper()
     if name in before:
         raise record.fault(f'there is a section {name} before')
@@ -141,7 +141,7 @@ def _new_block(record: Record, blocks: dict[str, DrawingBlock]) -> DrawingBlock:
 
 
 def _clipped(objects: dict[str, Record]) -> set[str]:
-    """Return the handles of the entities that own, through other objects, a clip that is on."""
+    """Return the handles of the entities that own an active clip, through other objects."""
     found = set()
     for record in objects.values():
         if record.kind == 'SPATIAL_FILTER' and record.integer(71, 1):
@@ -155,7 +155,7 @@ def _clipped(objects: dict[str, Record]) -> set[str]:
 
 
 class Seen:
-    """Walks through the model space, and adds remarks on entities that are not visible."""
+    """Walks through the model space, and adds remarks on invisible entities."""
 
     def __init__(self, drawing: Drawing, left_out: LeftOut) -> None:
         """Begin before the first entity."""
@@ -166,9 +166,9 @@ class Seen:
 
     def entities(self, place: Affine) -> Iterator[tuple[Record, Affine]]:
         """
-        Yield the visible entities in the order of the file, with the map of their coordinates.
+        Yield the visible entities in the order of the file, each with the map of its coordinates.
 
-        :param place: the map of the coordinates of the drawing.
+        :param place: the map from the drawing's coordinates to [m].
         :raises BrokenFile: a block cannot be placed.
         """
         sheets = [b for name, b in self._drawing.blocks.items() if name.startswith(_SHEETS)]
@@ -182,13 +182,13 @@ class Seen:
                 yield from self._seen(record, place, '', ())
 
     def _model_space(self) -> Iterator[Record]:
-        for name in _MODEL_SPACES:  # empty in files of most programs
+        for name in _MODEL_SPACES:  # most programs leave these blocks empty
             if name in self._drawing.blocks:
                 yield from self._drawing.blocks[name].entities
         yield from self._drawing.entities
 
     def _leave_on_sheet(self, record: Record) -> None:
-        if record.kind != 'VIEWPORT':  # a window of the sheet itself
+        if record.kind != 'VIEWPORT':  # a window, which belongs to the sheet
             self._left_out.add_term(record, '67')
 
     def _seen(
@@ -214,7 +214,7 @@ class Seen:
             yield record, place
 
     def _hidden(self, record: Record, layer: str) -> str:
-        """Return the term that hides an entity; a layer hides an INSERT only if it is frozen."""
+        """Return the term that hides an entity; of layers, only frozen ones hide an INSERT."""
         if record.integer(60):
             return '60'
         entry = self._drawing.layers.get(layer)
@@ -227,7 +227,7 @@ class Seen:
         return 'LAYER 62<0' if entry and entry.integer(62, 7) < 0 else ''
 
     def _show(self, layer: str) -> None:
-        """Add a remark, once for each layer, on properties that the tool ignores."""
+        """Add a remark, once for each layer, on the layer's properties that the tool ignores."""
         entry = self._drawing.layers.get(layer)
         if entry is None or layer in self._shown:
             return
@@ -258,7 +258,7 @@ class Seen:
                 yield from self._seen(entity, at, layer, (*inside, name))
 
     def _unplaced(self, record: Record, block: DrawingBlock | None) -> str:
-        """Return the term because of which an INSERT is left out; empty = none."""
+        """Return the term because of which an INSERT is left out; empty = it is placed."""
         if block is None:
             return 'INSERT without BLOCK'
         for bit in _EXTERNAL:
@@ -268,13 +268,13 @@ class Seen:
 
 
 def _places(record: Record, block: DrawingBlock, place: Affine) -> Iterator[Affine]:
-    """Yield the map of a block's coordinates for each place of an array of blocks."""
+    """Yield the map of a block's coordinates for each copy in an INSERT's array."""
     axes = place.after(object_axes(record.extrusion()))
     x, y, z = (record.number(code, 1.0) for code in (41, 42, 43))
     if x == 0.0 or y == 0.0:
         raise record.fault('a scale is 0 (group codes 41 and 42)')
     turn = turned(radians(record.number(50, 0.0)))
-    z = z or 1.0  # 2D programs write 0
+    z = z or 1.0  # 2D programs write a scale of 0 for z
     shape = turn.after(scaled(x, y, z)).after(shifted(scale(block.record.point(10, ZERO3), -1.0)))
     across, up = record.number(44, 0.0), record.number(45, 0.0)
     columns = record.integer(70, 1) if across else 1

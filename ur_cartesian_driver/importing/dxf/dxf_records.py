@@ -19,11 +19,11 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 from ur_cartesian_driver.importing.text_file import decoded, file_lines
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, ZERO3
 
-#: The first code of extended data, and the key under which all of them are stored.
+#: The group code under which all extended data (codes from 1000) are stored.
 EXTENDED_DATA = 1001
 _MARKER, _EMBEDDED, _APPLICATION_GROUP, _ELEVATION = 100, 101, 102, 38
 _EXTRUSION, Z_AXIS = 210, (0.0, 0.0, 1.0)
-#: Markers of subclasses, and the kinds that have them.
+#: Markers of subclasses, and the kinds of entities that have these markers.
 _MARKED = {
     'AcDbLine': ('LINE',),
     'AcDbCircle': ('ARC', 'CIRCLE'),
@@ -74,23 +74,23 @@ class Record:
             if code == _APPLICATION_GROUP:
                 inside = value.startswith('{')
             elif code == _EMBEDDED or (code == _MARKER and value == 'AcDbHelix'):
-                return  # the rest reuses codes; before it, a HELIX is a SPLINE
+                return  # later tags reuse codes; the earlier tags of a HELIX are a SPLINE
             elif not inside:
                 line = self.line + 2 * index + 3
                 if code == _MARKER and self.kind in _KINDS_WITH_MARKERS:
                     if self.kind not in _MARKED.get(value, (self.kind,)) or value[:4] != 'AcDb':
-                        # The file was cut: this is the rest of another entity.
+                        # The file was cut: these tags belong to another entity.
                         raise BrokenFile(line, f'{self.kind}: its marker {value!r:.40} is wrong')
                 yield code, value, line
 
     @property
     def handle(self) -> str:
-        """The identifier of the record that CAD programs show; empty = none."""
+        """The record's identifier, which CAD programs display; empty = none."""
         found = self.values.get(5)
         return found[0][0] if found and _HANDLE.fullmatch(found[0][0]) else ''
 
     def fault(self, text: str, line: int = 0) -> BrokenFile:
-        """Return the refusal of this record, at a line or else at its first one."""
+        """Return the error for this record, at the given line or else at its first line."""
         name = f'{self.kind} {self.handle}' if self.handle else self.kind
         return BrokenFile(line or self.line, f'{name}: {text}')
 
@@ -113,7 +113,7 @@ class Record:
         Return the number of a group code.
 
         :param default: the number if the code is missing; None = the code is required.
-        :raises BrokenFile: the code is missing, no number, or has two different numbers.
+        :raises BrokenFile: the code is missing, has no number, or has two different numbers.
         """
         found = self.values.get(code)
         if found is None:
@@ -154,7 +154,7 @@ class Record:
 
     def integer(self, code: int, default: int = 0) -> int:
         """
-        Return the integer of a group code; some programs write it with a point.
+        Return the integer of a group code; some programs write it with a decimal point.
 
         :raises BrokenFile: the value is no integer.
         """
@@ -169,7 +169,7 @@ class Record:
         """
         Return the point that begins with a group code.
 
-        A point without z has the elevation of the entity, as before AutoCAD R11.
+        A point without z is at the elevation of the entity, as before AutoCAD R11.
 
         :raises BrokenFile: a coordinate is missing, or no number.
         """
@@ -239,6 +239,6 @@ def read_records(file: Path) -> Iterator[Record]:
 
 
 def _code_page(data: bytes) -> str:
-    """Return the codec of an old drawing, whose header names it as ANSI_1252 or dos850."""
+    """Return the codec for the code page of an old drawing, such as ANSI_1252 or dos850."""
     found = re.search(rb'\$DWGCODEPAGE\s+3\s+(?:ansi_|dos)(\d+)', data, re.IGNORECASE)
     return f'cp{found[1].decode() if found else 1252}'

@@ -3,9 +3,10 @@
 """
 Terms of DXF: kinds of entities, their group codes, units.
 
-A group code is named with its kind of entity, as ``LWPOLYLINE 42``; a code alone, as ``39``, is
-that code of any entity. A point is named by its first code: ``LINE 11`` means 11, 21 and 31.
-``POLYLINE 70=16`` is a bit of a group code. Names and meanings follow the AutoCAD DXF reference.
+A group code is named with its kind of entity, such as ``LWPOLYLINE 42``; a code alone, such as
+``39``, means that code of any entity. A point is named by its first code: ``LINE 11`` means 11,
+21 and 31. ``POLYLINE 70=16`` means a bit of a group code. Names and meanings follow the AutoCAD
+DXF reference.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ UNITS = {
     23: ('US survey yards', 3600.0 / 3937.0),
     24: ('US survey miles', 6336000.0 / 3937.0),
 }
-#: Numbers of the units to which $MEASUREMENT 0 refers; 1 refers to all others.
+#: Numbers of the units for which $MEASUREMENT is 0; it is 1 for all others.
 ENGLISH = (1, 2, 3, 8, 9, 10, 21, 22, 23, 24)
 _KINDS, _ANY, _NO_EFFECT = 'kinds of entities', 'any entity', 'without effect on a shape'
 _WIDTH = 'it has a width; the tool follows the middle'
@@ -141,7 +142,7 @@ TERMS = term_table(
     refused('INSERT', 'its block contains itself', 'INSERT in its own BLOCK'),
     honoured('BLOCK', 'BLOCK 2', 'BLOCK 10'),
     left_out('BLOCK', 'its entities are in another file', 'BLOCK 70=4', 'BLOCK 70=8'),
-    # How a shape was made; the file also has its points and knots.
+    # These codes say how a shape was made; the file also contains the shape's points and knots.
     honoured(
         _NO_EFFECT,
         *('5', '100', '102', '330', '360', '999', 'LINE 210', 'INSERT 66'),
@@ -176,13 +177,13 @@ _DEFAULTS = {
     '410': ('MODEL',),
 }
 _FLAGS = 70
-#: The kinds of entities for which each bit of the flags is a term.
+#: The kinds of entities whose flags have a term for each bit.
 _HAVE_BITS = ('LWPOLYLINE', 'POLYLINE', 'VERTEX', 'SPLINE', 'HELIX')
 
 
 @cache
 def _term(kind: str, code: str) -> Term | None:
-    """Return the term of a group code, of its kind or of any entity; a HELIX is a SPLINE."""
+    """Return the term of a group code for a kind, or else for any entity; HELIX means SPLINE."""
     if kind == 'HELIX':
         kind = 'SPLINE'
     return TERMS.get(f'{kind} {code}') or TERMS.get(code)
@@ -190,7 +191,7 @@ def _term(kind: str, code: str) -> Term | None:
 
 @cache
 def _first_code(code: int) -> int:
-    """Return the group code of a point's x if a code is that of its y or z, else the code."""
+    """Turn the group code of a point's y or z into that of its x; return other codes unchanged."""
     for first, last, x in ((20, 28, 10), (30, 37, 10), (220, 223, 210), (230, 233, 210)):
         if first <= code <= last:
             return x + code - first
@@ -260,7 +261,7 @@ class LeftOut:
             self.add(record, term.reason, what)
 
     def tell(self, remarks: ImportNotes) -> None:
-        """Add the remarks; each names the first handles of its records."""
+        """Add all remarks to those of the import; each names the handles of its first records."""
         for (what, why), records in self._found.items():
             handles = _listed([record.handle for record in records if record.handle])
             for record in records:

@@ -26,24 +26,24 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     Vector3,
 )
 
-#: Largest angle of one arc of the robot [rad]; longer arcs are halved.
+#: Largest angle [rad] of one arc of the robot; longer arcs are halved.
 _LONGEST_ARC = 0.95 * pi
-#: Rounding of the angles of a whole turn in files [turns].
+#: Rounding error [turns] of whole turns in files.
 _WHOLE_TURN = 1e-6
 #: Arcs with a smaller bulge are drawn as lines: their height is below a billionth of the chord.
 _FLAT = 1e-9
 _CLOSED, _IN_SPACE, _MESH, _FACES, _FRAME = 1, 8, 16, 64, 16
-#: Ends that are as near as this are joined [m].
+#: Ends within this distance [m] of each other are joined.
 JOINED = 1e-5
 
 
 class _NoPathError(Exception):
-    """An entity has no path, for the reason of a term."""
+    """An entity has no path; the message is the term that says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Points [m]: the motion to each but the first is a line, or an arc through its via."""
+    """Points [m]; to each point but the first leads a line, or an arc through its via point."""
 
     record: Record
     points: list[Vector3]
@@ -101,11 +101,11 @@ class _Pen:
         self.vias.extend([None] * (len(places) - 1))
 
     def gap(self) -> float:
-        """Return the distance between the ends [m]."""
+        """Return the distance [m] between the ends."""
         return norm(subtract(self.points[0], self.points[-1]))
 
     def arrive(self, point: Vector3) -> None:
-        """Move the end of a curve exactly to the point that the file gives."""
+        """Move the newest point, the end of a curve, exactly to the point that the file gives."""
         self.points[-1] = self.place.point(point)
 
 
@@ -115,8 +115,8 @@ def stretch_of(
     """
     Return the stretch of an entity; None = the entity is left out, with a remark.
 
-    :param place: the map of the coordinates of the drawing to [m].
-    :param tolerance: the largest distance of chords from their curve [m].
+    :param place: the map from the drawing's coordinates to [m].
+    :param tolerance: the largest distance [m] of chords from their curve.
     :raises BrokenFile: a value is missing or must be a mistake.
     """
     draw = _DRAWN.get(record.kind)
@@ -141,7 +141,7 @@ def stretch_of(
 
 
 def _coordinates(record: Record, place: Affine) -> Affine:
-    """Return the map of an entity's coordinates: a plane entity has axes of its own."""
+    """Return the map from an entity's coordinates to [m]; a plane entity has its own axes."""
     is_plane = record.kind in ('ARC', 'CIRCLE', 'LWPOLYLINE', 'POLYLINE')
     if not is_plane or (record.kind == 'POLYLINE' and record.integer(70) & _IN_SPACE):
         return place
@@ -244,7 +244,7 @@ def _polyline(record: Record, pen: _Pen, left_out: LeftOut) -> None:
 def _plane_polyline(
     pen: _Pen, corners: Sequence[tuple[float, float, float]], height: float, closed: bool
 ) -> None:
-    """Draw corners (x, y, bulge); tan(angle / 4) is the bulge of the arc after a corner."""
+    """Draw a polyline through (x, y, bulge): the arc after a corner has bulge = tan(angle / 4)."""
     if not corners:
         return
     pen.line_to((*corners[0][:2], height))

@@ -10,22 +10,22 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 
-#: The radii at both ends of an arc may differ by the larger of a length [m] and a share of the
-#: radius, but by no more than a second length [m], as in LinuxCNC and GRBL.
+#: Allowed difference of the radii at the ends of an arc, as in LinuxCNC and GRBL: the larger of a
+#: length [m] and a fraction of the radius, but at most a second length [m].
 _RADIUS_TOLERANCE, _RADIUS_SHARE, _MAX_RADIUS_TOLERANCE = 5e-6, 1e-3, 5e-4
 #: An arc that turns by less than this angle [rad] is a full circle, as in LinuxCNC.
 _FULL_CIRCLE = 1e-6
-#: Smallest rise of a helix, and smallest chord of an arc that is given by its radius [m].
+#: Smallest rise [m] of a helix, and smallest chord [m] of an arc that is given by its radius.
 _MIN_RISE = 1e-6
 _MAX_LINES = 100_000
 
 
 class ArcPlane(NamedTuple):
-    """The plane of arcs: two axes, and the axis along which arcs can rise, right-handed."""
+    """A plane of arcs: right-handed axes, two in the plane and one along which arcs can rise."""
 
     name: str
     axes: tuple[int, int, int]
-    #: The words that give the centre along these axes.
+    #: The letters of the words that give the centre along these three axes.
     letters: tuple[str, str, str]
 
 
@@ -37,7 +37,7 @@ PLANES = {
 
 
 class Arc(NamedTuple):
-    """A part of a circle or a helix [m, rad]."""
+    """An arc of a circle or a helix [m, rad], which can have several turns."""
 
     axes: tuple[int, int, int]
     centre: tuple[float, float]
@@ -55,7 +55,7 @@ class Arc(NamedTuple):
         return abs(self.end[axis] - self.start[axis]) > _MIN_RISE
 
     def place(self, share: float) -> Vector3:
-        """Return the point at a share of the arc, a spiral if the radii differ (LinuxCNC)."""
+        """Return the point at a fraction of the arc, a spiral if its radii differ (LinuxCNC)."""
         if share == 1.0:
             x, y, z = self.end
             return (x, y, z)
@@ -70,7 +70,7 @@ class Arc(NamedTuple):
 
     def lines(self, tolerance: float) -> list[Vector3]:
         """
-        Return the ends of lines that are nowhere farther than a tolerance [m] from the arc.
+        Return the end points of lines that stay within a tolerance [m] of the arc.
 
         :raises ValueError: there would be too many lines.
         """
@@ -81,7 +81,7 @@ class Arc(NamedTuple):
         return [self.place(i / count) for i in range(1, count + 1)]
 
     def arcs(self) -> Iterator[tuple[Vector3, Vector3]]:
-        """Yield the middle and the end of each of the robot's arcs, which go through 3 points."""
+        """Yield the via point and the end point of each of the robot arcs that form this arc."""
         # Three points define an arc of about half a circle best.
         count = ceil(abs(self.sweep) / (0.9 * pi))
         for i in range(count):
@@ -99,9 +99,10 @@ def arc_between(
     """
     Return the arc from one point to another.
 
-    :param centre: the centre in the plane; or a radius, negative for more than a half circle.
+    :param centre: the centre in the plane, or else a radius: negative if the arc is longer than
+        a half circle.
     :param direction: clockwise -1 (G2), counterclockwise 1 (G3).
-    :raises ValueError: there is no such arc; the message is a sentence without a full stop.
+    :raises ValueError: no arc fits these values; the message is a sentence without a full stop.
     """
     a, b, _ = plane.axes
     ax, ay, bx, by = start[a], start[b], end[a], end[b]

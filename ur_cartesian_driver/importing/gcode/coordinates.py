@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place of the tool in the frame of the file, from the coordinates of the program.
+The position of the tool in the frame of the file, from the coordinates of the program.
 
-A program does not say where the tool is when it begins, and the places of a machine (G28, G53)
-are not known here. So an axis is known from its first absolute coordinate on. An axis that begins
-with increments begins at 0, as in RS274/NGC; an axis that no line names stays at 0.
+A program does not say where the tool is at its beginning, and the machine positions of G28 and G53
+are not known here. So the position along an axis is unknown before the first absolute coordinate
+of that axis, unless increments come first: then the axis begins at 0, as in RS274/NGC. An axis
+that no line names stays at 0.
 """
 
 from __future__ import annotations
@@ -17,34 +18,37 @@ from typing import NamedTuple
 from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollector
 
 AXES = 'XYZ'
-#: The states of an axis; a state above 0 is the line that made its place unknown.
+#: Two states of an axis: its position is known, or not known yet. A state above 0 is the number of
+#: the line since which the position is unknown.
 _KNOWN, _BEGIN = 0, -1
 
 
 class _Offset(NamedTuple):
-    """A length that is added to a coordinate [m]; it is unknown unless its state is _KNOWN."""
+    """A length [m] that is added to a coordinate; it is known only if its state is _KNOWN."""
 
     length: float = 0.0
     state: int = _KNOWN
 
 
 class Coordinates:
-    """Follows the tool through coordinates and offsets [m]."""
+    """Follows the position of the tool through coordinates and offsets [m]."""
 
     def __init__(self) -> None:
-        """Begin at an unknown place."""
+        """Begin at an unknown position."""
         self.place = [0.0, 0.0, 0.0]
         self.states = [_BEGIN, _BEGIN, _BEGIN]
-        #: Flags since the last point: the tool went to a place of the machine; states changed.
+        #: Whether the tool has gone to a machine position since the last point; whether the state
+        #: of an axis has changed since then.
         self.is_away, self.has_changed = False, True
-        #: The present offsets, the offsets without G92 and G52, and those that G92.2 suspended.
+        #: The present offsets; the offsets that apply without G92 and G52.
         self._offsets = self._origin = [_Offset(), _Offset(), _Offset()]
+        #: The offsets that G92.2 suspended; empty = none.
         self._suspended: list[_Offset] = []
-        #: The code whose offsets are in use, G92 or G52; empty = neither.
+        #: The code whose offsets are in use: G92 or G52; empty = neither.
         self._preset_by = ''
         self._is_named, self._was_known = [False, False, False], [False, False, False]
         self._counts_from_zero = [False, False, False]
-        #: Rows of the path, and the states of the axes from each of these rows on.
+        #: Rows of the path, each with the states that the axes have from that row on.
         self._history: list[tuple[int, Sequence[int]]] = []
 
     # ---- moves ---------------------------------------------------------------------------------
@@ -66,7 +70,7 @@ class Coordinates:
             self._set_state(axis, _KNOWN)
 
     def is_named(self, axis: str) -> bool:
-        """Return whether the program has given a coordinate on an axis."""
+        """Return whether the program has given a coordinate or an increment of an axis."""
         return self._is_named[AXES.index(axis)]
 
     def absolute(self, axis: int, coordinate: float) -> float:
@@ -74,11 +78,11 @@ class Coordinates:
         return coordinate + self._offsets[axis].length
 
     def lose(self, axes: str, line: int) -> None:
-        """Go to a place of the machine along some axes; their coordinates become unknown."""
+        """Go to a machine position along some axes; their coordinates become unknown."""
         for axis in map(AXES.index, axes):
             self.is_away = True
             self._set_state(axis, line)
-            # Homing ends G92 in Marlin, but not in RS274/NGC.
+            # Homing cancels G92 in Marlin but not in RS274/NGC: the offset is now unknown.
             if self._preset_by == 'G92' and self._offsets[axis] != self._origin[axis]:
                 self._set_offset(axis, _Offset(state=line))
 
@@ -90,10 +94,11 @@ class Coordinates:
 
     def preset(self, line: int, coordinates: Mapping[int, float]) -> str:
         """
-        Set the coordinates of the present place of the tool (G92).
+        Set the coordinates that the tool's present position has (G92).
 
-        :returns: the axes along which the place was not known before.
-        :raises BrokenFile: the place was known earlier in the program, but is not now.
+        :returns: the names of the axes along which the position was not known before.
+        :raises BrokenFile: the position along an axis was known earlier in the program, but is
+            not known now.
         """
         begun = ''
         for axis, coordinate in coordinates.items():
@@ -117,7 +122,7 @@ class Coordinates:
 
     def preset_origin(self, line: int, coordinates: Mapping[int, float]) -> None:
         """
-        Set the coordinates of the present place of the tool for good (G10 L20).
+        Set the coordinates that the tool's present position has in the work offset (G10 L20).
 
         :raises BrokenFile: G92 or G52 is in use, or as for :meth:`preset`.
         """
@@ -128,7 +133,7 @@ class Coordinates:
 
     def shift(self, line: int, offsets: Mapping[int, float]) -> None:
         """
-        Move the origin of coordinates (G52).
+        Move the origin of the coordinates (G52).
 
         :raises BrokenFile: G92 is in use.
         """
@@ -141,9 +146,9 @@ class Coordinates:
 
     def cancel_preset(self, code: str, line: int) -> None:
         """
-        End G92 and G52 (G92.1, G92.2), or restore the offsets that G92.2 suspended (G92.3).
+        Cancel the offsets of G92 and G52 (G92.1, G92.2), or restore those before G92.2 (G92.3).
 
-        :raises BrokenFile: there are no suspended offsets.
+        :raises BrokenFile: G92.3 is given, but G92.2 has not suspended any offsets.
         """
         if code == 'G92.3':
             if not self._suspended:
@@ -163,7 +168,7 @@ class Coordinates:
     # ---- rows of the path ----------------------------------------------------------------------
 
     def start_is_known(self, states_before: Sequence[int]) -> bool:
-        """Return whether the axes known after the last motion were also known at its start."""
+        """Return whether the last motion's start is as well known, along each axis, as its end."""
         return self.states == states_before or all(
             before == after or (before == _BEGIN and from_zero)
             for before, after, from_zero in zip(
@@ -172,14 +177,14 @@ class Coordinates:
         )
 
     def record(self, row: int) -> None:
-        """Remember the present states of the axes, from a row of the path on."""
+        """Note that the present states of the axes apply from a row of the path on."""
         self._history.append((row, (*self.states,)))
         for axis, state in enumerate(self.states):
             self._was_known[axis] |= state == _KNOWN
         self.has_changed = self.is_away = False
 
     def finish(self, into: PathCollector) -> None:
-        """Leave out the rows whose place is not known, and add remarks on the assumptions."""
+        """Leave out the rows whose position is not known, and add remarks on assumed positions."""
         for axis, name in enumerate(AXES if len(into) else ''):
             if not self._is_named[axis]:
                 into.remarks.add(0, f'no {name} in the file', f'{name} is 0')

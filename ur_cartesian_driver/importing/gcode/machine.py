@@ -4,7 +4,7 @@
 The machine that executes a program, line by line.
 
 The codes of a line act in the order of RS274/NGC: modes, feed, spindle and outputs, offsets, the
-motion, and the end of the program after it.
+motion, and last the end of the program.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile, PathCollecto
 
 _MOTIONS = frozenset(('G0', 'G1', 'G2', 'G3'))
 _OF_MOTION = frozenset('XYZIJKRP')
-# Prusa's W is no axis, and U and W of a lathe are steps along X and Z.
+# W is no axis on Prusa's printers; on a lathe, U and W are increments along X and Z.
 _AXIS_WORDS = frozenset('XYZABCE')
-#: Codes that go to a place of the machine along the axes that they name, or along all if none.
+#: Codes that move to a machine position: along the named axes, or along all if none is named.
 _WITH_AXES = ('G28', 'G30', 'G53')
 _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
@@ -52,7 +52,7 @@ class GcodeMachine:
         self._feed_per_turn = self._surface_speed = self._is_lathe = False
         #: The line of an M622 whose M623 is still to come; 0 = none.
         self._condition = 0
-        #: The lines of G0 during which S keeps its output on.
+        #: The lines of the G0 motions during which the output of S stays on.
         self._powered_travels: list[int] = []
 
     def run(self) -> None:
@@ -70,7 +70,7 @@ class GcodeMachine:
         self._finish()
 
     def _finish(self) -> None:
-        """Make the remarks for which the whole program has to be known."""
+        """Add the remarks that need the whole program; refuse a condition that does not end."""
         if self._condition:
             raise BrokenFile(self._condition, 'M622 begins a condition, and no M623 ends it')
         self._outputs.finish()
@@ -110,7 +110,7 @@ class GcodeMachine:
             self._move(words)
 
     def _obey(self, codes: Sequence[str], words: _Words, bare: str) -> None:
-        """Execute a line with any codes but a single motion code."""
+        """Execute a line with other codes than one motion code, or with bare letters."""
         rows = [self._row(code, words) for code in codes]
         if len(rows) == 1 and rows[0].alone:
             self._do(codes[0], rows[0], words, bare)
@@ -163,7 +163,7 @@ class GcodeMachine:
         words: _Words,
         bare: str,
     ) -> None:
-        """Refuse words that could belong to one code or to another."""
+        """Refuse letters that lack a number, and words that could belong to several codes."""
         for letter in bare:
             if not any(letter in row.bare for row in rows):
                 raise self._fail(f'{letter} has no number')
@@ -200,7 +200,7 @@ class GcodeMachine:
             )
 
     def _take_words(self, words: _Words, *, beside_spindle: bool = False) -> None:
-        """Carry out and remove the words that belong to no code, except the words of a motion."""
+        """Carry out and remove the words that belong neither to a code nor to a motion."""
         if words.keys() <= _OF_MOTION:
             return
         for letter in [each for each in words if each not in _OF_MOTION]:
@@ -297,7 +297,7 @@ class GcodeMachine:
         self._path.coordinates.cancel_preset(code, self._line)
 
     def _set_table(self, code: str, own: _Words) -> None:
-        """Set a work offset (G10 L2), or the present coordinates within it (G10 L20)."""
+        """Set the present coordinates (G10 L20); leave out or refuse a work offset (G10 L2)."""
         number = own.get('P', 0.0)
         kind = f'{code} L{own["L"]:g}'
         if number and (number not in range(1, 10) or _FRAMES[int(number) - 1] != self._frame):
@@ -337,7 +337,7 @@ class GcodeMachine:
 
     @cached_property
     def _has_v(self) -> bool:
-        """Return whether the program has V words, so that U is an axis of a wire and no step."""
+        """Return whether there are V words: U is then an axis of a wire, no increment along X."""
         return any(re.search(r'V\s*[-+.0-9]', line, re.I) for line in self._lines)
 
 

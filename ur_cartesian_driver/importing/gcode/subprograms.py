@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The order in which the lines of a program are executed: subprograms by M98 and M99."""
+"""The order in which a program's lines are executed: M98 calls subprograms, M99 ends them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ur_cartesian_driver.importing.imported_path import BrokenFile
 
 _NUMBER_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?[O:]\s*([0-9]{1,8})\s*(?:[(;].*)?', re.I)
 _END_LINE = re.compile(r'\s*(?:N\s*[0-9]+\s*)?M\s*0*(?:2|30)\b', re.I)
-#: Largest depth of nested calls, as of Fanuc and LinuxCNC.
+#: Largest depth of nested calls, as in Fanuc's controls and LinuxCNC.
 _MAX_DEPTH = 10
 #: Largest number of executed lines of all subprograms together.
 _MAX_LINES = 200_000
-#: Fanuc packs repetitions and a four-digit number into one P: P51002 is 5 times O1002.
+#: Fanuc packs repetitions and a four-digit number into one P: P51002 calls O1002 five times.
 _PACKED = 10_000
 
 
 @dataclass(slots=True)
 class _Call:
     number: int
-    #: The indices of the first line of the subprogram, and of the line after the call.
+    #: The index of the subprogram's first line; the index of the line after the call.
     first: int
     back: int
     repeats_left: int
@@ -41,7 +41,7 @@ class LineSequence:
         self._in_subprograms = 0
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
-        """Yield the number of each line, from 1, and the line."""
+        """Yield the number (from 1) and the text of each line that is executed."""
         while self._next < len(self._lines):
             self._next += 1
             if self._calls:
@@ -62,7 +62,7 @@ class LineSequence:
         self._next = len(self._lines)
 
     def meet_number(self, line: int, number: int, *, is_first: bool) -> None:
-        """Accept the first number of a program; refuse a program that runs into another number."""
+        """Accept an O number at the beginning; refuse a program that runs into a later one."""
         if self._calls:
             raise BrokenFile(line, f'the subprogram O{self._calls[-1].number} has no M99 before')
         if not is_first:
@@ -72,7 +72,8 @@ class LineSequence:
         """
         Continue at a subprogram (M98 P- L-).
 
-        :raises BrokenFile: the call is wrong or too deep, or the file has no such subprogram.
+        :raises BrokenFile: a word of the call is wrong, calls are nested too deeply, or the file
+            lacks the subprogram.
         """
         number, repeats = words.get('P'), words.get('L', 1.0)
         if number is None or set(words) - {'P', 'L'}:
@@ -95,7 +96,8 @@ class LineSequence:
         """
         Repeat the subprogram or continue after its call (M99); return False in the main program.
 
-        :raises BrokenFile: M99 names a place, or is in the main program before an M2 or M30.
+        :raises BrokenFile: M99 names a line to continue at, or is in the main program before an
+            M2 or M30.
         """
         if words:
             raise BrokenFile(line, 'M99 with a place to go on at is not read')

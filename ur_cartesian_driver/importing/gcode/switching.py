@@ -3,8 +3,9 @@
 """
 The outputs that codes switch.
 
-S is the power of a spindle or a laser. It drives its output while M3 or M4 is active, even if S
-changes on a line without them, such as GRBL's ``G1 X1 S200``. M5, M2 and M30 set the output to 0.
+S is the power of a spindle or a laser. S drives its output while M3 or M4 is active, even if its
+number changes on a line without M3 and M4, such as GRBL's ``G1 X1 S200``. M5, M2 and M30 set the
+output to 0.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class CodeOutputs:
         self._ever_on = False
 
     def __contains__(self, code: str) -> bool:
-        """Return whether a code has an output."""
+        """Return whether the options give an output for a code."""
         return code in self._keys
 
     @property
@@ -47,7 +48,7 @@ class CodeOutputs:
         """
         Set the power.
 
-        :param beside_spindle: M3, M4 or M5 is on the same line, and acts next.
+        :param beside_spindle: whether M3, M4 or M5 is on the same line, and so acts next.
         """
         changed, self._power = value != self._power, value
         by_value = any(values for code in ('M3', 'M4') for values in self._keys.get(code, ()))
@@ -63,8 +64,8 @@ class CodeOutputs:
         Switch the outputs that the options give for a code.
 
         :param values: the words that belong to the code.
-        :raises BrokenFile: the code has values but its output is given without any, or S is out of
-            range.
+        :raises BrokenFile: the code has values, but the options give its output without any; or S
+            is out of range.
         """
         if code in ('M3', 'M4', 'M5'):
             was_on, self._spindle = self._spindle != _SPINDLE_OFF, code
@@ -111,7 +112,7 @@ class CodeOutputs:
     def _switch(
         self, line: int, code: str, values: Mapping[str, float], modal: Mapping[str, float]
     ) -> None:
-        """Switch the output whose key matches the largest number of values."""
+        """Switch the output of a code; of several that fit, the one with the most values."""
         own = [f'{letter}{value:g}' for letter, value in values.items()]
         here = {*own, *(f'{letter}{value:g}' for letter, value in modal.items())}
         keys = [key for key in self._keys.get(code, ()) if here.issuperset(key)]

@@ -20,12 +20,12 @@ class Toolpath:
     """Collects the points of motions, in the modes that the codes set."""
 
     def __init__(self, options: ImportOptions, into: PathCollector) -> None:
-        """Begin in the modes of RS274/NGC, at an unknown place."""
+        """Begin in the modes of RS274/NGC, at an unknown position."""
         self._options, self._into = options, into
         self.coordinates = Coordinates()
-        #: G0 to G3, or G80, which ends them; empty = none has been given.
+        #: The motion code in effect, G0 to G3, or G80 (no motion); empty = none has been given.
         self.motion = ''
-        #: G17 to G19; empty = none has been given, so it is G17.
+        #: The code of the plane, G17 to G19; empty = none has been given, so G17 applies.
         self.plane = ''
         self.relative, self.relative_centre = False, True
         #: The unit of lengths [m]; None = not given yet.
@@ -44,7 +44,7 @@ class Toolpath:
         return self.unit
 
     def lengths(self, line: int, words: Mapping[str, float]) -> dict[int, float]:
-        """Return the coordinates among some words, by axis [m]."""
+        """Return the coordinates [m] among some words, by axis."""
         share = self.share_of_x or 1.0
         return {
             axis: words[name] * self.length(line) * (share if axis == 0 else 1.0)
@@ -57,7 +57,7 @@ class Toolpath:
         Carry out a motion.
 
         :param words: coordinates, and the centre or radius of an arc.
-        :raises BrokenFile: the motion is not complete, or must be a mistake.
+        :raises BrokenFile: the words do not describe a motion, or do not suit the motion code.
         """
         if self.motion == 'G80':
             raise BrokenFile(line, 'coordinates without G0, G1, G2 or G3 since G80')
@@ -145,7 +145,7 @@ class Toolpath:
         self, line: int, plane: ArcPlane, start: Sequence[float], words: Mapping[str, float]
     ) -> tuple[float, float] | float:
         """
-        Return the centre of an arc, or its radius, whichever its words give.
+        Return the centre of an arc, or else its radius, depending on the words of the line.
 
         :raises ValueError: the words are incomplete, or contradict each other.
         """

@@ -3,9 +3,9 @@
 """
 Messages as ``ros2 topic echo`` and ``rostopic echo`` print them.
 
-They are YAML, a document for each message, and consist of mappings, lists, numbers and texts only.
-Each of these values knows its line here. PyYAML only splits the text, because the wording of its
-errors and its limits on nesting differ between versions.
+Such a text is YAML with a document for each message, and consists of mappings, lists, numbers and
+texts only. In this module each of these values keeps its line. PyYAML is used only to split the
+text, because the wording of its errors and its limits on nesting differ between versions.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ import yaml
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
 
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-#: Deepest nesting; messages have about five levels.
+#: Deepest nesting of values; messages have about five levels.
 _MAX_DEPTH = 50
 _END_OF_MESSAGE = re.compile(r'^---[ \t]*$', re.MULTILINE)
 _BLANK_LINES = re.compile(r'(?:[ \t]*\n)*')
-#: The notice of a lost message: its hyphens are not on a line of their own.
+#: The notice of a lost message; the hyphens at its end are not on a line of their own.
 _LOST = re.compile(r'^A message was lost!!!\n\ttotal count change:.*\n\ttotal count:.*---$', re.M)
 #: Characters that end lines only in YAML 1.1: they would shift the numbers of lines.
 _NO_LINE_ENDS = str.maketrans('\x85\u2028\u2029', '   ')
@@ -108,7 +108,7 @@ class EchoedMessage:
         return values[0]
 
     def _no_message(self, row: int) -> BrokenFile:
-        """Return the refusal of a text that is no YAML, at the row of PyYAML's error."""
+        """Return the error for a text that is no YAML, at the row of PyYAML's error."""
         lines = self.text.split('\n')
         row = min(row, len(lines) - 1)
         if '\t' in lines[row][: len(lines[row]) - len(lines[row].lstrip())]:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The types of messages with the fields that identify them, and the treatment of fields."""
+"""The types of messages, the fields that identify each type, and the treatment of fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PATH, POSE_ARRAY = 'nav_msgs/Path', 'geometry_msgs/PoseArray'
 JOINT_TRAJECTORY = 'trajectory_msgs/JointTrajectory'
 ROBOT_TRAJECTORY = 'moveit_msgs/RobotTrajectory'
 DISPLAY_TRAJECTORY = 'moveit_msgs/DisplayTrajectory'
-#: Types of messages that have a single pose: each message is a point of the path.
+#: Types of messages with a single pose: each message becomes a point of the path.
 POSES = (
     'nav_msgs/Odometry',
     'geometry_msgs/PoseStamped',

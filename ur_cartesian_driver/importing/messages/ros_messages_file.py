@@ -3,8 +3,8 @@
 """
 Paths and joint trajectories of ROS, and streams of poses.
 
-They come as text printed by echo, or as the messages themselves. One reader reads both, because
-the parsed text has the fields of a message as attributes.
+The messages come as text that ``ros2 topic echo`` printed, or as ROS objects. One reader reads
+both forms, because the parsed text has the fields of a message as attributes.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def collect_yaml(file: Path, options: ImportOptions, into: PathCollector) -> Non
     """
     Read the first message of a file, or all messages if they are single poses.
 
-    :raises BrokenFile: the first message is of another type, or a message is broken.
+    :raises BrokenFile: the first message has neither a path nor a pose, or a message is broken.
     """
     messages = echoed_messages(file_text(file), into.remarks)
     if not messages:
@@ -136,7 +136,7 @@ def _stream(messages: Sequence[EchoedMessage], remarks: ImportNotes) -> Iterator
 
 
 def _fields(part: Any) -> Mapping[str, Any]:
-    """Return the fields of a message or of a part."""
+    """Return the fields of a message, or of a part of one."""
     if isinstance(part, MessagePart):
         return part.fields
     if hasattr(part, 'get_fields_and_field_types'):
@@ -145,7 +145,7 @@ def _fields(part: Any) -> Mapping[str, Any]:
 
 
 def _say_others(part: Any, read: Collection[str], remarks: ImportNotes, line: int = 0) -> None:
-    """Add remarks on the fields of a part that are left out, unless they are empty or zero."""
+    """Add remarks on the left-out fields of a part, except fields that are empty or zero."""
     for name, value in _fields(part).items():
         if name not in read and not _is_default(value):
             term = TERMS.get(name) or TERMS.get(f'header.{name}')
@@ -212,7 +212,7 @@ def _sequence(value: Any, name: str, line: int) -> Sequence[Any]:
 
 
 def _seconds(part: Any, line: int) -> float:
-    """Return the time of a stamp or a duration; ROS 1 has other names for its fields."""
+    """Return the time [s] of a stamp or a duration; its fields have other names in ROS 1."""
     part = _part(part, 'sec, nanosec', line)
     names = ('secs', 'nsecs') if 'secs' in _fields(part) else ('sec', 'nanosec')
     sec, nanosec = (_number(getattr(part, name), name, line) for name in names)
@@ -296,7 +296,7 @@ def _poses(items: Sequence[Any]) -> Iterator[_Pose]:
 
 
 def _say_others_of_pose(item: Any, remarks: ImportNotes) -> None:
-    """Add remarks on the fields of a pose that are left out."""
+    """Add remarks on the left-out fields of a pose."""
     _say_others(item, ('header', 'pose', 'position', 'orientation'), remarks)
     if 'header' in _fields(item):
         _say_others(item.header, _STAMPED, remarks)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The place of the arm while a program runs, as far as it follows from the file.
+The position of the arm while a program runs, as far as the file determines it.
 
-Before the first move the place is unknown, and if all moves were lines the joints still are. Most
-programs never ask for the joints, so inverse kinematics is put off until a program does.
+Before the first move the arm's position is unknown; after lines only, the joint positions still
+are. Most programs never read the joint positions, so inverse kinematics waits until one does.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 
 class ArmPlace:
-    """The place, also kept in the motion generator, which the controller's functions read."""
+    """The arm's position, also set in the motion generator for the controller's functions."""
 
     def __init__(self, controller: Controller, options: ImportOptions) -> None:
-        """Begin at an unknown place."""
+        """Begin at an unknown position."""
         self._motion, self._arm = controller.motion, options.arm
         self._model = options.arm.model.name
         self._motion.T_flange_tcp = options.T_flange_tcp
-        #: Whether the pose follows from the file, and whether the joints do.
+        #: Whether the file determines the pose; whether it also determines the joint positions.
         self.is_known = self.knows_joints = False
-        #: The last pose of the tool, and its TCP; None = the pose follows from the joints.
+        #: The last target pose, and the TCP of that pose; None = the joints give the pose.
         self._last: tuple[Pose, Pose] | None = None
-        #: Poses of the flange since the joints were last solved.
+        #: Poses of the flange for which the joint positions have not been solved yet.
         self._flange_poses: list[Pose] = []
-        #: For each TCP that was set: the line of the call, and the pose as text.
+        #: For each TCP that was set: the line of the set_tcp call, and the TCP as text.
         self.set_tcps: dict[Pose, tuple[int, str]] = {}
-        #: Joint positions that the program got for a pose; the pose is the same for any arm.
+        #: Joint positions that get_inverse_kin() returned: their pose does not depend on the arm.
         self.solutions: set[tuple[Value, ...]] = set()
 
     @property
@@ -58,7 +58,7 @@ class ArmPlace:
         return not self._flange_poses
 
     def of_arm(self, tcp: Pose) -> str:
-        """Return the clause that names the arm and the TCP assumed for joint positions."""
+        """Return a clause that names the arm and the TCP that are assumed for joint positions."""
         return f'their places are those of a {self._model} with the TCP {_text(tcp)}'
 
     def forward(self, q: Vector6, tcp: Pose) -> Pose:
@@ -80,7 +80,7 @@ class ArmPlace:
 
     def joints(self) -> Vector6:
         """
-        Return the joints, solved pose by pose with the solution nearest to the one before.
+        Return the joint positions; each pose is solved with the solution nearest to the last one.
 
         :raises RuntimeException: the arm cannot reach a pose.
         """
@@ -91,7 +91,7 @@ class ArmPlace:
 
     def solution(self, pose: Pose, near: Vector6) -> Vector6:
         """
-        Return the joints for a pose that are nearest to given joints.
+        Return the joint positions for a pose that are nearest to given ones.
 
         :raises RuntimeException: the arm cannot reach the pose.
         """
@@ -101,14 +101,14 @@ class ArmPlace:
         return q
 
     def unreachable(self, pose: str) -> str:
-        """Return the clause that says that the arm cannot reach a pose."""
+        """Return a clause that says that the arm cannot reach a pose."""
         return (
             f'a {self._model} cannot reach {pose} with the TCP {_text(self.tcp)}; name your arm '
             'and its TCP in the options'
         )
 
     def assumption(self, say: Callable[[str], None], *, of_joints: bool) -> None:
-        """Report the place that is assumed, if the file does not determine it."""
+        """Report the assumed position of the arm, if the file does not determine it."""
         if not self.is_known:
             say(
                 'where the arm stands before its first move is not in the file; '

@@ -24,10 +24,10 @@ from ur_cartesian_driver.motion.goal.goal import (
 )
 from ur_cartesian_driver.urscript import RuntimeException
 
-#: The generator of a function that takes a cycle.
+#: The generator of a URScript function that takes a controller cycle.
 Steps = Generator[None, None, None]
 
-#: Offset of outputs after a wait [s]: without an offset they would be switched before it.
+#: Offset [s] of the outputs after a wait: without an offset they would switch before the wait.
 AFTER_WAIT = 0.01
 
 
@@ -36,7 +36,7 @@ class CollectedPoint:
     """A point, which later calls can still turn into a stop."""
 
     kind: SegmentType
-    #: The pose of the active TCP; None = it follows from the joints.
+    #: The pose of the active TCP; None = the joints give the pose.
     pose: Pose | None
     joints: Vector6 | None = None
     acceleration: float
@@ -52,7 +52,7 @@ class CollectedPoint:
 
 
 class CollectedEvents:
-    """Points, outputs and waits in the order of the program; one thread moves at a time."""
+    """Points, outputs and waits in the program's order; one thread moves the arm at a time."""
 
     def __init__(self, run: RunningScript, place: ArmPlace) -> None:
         """Begin without points."""
@@ -62,7 +62,7 @@ class CollectedEvents:
         self._events: list[CollectedPoint | IOCommand | InputWait] = []
         #: The TCP of the lines and arcs; None = there are none yet.
         self._tcp: Pose | None = None
-        #: The thread that moved last, and the thread that is in a motion call.
+        #: The thread that moved the arm last; the thread that is in a motion call (None = none).
         self._mover = MAIN
         self._moving: int | None = None
 
@@ -72,13 +72,13 @@ class CollectedEvents:
 
     @property
     def acts(self) -> bool:
-        """Whether the running thread moved last, or is the main one and that thread has ended."""
+        """Whether the running thread moved last, or is the main one and the mover has ended."""
         thread = self.run.thread
         return thread == self._mover or (thread == MAIN and not self.run.lives(self._mover))
 
     @property
     def is_mover(self) -> bool:
-        """Whether the running thread moved last."""
+        """Whether the running thread moved the arm last."""
         return self.last is not None and self.run.thread == self._mover
 
     def take(self) -> None:
@@ -102,7 +102,7 @@ class CollectedEvents:
         """
         Add a point.
 
-        :raises RuntimeException: the move is of another TCP than the lines before it.
+        :raises RuntimeException: the active TCP differs from that of the previous lines.
         """
         if point.joints is None:
             if self._tcp not in (None, self.place.tcp):
@@ -137,7 +137,7 @@ class CollectedEvents:
         """
         Wait for an input at the last point.
 
-        :raises RuntimeException: a goal cannot wait after another wait or a delayed output.
+        :raises RuntimeException: another wait or a delayed output comes first at the same point.
         """
         point = self.last
         if point is None:
@@ -154,7 +154,7 @@ class CollectedEvents:
         self._events.append(wait)
 
     def switch(self, output: IOCommand) -> None:
-        """Switch an output at the last point, after the waits there."""
+        """Switch an output at the last point, after the rest and the waits there."""
         if not self.acts:
             self.run.say(
                 'an output', 'when a thread switches it beside the moves is not in the file'
@@ -174,7 +174,7 @@ class CollectedEvents:
         self._events.append(replace(output, offset=offset))
 
     def hand_over(self, into: PathCollector) -> None:
-        """Hand over all events; joint positions become poses of the TCP of the lines."""
+        """Add all events to a path; joint positions become poses of the TCP of the lines."""
         tcp = self.place.tcp if self._tcp is None else self._tcp
         if (found := self.place.set_tcps.get(tcp)) is not None:
             line, pose = found

@@ -3,7 +3,7 @@
 """
 The moves of programs: each method is a URScript function whose target becomes a point.
 
-A move reaches its target at once, and takes one cycle.
+Here each move reaches its target at once, and takes one controller cycle.
 """
 
 from __future__ import annotations
@@ -40,11 +40,12 @@ from ur_cartesian_driver.sim.simulator_config import TURN_RATIO
 from ur_cartesian_driver.urscript import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
 
-#: Defaults of the manual for the tool [m/s^2, m/s], and for fractions of the arm's limits.
+#: The manual's defaults: acceleration [m/s^2] and speed [m/s] of the tool; fraction of the arm's
+#: limits, for optimovej and optimovel.
 TOOL_A, TOOL_V, FRACTION = 1.2, 0.25, 0.3
-#: Larger lengths [m] and angles [rad] must be meant in millimetres and degrees.
+#: A larger length [m] must be meant in millimetres, and a larger angle [rad] in degrees.
 FAR, MAX_ANGLE = 3.0, 12.6
-#: Joints that turn by less than this stand still [rad].
+#: Joints that turn by less than this angle [rad] do not move.
 SAME_ANGLE = 1e-6
 
 #: Acceleration and speed, as a program gives them.
@@ -55,7 +56,7 @@ class MoveFunctions:
     """Moves and stops."""
 
     def __init__(self, events: CollectedEvents) -> None:
-        """Collect into these events."""
+        """Collect points into ``events``."""
         self._events, self._place, self._run = events, events.place, events.run
 
     def movej(
@@ -148,7 +149,7 @@ class MoveFunctions:
         else:
             pose, joints = None, self._angles(name, six(q, 'q'))
         length = None
-        # Solving the joints takes inverse kinematics of all poses since they were last solved.
+        # place.joints() solves all poses since the last solution, so it is called only if needed.
         if (
             joints is not None
             and place.knows_joints
@@ -188,7 +189,7 @@ class MoveFunctions:
                 here = self._place.pose
                 length = max(here.distance_to(target), here.angle_to(target) / TURN_RATIO)
                 if kind is SegmentType.LINEAR and here.distance_to(target) < SAME_POINT:
-                    # The tool only turns: the rates are in rad in a goal, and 4 rad are a metre.
+                    # The tool only turns: a goal then has rates in rad; 4 rad last as long as 1 m.
                     unit = TURN_RATIO
             a, v = self._rates(name, rates, length, time, blend, (TOOL_A, TOOL_V))
             self._events.add(
@@ -200,7 +201,7 @@ class MoveFunctions:
         yield from self._events.moved()
 
     def _is_here(self, pose: Pose) -> bool:
-        """Return whether a pose is the known place of the tool."""
+        """Return whether the tool is known to be at a pose already."""
         here = self._place.pose
         return (
             self._place.is_known
@@ -218,7 +219,7 @@ class MoveFunctions:
         defaults: tuple[float, float],
     ) -> tuple[float, float]:
         """
-        Return acceleration and speed; if a time is given, those with which the move takes it.
+        Return acceleration and speed; with a time, those at which the move takes that time.
 
         The robot stretches the trapezoid of `a` and `v` to the time, as recordings of a UR3 show.
         """
@@ -242,7 +243,7 @@ class MoveFunctions:
         return a * stretch * stretch, v * stretch
 
     def _pose(self, name: str, value: Value) -> Pose:
-        """Return the pose of a target, which can also be joint positions."""
+        """Return the pose of a target that is given as a pose or as joint positions."""
         if not is_pose(value):
             tcp = self._place.tcp
             self._run.say('joint positions', self._place.of_arm(tcp))

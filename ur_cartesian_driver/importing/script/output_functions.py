@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rests, outputs, and waits for inputs: each method is a function that programs call."""
+"""Rests, outputs, and waits for inputs: each method is a URScript function."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class OutputFunctions:
     """Sleeps, waits and outputs of a program, which can read its own outputs back."""
 
     def __init__(self, events: CollectedEvents, controller: Controller) -> None:
-        """Collect into these events."""
+        """Collect outputs and waits into ``events``."""
         self._events, self._controller = events, controller
         self._domains: dict[int, AnalogDomain] = {}
 
@@ -41,10 +41,10 @@ class OutputFunctions:
         yield
 
     def wait_for_input(self, function: Value, n: Value, level: Value) -> Steps:
-        """Wait for a digital input, in place of a loop that waits for it."""
+        """Wait for a digital input; a call of this replaces a loop that waits for the input."""
         while not self._events.acts:
             yield
-        if function == 'get_digital_in':  # the old numbering: 8 and 9 are on the tool
+        if function == 'get_digital_in':  # the old numbering: pins 8 and 9 are on the tool
             pin = index(n, 'n', 10)
             kind = InputKind.STANDARD_DIGITAL if pin < 8 else InputKind.TOOL_DIGITAL
             pin %= 8
@@ -59,21 +59,21 @@ class OutputFunctions:
         yield
 
     def set_digital_out(self, n: Value, b: Value) -> None:
-        """Switch an output by its old number: 8 and 9 are on the tool."""
+        """Switch an output by its old number: outputs 8 and 9 are on the tool."""
         pin = index(n, 'n', 10)
         kind = OutputKind.STANDARD_DIGITAL if pin < 8 else OutputKind.TOOL_DIGITAL
         self._switch(kind, pin % 8, b)
 
     def set_standard_digital_out(self, n: Value, b: Value) -> None:
-        """Switch an output."""
+        """Switch a standard output."""
         self._switch(OutputKind.STANDARD_DIGITAL, index(n, 'n', 8), b)
 
     def set_configurable_digital_out(self, n: Value, b: Value) -> None:
-        """Switch an output."""
+        """Switch a configurable output."""
         self._switch(OutputKind.CONFIGURABLE_DIGITAL, index(n, 'n', 8), b)
 
     def set_tool_digital_out(self, n: Value, b: Value) -> None:
-        """Switch an output."""
+        """Switch an output of the tool."""
         self._switch(OutputKind.TOOL_DIGITAL, index(n, 'n', 2), b)
 
     def _switch(self, kind: OutputKind, pin: int, b: Value) -> None:
@@ -84,7 +84,7 @@ class OutputFunctions:
         )
 
     def set_standard_analog_out(self, n: Value, f: Value) -> None:
-        """Set an output to a fraction of its range."""
+        """Set an analog output to a fraction of its range."""
         pin, value = index(n, 'n', 2), within(f, 'f', 0, 1)
         self._controller.io.set_analog_out(pin, value)
         if pin not in self._domains:

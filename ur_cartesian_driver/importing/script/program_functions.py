@@ -3,9 +3,9 @@
 """
 All functions that a program can call, each treated as the table of terms says.
 
-Honoured functions that neither move nor switch run in the simulated controller, which computes
-their values. Functions that are left out also run there unless they take time, so that wrong
-arguments are found.
+Honoured functions that neither move the arm nor switch outputs run in the simulated controller,
+which computes their values. Functions that are left out also run there, so that wrong arguments
+are found, unless they take time; socket functions run there even if they take time.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from ur_cartesian_driver.urscript import (
 
 #: After this many cycles without an event, no more events are expected from other threads.
 QUIET_CYCLES = 500
-#: Functions that read the arm need its pose, or its joints as well.
+#: The functions that read the arm, and what each needs: only the pose, or the joints as well.
 _POSE, _JOINTS = False, True
 _READERS = {
     'get_actual_tcp_pose': _POSE,
@@ -60,7 +60,7 @@ _READERS = {
 
 
 class NoPeer:
-    """Sockets to a peer that accepts all data and hangs up when the program reads from it."""
+    """Sockets whose peer accepts all data, and hangs up when the program reads."""
 
     def __init__(self) -> None:
         """Begin without sockets."""
@@ -71,7 +71,7 @@ class NoPeer:
         self._open.add(name)
 
     def state(self, name: str) -> SocketState:
-        """Return OPEN until the socket is read from, else CLOSED."""
+        """Return OPEN until the program reads from the socket, then CLOSED."""
         return SocketState.OPEN if name in self._open else SocketState.CLOSED
 
     def received(self, name: str) -> bytearray:
@@ -105,7 +105,7 @@ class ProgramFunctions:
     """The functions of one program."""
 
     def __init__(self, events: CollectedEvents, controller: Controller) -> None:
-        """Collect into these events."""
+        """Collect points, outputs and waits into ``events``."""
         self._events, self._controller = events, controller
         self._run, self._place = events.run, events.place
 
@@ -171,7 +171,7 @@ class ProgramFunctions:
     # ---- the arm -------------------------------------------------------------------------------
 
     def _reader(self, name: str, does: Any) -> Any:
-        """Wrap a function so that it first reports the place of the arm if that is assumed."""
+        """Wrap a function so that it first reports the arm's position if that is only assumed."""
         place, of_joints, signature = self._place, _READERS[name], inspect.signature(does)
 
         @functools.wraps(does)
@@ -203,7 +203,7 @@ class ProgramFunctions:
         return script_pose(self._place.pose @ self._place.tcp.inverse())
 
     def _set_tcp(self, pose: Value, tcp_name: Value = '') -> None:
-        """Change the TCP, and keep the line for a remark: the robot has to have this TCP, too."""
+        """Change the TCP, and keep the line for a remark: the robot must have the same TCP."""
         offset = (
             Pose.from_rotation_vector(six(pose, 'pose')) if any(six(pose, 'pose')) else IDENTITY
         )
@@ -214,7 +214,7 @@ class ProgramFunctions:
     # ---- loops without an end ------------------------------------------------------------------
 
     def _end_of_round(self) -> Steps:
-        """End the program, or a thread that has moved, after one round of an endless loop."""
+        """End the program, or the thread that moved last, after one round of an endless loop."""
         run, events = self._run, self._events
         interpreter = run.interpreter
         assert interpreter is not None

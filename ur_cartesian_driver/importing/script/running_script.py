@@ -13,14 +13,14 @@ MAIN = 0
 
 
 class RunningScript:
-    """The program, as its functions see it."""
+    """The program, as the functions that it calls see it."""
 
     def __init__(self) -> None:
         """Begin before the program is compiled."""
         self.interpreter: ScriptInterpreter | None = None
-        #: A clause on the last call whose value can be different on a robot; empty = none.
+        #: A clause on the last call whose value can differ from that on a robot; empty = none.
         self._assumed = ''
-        #: The subjects and the lines of the remarks, by reason.
+        #: The subjects and the lines of the remarks, by the reason that the remarks give.
         self._said: dict[str, tuple[dict[str, None], set[int]]] = {}
 
     @property
@@ -51,7 +51,7 @@ class RunningScript:
         self.say(what, why)
 
     def suspicion(self, before: str) -> str:
-        """Return a text and a possible reason for a failure or an endless loop; empty = none."""
+        """Return `before` and a possible reason for a failure or endless loop; empty = none."""
         return f'{before}{self._assumed}' if self._assumed else ''
 
     def tell(self, remarks: ImportNotes) -> None:

@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The program in a file, whatever surrounds it, with marks at the loops that would not end here.
+Extracts the program from a file, and marks the loops that would not end here.
 
-A file holds one program, as a controller accepts it; functions and statements, as PolyScope
-inserts them into a program of its own; a program and a call of it; or only functions. An endless
-loop gets a call of :data:`END_OF_ROUND`, and a call of :data:`WAIT` replaces a loop that waits for
-an input: functions with names that no program can write.
+A file contains a program, as a controller accepts it; or functions and statements, as PolyScope
+inserts them into its own programs; or a program and a call of it; or only functions. A call of
+:data:`END_OF_ROUND` is added to each endless loop, and a call of :data:`WAIT` replaces a loop that
+waits for an input. The names of these functions begin with a blank, so that no program can define
+them.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ from ur_cartesian_driver.urscript.script_values import truth
 
 END_OF_ROUND, WAIT, PAUSE = ' end of round', ' wait', ' pause'
 
-#: A file whose first statement is a secondary program.
+#: Matches a file whose first statement is a secondary program.
 _SECONDARY = re.compile(r'(?:\s|#.*\n)*(sec)\s+\w+\s*\(')
-#: Nodes without statements in them.
+#: Nodes that contain no statements.
 _SIMPLE = (Expression, CallStatement, AssignStatement, LabelStatement)
-#: Inputs that a program can wait for.
+#: Functions that read the inputs for which a loop can wait.
 _INPUTS = (
     'get_standard_digital_in',
     'get_configurable_digital_in',
@@ -88,7 +89,7 @@ def _main(program: ScriptProgram) -> tuple[Statement, ...]:
     if not functions:
         return program.body
     if len(functions) == 1 and not functions[0].parameters:
-        # To a controller, the only function is the program, whose variables are global.
+        # A controller takes the only function as the program, and its variables as global.
         only = functions[0]
         if not statements or (len(statements) == 1 and _calls(statements[0]) == [only.name]):
             others = (node for node in program.body if node not in (only, *statements))
@@ -102,7 +103,7 @@ def _only_root(functions: list[FunctionDefinition]) -> FunctionDefinition:
     """
     Return the only function that no function calls; it must have no parameters.
 
-    :raises BrokenFile: it has parameters, or there is not exactly one such function.
+    :raises BrokenFile: the function has parameters, or there is not exactly one such function.
     """
     called = {name for function in functions for node in function.body for name in _calls(node)}
     roots = [function for function in functions if function.name not in called]
@@ -129,7 +130,7 @@ def _calls(node: SyntaxNode) -> list[str]:
 
 
 def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
-    """Return a call at the place of a node: of a named function, or else of the node's own."""
+    """Return a call, at the position of a node, of a named function or else of the node itself."""
     place = {'line': node.line, 'column': node.column}
     given = tuple(CallArgument(name=None, value=value, **place) for value in arguments)
     return CallStatement(
@@ -138,7 +139,7 @@ def _call(node: Any, name: str = '', *arguments: Expression) -> CallStatement:
 
 
 def _without_waiting(node: SyntaxNode) -> Any:
-    """Return a statement with calls in place of waits, and of END_OF_ROUND in endless loops."""
+    """Return a statement with calls in place of waits, and END_OF_ROUND in endless loops."""
     if isinstance(node, PauseStatement):
         return _call(node, PAUSE)
     if isinstance(node, WhileStatement):
@@ -159,7 +160,7 @@ def _without_waiting(node: SyntaxNode) -> Any:
 
 
 def _is_endless(loop: WhileStatement) -> bool:
-    """Return whether a loop's condition is always true, and no statement leaves a round early."""
+    """Return whether a loop's condition is always true, and no statement ends a round early."""
     condition = loop.condition
     return (
         isinstance(condition, ConstantExpression)

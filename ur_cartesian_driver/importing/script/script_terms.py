@@ -16,7 +16,7 @@ from ur_cartesian_driver.importing.import_format import (
     term_table,
 )
 
-#: The topics whose terms are no functions.
+#: The topics whose terms are not functions.
 STATEMENTS, PARAMETERS = 'statements', 'parameters of moves'
 
 _IDLE = 'its value is not in the file; an idle robot is read, and the path may depend on that'
@@ -249,7 +249,7 @@ TERMS = term_table(
     ),
 )
 
-#: Reasons of functions whose value here differs from that on a robot.
+#: The reasons to leave out functions whose values here can differ from those on a robot.
 ASSUMED = frozenset({_IDLE, _UNANSWERED, TERMS['random'].reason})
 #: The functions, by name.
 FUNCTIONS = {

@@ -3,9 +3,9 @@
 """
 URScript: the program runs in our interpreter, on an arm that reaches each target at once.
 
-So variables, loops, functions and relative poses work as on the controller, and the targets of
-moves are collected. Nothing waits for the arm or for a person, and inputs have the values of an
-arm to which nothing is connected.
+So variables, loops, functions and relative poses work as on the controller; the targets of moves
+are collected as points. Nothing waits for the arm or for a person, and inputs have the values of a
+robot to which nothing is connected.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript import CompileError, ScriptInterpreter
 from ur_cartesian_driver.urscript.running.script_interpreter import BUDGET_EXCEEDED
 
-#: A program beyond these bounds probably does not end: cycles, points, nodes of the syntax tree.
+#: A program probably does not end if it has more cycles, more points (with outputs and waits), or
+#: more evaluated nodes of the syntax tree than this.
 MAX_CYCLES, MAX_POINTS, MAX_NODES = 100_000, 100_000, 10_000_000
-#: Bound on the nodes that a thread evaluates between two moves. A block of statements is paid for
-#: as a whole, and slicers write long ones.
+#: Largest number of nodes that a thread evaluates between two moves: entering a block pays for all
+#: of its statements, and slicers write long blocks.
 MAX_NODES_AT_ONCE = 5_000_000
 
 
@@ -41,7 +42,7 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
 
     :raises BrokenFile: the file has no program, or the program fails or does not end.
     """
-    # Ends of lines other than LF would change the numbers of lines.
+    # The parser counts only LF as the end of a line; other line ends would shift its line numbers.
     program = parsed('\n'.join(file_lines(file_text(file))))
     arm = options.arm
     controller = Controller(
@@ -64,7 +65,7 @@ def collect_urscript(file: Path, options: ImportOptions, into: PathCollector) ->
     line = 0
     for _ in range(MAX_CYCLES):
         interpreter.step()
-        # Advance the clock for programs that wait; nothing moves.
+        # Advance the clock, for programs that wait; nothing moves.
         controller.cycles += 1
         line = interpreter.main_location[0]
         if interpreter.error is not None:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers and times in the cells of a table; an error names the row of any other cell."""
+"""The numbers and times in the cells of a table; for any other cell, an error names the row."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ur_cartesian_driver.importing.tables.column_names import POSITION, ROLES
 from ur_cartesian_driver.importing.tables.table_columns import Column
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
-#: A number of a table; Python's float() also accepts underscores, digits of other scripts, nan.
+#: Matches a number; Python's float() also accepts underscores, digits of other scripts, and nan.
 _NUMBER = re.compile(r'\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?\s*', re.IGNORECASE | re.ASCII)
-#: All numbers are smaller: even the ns since 1970 have only 19 digits.
+#: All numbers of a table are smaller: even the ns since 1970 have only 19 digits.
 _MAX_NUMBER = 1e30
 _NO_CHARACTER_OF_IT = re.compile(r'[^-+.0-9eE \t]')
 #: In a text with one cell on each line: a cell with thousands separators, and a cell whose comma
 #: must separate decimals. The comma in 1,234 could be either.
 _WITH_THOUSANDS = re.compile(r'[.,][^\n,.]*,|,[^\n,.]*\.')
 _CERTAIN_COMMA = re.compile(r'^(?!\s*[-+]?[1-9]\d{0,2},\d{3}\s*$).*,.*$', re.MULTILINE | re.ASCII)
-#: A time of day has two colons; 01:30 could be minutes and seconds.
+#: Matches a time of day with two colons; 01:30 could be minutes and seconds.
 _MOMENT = re.compile(r'\d:\d\d:\d')
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 #: Above these bounds a time without a unit is in ns, us or ms since 1970: in seconds it would be
@@ -79,7 +79,7 @@ def _times(
     column: Column, cells: Sequence[str], lines: Sequence[int], remarks: ImportNotes
 ) -> Floats:
     """
-    Return the times of a column in its unit: numbers, or dates and times of day.
+    Return the times of a column in its unit; the cells are numbers, or dates and times of day.
 
     :raises BrokenFile: a cell is neither.
     """
@@ -115,7 +115,7 @@ def _seconds(cell: str, line: int) -> float:
 
 def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[Column, list[str]]:
     """
-    Return the cells with decimal points in place of decimal commas.
+    Return the cells, with decimal points in place of decimal commas.
 
     :raises BrokenFile: cells have or may have thousands separators, or mix points and commas.
     """
@@ -141,7 +141,7 @@ def _with_points(texts: dict[Column, list[str]], lines: Sequence[int]) -> dict[C
             'comma; write points everywhere',
         )
     if _CERTAIN_COMMA.search(joined) is None and all(
-        # The comma can separate thousands only if the points are then still within reach.
+        # The comma can separate thousands only if all points are then within reach of an arm.
         abs(float(cell.replace(',', ''))) * column.factor < MAX_DISTANCE
         for column in numeric
         if column.role in ROLES[POSITION]

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Names of columns, as programs write them, and their meaning.
+The names that programs give to columns, and the meaning of these names.
 
 A term is a group of columns that belong together, such as ``qx, qy, qz, qw``. Case, blanks, ``_``,
 ``.``, ``/`` and ``-`` make no difference: ``Pos X`` and ``pos_x`` are the same name. A path of
@@ -33,7 +33,7 @@ BLEND = 'radius of the blend'
 OTHER = 'others'
 
 _XYZ, _RXYZ, _QXYZW = ('x', 'y', 'z'), ('rx', 'ry', 'rz'), ('qx', 'qy', 'qz', 'qw')
-#: The roles of the columns of a group.
+#: The roles of the columns in a group, by the topic of the group.
 ROLES: Mapping[str, tuple[str, ...]] = {
     POSITION: _XYZ,
     POSE: (*_XYZ, *_RXYZ),
@@ -48,7 +48,7 @@ ROLES: Mapping[str, tuple[str, ...]] = {
     SPEED: ('speed',),
     BLEND: ('blend',),
 }
-#: The kinds of values of which a table has only one, by the first role of their group.
+#: Kinds of values, by the first role of their group; only one group of a kind is used.
 KINDS = {
     'x': 'position',
     'qx': 'orientation',
@@ -67,7 +67,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     **dict.fromkeys(('t', 'sec', 'nanosec'), Quantity.TIME),
     'speed': Quantity.SPEED,
 }
-#: Units that follow from the program that writes such columns, if the header has none.
+#: The units that the programs that write these columns use; they apply if the header has none.
 FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
     POSE: {**dict.fromkeys(_XYZ, 'm'), **dict.fromkeys(_RXYZ, 'rad')},
     ROS_POSE: dict.fromkeys(_XYZ, 'm'),
@@ -77,8 +77,8 @@ FIXED_UNITS: Mapping[str, Mapping[str, str]] = {
 
 
 _WORDS = 'a path has no such quantity'
-#: Braces mean each of their letters in turn. Of groups that give the same kind of values, the
-#: first one in TERMS is used.
+#: The braces mean each letter within them in turn. Of several groups with the same kind of values,
+#: the first one in TERMS is used.
 TERMS = term_table(
     honoured(
         POSITION,
@@ -147,20 +147,20 @@ _UNIT_BEHIND = re.compile(r'[\s_/,:]+(?:in\s+)?')
 
 
 def letters(name: str) -> str:
-    """Return the letters of a name that make a difference."""
+    """Return the significant characters of a name, in lower case."""
     name = name.strip().lower().lstrip('%#/_ ')
     return re.sub(r'[\s_./]+|(?<=\w)-(?=\w)', '', name)
 
 
 def _columns(term: str) -> Iterator[str]:
-    """Yield the letters of the columns of a term."""
+    """Yield the significant characters of each column of a term."""
     for name in term.split(', '):
         before, _, rest = name.partition('{')
         axes, _, behind = rest.partition('}')
         yield from (letters(before + axis + behind) for axis in axes or [''])
 
 
-#: The letters of the columns of each term.
+#: The significant characters of the columns of each term.
 COLUMNS: Mapping[str, tuple[str, ...]] = {name: tuple(_columns(name)) for name in TERMS}
 _KNOWN = frozenset(column for columns in COLUMNS.values() for column in columns)
 _ORIENTATIONS = frozenset(
@@ -175,7 +175,7 @@ _ORIENTATIONS = frozenset(
 class Title:
     """A title of a column, split into name and unit."""
 
-    #: The letters of a name in the table of terms; empty = the name is not known.
+    #: The significant characters of a name in the table of terms; empty = an unknown name.
     name: str
     unit: str
     #: The title as the file has it.
@@ -196,13 +196,13 @@ def read_title(text: str) -> Title:
 
 
 def _known(name: str) -> str:
-    """Return the letters of a known name, or of the known end of a path; empty = not known."""
+    """Return the significant characters of a name or its path's end; empty = both are unknown."""
     ends = (name, '.'.join(re.split(r'[./]', name)[-2:]))
     return next((found for end in ends if (found := letters(end)) in _KNOWN), '')
 
 
 def is_orientation(title: Title) -> bool:
-    """Return whether a title means an orientation or a normal, by a known name or its words."""
+    """Return whether a title's name or words mean an orientation or a normal."""
     words = re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])', title.text)
     return title.name in _ORIENTATIONS or not _ORIENTATION_WORDS.isdisjoint(
         word.lower() for word in words

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Units of columns, as programs write them into headers."""
+"""The units of columns, in the spellings that programs use in headers."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ UNITS: Mapping[Quantity, Mapping[str, float]] = {
 
 
 def plain_unit(text: str) -> str:
-    """Return a unit as :data:`UNITS` names it, or the text in lower case if it is none of them."""
-    # NFKC: the micro sign becomes the Greek letter, superscripts become digits.
+    """Return the name of a unit in :data:`UNITS`; for an unknown unit, its text in lower case."""
+    # NFKC turns the micro sign into the Greek letter, and superscripts into digits.
     text = unicodedata.normalize('NFKC', text).strip().lower()
     parts = text.replace('_per_', '/').replace(' per ', '/').replace('_', '/').split('/')
     return '/'.join(_SYNONYMS.get(part.strip(), part.strip()) for part in parts)

@@ -3,8 +3,8 @@
 """
 A table with named columns: CSV of scanners, spreadsheets, recorders and our own scripts.
 
-The header names the columns, with their units: ``x [mm]``, ``x(mm)`` or ``x_mm``. If commas do
-not separate the columns, numbers can have decimal commas.
+The header names the columns, with their units: ``x [mm]``, ``x(mm)`` or ``x_mm``. If the columns
+are not separated by commas, the numbers can have decimal commas.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import multiply_rows, normali
 from ur_cartesian_driver.motion.geometry.rotation_rows import exp_rows
 from ur_cartesian_driver.motion.goal.goal_table import rows_where
 
-#: Larger turns [rad] must be in degrees.
+#: A larger angle [rad] must be meant in degrees.
 _MAX_TURN = 4.0 * np.pi
 
 
@@ -91,9 +91,9 @@ def _rows(values: Mapping[str, Floats], roles: Sequence[str]) -> Floats | None:
 
 def _orientations(values: Mapping[str, Floats], lines: Sequence[int]) -> Floats | None:
     """
-    Return the unit quaternions (n, 4) of a table that has orientations.
+    Return the unit quaternions (n, 4) of a table; None = the table has no orientations.
 
-    :raises BrokenFile: a row has no unit quaternion, or turns by too much.
+    :raises BrokenFile: the quaternion of a row is not of length 1, or an angle is too large.
     """
     if (quaternions := _rows(values, ROLES[QUATERNION])) is not None:
         lengths = np.linalg.norm(quaternions, axis=1)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The columns of a table from which a path is made, with their units; remarks name all others."""
+"""Finds the columns of a table that make a path, and their units; remarks name all others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ur_cartesian_driver.importing.tables.column_names import (
 from ur_cartesian_driver.importing.tables.column_units import plain_unit, Quantity, UNITS
 
 _POSITION, _ORIENTATION, _NORMAL = 'position', 'orientation', 'normal'
-#: Kinds of values that an option replaces, with the reason.
+#: Kinds of values that an orientation option replaces, with the reason for the remark.
 _REPLACED: Mapping[ToolOrientation, Mapping[str, str]] = {
     ToolOrientation.FILE: {},
     ToolOrientation.NORMALS: {_ORIENTATION: 'the tool is to point against the normals'},
@@ -37,7 +37,7 @@ _REMEDY = (
     'name them qx, qy, qz, qw, or rx, ry, rz [rad], or roll, pitch, yaw [deg], or give the option '
     'orientation'
 )
-#: Units of columns for which the file gives none; a length or a speed has to have one.
+#: Units of columns without a unit in the file; a length or a speed must have one there.
 _DEFAULT_UNITS = {Quantity.TIME: 's', Quantity.PURE: '-'}
 
 
@@ -51,7 +51,7 @@ class Column:
     #: The factor from the unit of the column to SI.
     factor: float
     title: str
-    #: Whether the unit is known from the header or from the program that wrote the file.
+    #: Whether the header gives the unit, or the program that writes such columns determines it.
     has_unit: bool
 
 
@@ -74,7 +74,7 @@ def find_columns(
     :param texts: the titles in the header.
     :param units: the units in a second line of the header; empty = there is no such line.
     :param line: the line of the header.
-    :raises BrokenFile: a column is missing, occurs twice, or cannot be read for sure.
+    :raises BrokenFile: a column is missing, occurs twice, or has no certain unit or meaning.
     """
     titles = [read_title(text) for text in texts]
     names = [title.name for title in titles]
@@ -112,7 +112,7 @@ def find_columns(
     return taken
 
 
-#: The kinds of numbers in the groups of columns, by the names of their terms.
+#: The kinds of values in each group of columns, by the name of the group's term.
 _KINDS = {
     name: [KINDS[role] for role in ROLES[term.topic] if role in KINDS]
     for name, term in TERMS.items()
@@ -129,7 +129,7 @@ def _listed(titles: Sequence[Title]) -> str:
 
 
 def _names(titles: Sequence[Title]) -> str:
-    """Return titles with commas; numbered ones become ranges, as RTDE has over a hundred."""
+    """Return titles with commas between them; numbered titles become ranges: RTDE has over 100."""
     runs: list[list[str]] = []
     for title in titles:
         stem = title.text.rstrip('0123456789')
@@ -151,7 +151,7 @@ def _refuse_header(titles: Sequence[Title], line: int) -> NoReturn:
 
 
 def _missing(names: set[str], kind: str) -> str:
-    """Return the first missing column of the group with the most columns in the table."""
+    """Return the first missing column of the group of which the table has the most columns."""
     groups = [COLUMNS[term] for term, kinds in _KINDS.items() if kinds[0] == kind]
     best = max(groups, key=lambda columns: len(names.intersection(columns)))
     return next(column for column in best if column not in names)
@@ -163,7 +163,7 @@ def _say_others(
     """
     Add remarks on the columns that are left out.
 
-    :raises BrokenFile: such a column could be the orientation, and there is no other orientation.
+    :raises BrokenFile: a left-out column could be an orientation, and there is no other.
     """
     oriented = reasons.get(_ORIENTATION) or reasons.get(_NORMAL)
     for name, columns in COLUMNS.items():
@@ -189,7 +189,7 @@ def _say_others(
 
 
 def _refuse_orientation(titles: Sequence[Title], line: int) -> NoReturn:
-    """Refuse columns that are a part of an orientation or a normal, or seem so by their names."""
+    """Refuse columns that are, or seem by their names to be, part of an orientation or normal."""
     names = {title.name for title in titles}
     kind = next((k for k in (_ORIENTATION, _NORMAL) if _parts(k) & names), '')
     why = f'the column {_missing(names, kind)!r} is missing' if kind else 'the name is not known'
@@ -197,7 +197,7 @@ def _refuse_orientation(titles: Sequence[Title], line: int) -> NoReturn:
 
 
 def _parts(kind: str) -> set[str]:
-    """Return all columns in the groups of a kind."""
+    """Return the columns of all groups that have only values of a kind."""
     return {
         column for term, kinds in _KINDS.items() if kinds == [kind] for column in COLUMNS[term]
     }

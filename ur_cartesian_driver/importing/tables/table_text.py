@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Header and rows of a table, in the dialects that programs write.
+The header and rows of a table, in the dialects that programs write.
 
 Columns are separated by semicolons, tabs, commas or blanks; rows and header can have different
-separators, because numpy.savetxt writes the header as it was given. The header is the first line
-that names a position and is no comment. If the rows begin before such a line, the header is the
-last comment before them that names a position.
+separators, because numpy.savetxt writes a header without changing it. The header is the first line
+that names a position and is not a comment. If the rows begin before such a line, the header is the
+last comment before the rows that names a position.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import string
 from ur_cartesian_driver.importing.imported_path import BrokenFile, ImportNotes
 from ur_cartesian_driver.importing.tables.column_units import is_unit
 
-#: None = any number of blanks.
+#: The separators of columns; None = any number of blanks.
 _DELIMITERS = (';', '\t', ',', None)
 _COMMENT = re.compile(r'\s*(?:#|%|//)[#%/\s]*')
 _FIRST_LINE_OF_EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
-#: A title, with its unit in brackets, in a header whose titles are separated by blanks.
+#: Matches a title and its unit in brackets, in a header with blanks between the titles.
 _TITLE = re.compile(r'"[^"]*"|[^\s"]+(?:\s+[\[(][^\])]*[\])])?')
-#: The number of lines in which the header is looked for.
+#: The number of lines among which the header is searched for.
 _MAX_PREAMBLE = 200
 _SAMPLES = {
     3: 'x [mm],y [mm],z [mm]',
@@ -56,7 +56,8 @@ class Table:
         """
         Yield the line number and the cells of each row.
 
-        :raises BrokenFile: the number of cells of a row and of the header differ.
+        :raises BrokenFile: a row has another number of cells than the header, or bad quotation
+            marks.
         """
         width, delimiter = len(self.titles), self.delimiter
         # A spreadsheet ends with rows of empty cells.
@@ -75,7 +76,7 @@ class Table:
             yield number, cells
 
     def _wrong_width(self, line: str, width: int) -> str:
-        """Return the sentence about a row whose number of columns differs from the header's."""
+        """Return the message about a row that has more or fewer columns than the header."""
         why = f'it has {width} column{"s" * (width != 1)}, but the header has {len(self.titles)}'
         if self.delimiter == ',' and width > len(self.titles) and '.' not in line:
             why += '; numbers with decimal commas need semicolons or tabs between them'
@@ -90,7 +91,7 @@ def read_table(
 
     :param is_header: returns whether titles name a position.
     :param unit: the unit for three columns without a header; empty = such a table is refused.
-    :raises BrokenFile: there is no header.
+    :raises BrokenFile: the file is empty, or has only numbers whose meaning is not known.
     """
     delimiters: tuple[str | None, ...] = _DELIMITERS
     header, before = None, []
@@ -128,7 +129,7 @@ def _with_rows(
     for number, text in itertools.islice(rows, 2):
         split = {d: [cell.strip() for cell in _cells(text, d)] for d in order}
         fitting = [d for d in order if _fits(split[d], len(table.titles))]
-        # If none fits, the error about the width is for a delimiter that is in the row.
+        # If no delimiter fits, the later error about the width is for one that is in the row.
         table.delimiter = next(iter(fitting), next((d for d in order if d and d in text), None))
         if table.units or not (fitting and _are_units(split[table.delimiter])):
             break
@@ -137,7 +138,7 @@ def _with_rows(
 
 
 def _fits(cells: list[str], width: int) -> bool:
-    """Return whether a row has a number of cells, or one more cell that is empty."""
+    """Return whether a row has ``width`` cells, or one more that is empty, at its end."""
     return bool(cells) and len(cells) - (not cells[-1]) <= width <= len(cells)
 
 
@@ -188,7 +189,7 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
     if '"' not in line:
         return line.split(delimiter)
     if delimiter is None:
-        # With this delimiter the reader treats several blanks as one.
+        # With this delimiter and skipinitialspace, the reader treats several blanks as one.
         line, delimiter = line.expandtabs(1).strip(), ' '
     try:
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
@@ -211,7 +212,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Return whether a row is a second line of the header, with the units."""
+    """Return whether a row is a second line of the header, which gives the units."""
     units = [cell.strip(' []()') for cell in cells]
     return any(is_unit(unit) and unit != '1' for unit in units) and all(
         not unit or is_unit(unit) for unit in units

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Types of numpy arrays by the type of their numbers; docstrings add shapes and units."""
+"""Names for the types of numpy arrays, by element type; docstrings state shapes and units."""
 
 from __future__ import annotations
 

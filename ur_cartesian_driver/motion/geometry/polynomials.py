@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Polynomials between two states, in rows: for positions of the tool, its turns, and the joints.
+Polynomials that join two states of a motion: of tool positions, tool rotations or joints.
 
-Coefficients have the shape (n, 6 powers, k quantities); the variable is the time since the piece
-began [s].
+Each row is one piece of a motion: coefficients have the shape (n pieces, 6 powers, k quantities),
+and the variable is the time since the piece began [s].
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class MotionRows(NamedTuple):
 
 def cubic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats:
     """
-    Return the cubics (n, 6, k) with these positions and velocities at their ends.
+    Return the cubics (n, 6, k) that have x and v of both states at their ends.
 
-    :param duration: (n,) [s].
+    :param duration: (n,) durations of the pieces [s].
     """
     T = duration[:, None]
     d = end.x - start.x
@@ -68,7 +68,7 @@ def values(coefficients: Floats, t: Floats) -> Floats:
     Return the values of polynomials, without derivatives: (m, k) or (m, c, k).
 
     :param coefficients: (m, 6, k).
-    :param t: (m,) or (m, c): one or several times since the piece began [s].
+    :param t: (m,) or (m, c): one time, or c times, since each piece began [s].
     """
     if t.ndim > 1:
         coefficients = coefficients[:, :, None]
@@ -82,10 +82,10 @@ def values(coefficients: Floats, t: Floats) -> Floats:
 
 def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     """
-    Return the values and both derivatives of polynomials, at one time for each row.
+    Return the values and first two derivatives of polynomials, at one time for each row.
 
     :param coefficients: (m, 6, k).
-    :param t: (m,) the time since the piece began [s].
+    :param t: (m,) times since the pieces began [s].
     """
     t = t[:, None]
     x = coefficients[:, 5].copy()

@@ -3,9 +3,9 @@
 """
 Rigid-body poses in plain floats.
 
-A control cycle handles only a few poses, so a single pose consists of Python floats (immutable,
-comparable, about a microsecond per composition) and is no array. Batches of poses are arrays of
-rows ``x y z qx qy qz qw``, see :func:`pose_rows`.
+A control cycle handles only a few poses, so a single pose consists of Python floats instead of an
+array: it is immutable and comparable, and composing two takes about a microsecond. Batches of
+poses are arrays of rows ``x y z qx qy qz qw``, see :func:`pose_rows`.
 
 Rotations are unit quaternions ``(x, y, z, w)``, in the order of ROS. The robot's own notation,
 rotation vectors ``rx ry rz`` (axis times angle), is converted here.
@@ -87,7 +87,7 @@ class Pose:
         return angle_between(self.quaternion, other.quaternion)
 
     def interpolate(self, other: Pose, fraction: float) -> Pose:
-        """Return the pose at a fraction of the way to the other: straight, shortest rotation."""
+        """Return the pose at a fraction of the straight way and shortest rotation to another."""
         (ax, ay, az), (bx, by, bz) = self.position, other.position
         return Pose(
             (ax + fraction * (bx - ax), ay + fraction * (by - ay), az + fraction * (bz - az)),
@@ -183,7 +183,7 @@ def pose_error(desired: Pose, actual: Pose) -> Pose:
 
     The position is a difference along the axes of the common frame. The orientation is the
     rotation from the actual to the desired orientation in the axes of the actual one,
-    q_actual^-1 q_desired. Of its two quaternions it is the one with w >= 0.
+    q_actual^-1 q_desired, with the sign for which w >= 0.
     """
     (ax, ay, az), (dx, dy, dz) = actual.position, desired.position
     x, y, z, w = multiply(conjugate(actual.quaternion), desired.quaternion)

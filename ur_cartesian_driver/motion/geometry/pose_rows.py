@@ -4,7 +4,7 @@
 The formulas of :mod:`~ur_cartesian_driver.motion.geometry.pose` for rows of poses.
 
 A row is x y z [m] and the unit quaternion x y z w; arrays are (n, 7). The checks along a goal need
-so many poses that an object for each would take longer than the inverse kinematics.
+so many poses that creating an object for each would take longer than the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def conjugate_rows(a: Floats) -> Floats:
 
 
 def distance_rows(a: Floats, b: Floats) -> Floats:
-    """Return the distances between positions (n, 3 or more) [m]; huge ones do not overflow."""
+    """Return the distances of positions (n, 3 or more) [m]; huge distances do not overflow."""
     x, y, z = (b[:, :3] - a[:, :3]).T
     distances: Floats = np.hypot(np.hypot(x, y), z)
     return distances
@@ -93,9 +93,9 @@ def transform_rows(T_a_b: Pose, T_b_c: Floats) -> Floats:
 
 def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     """
-    Return the poses at fractions (n,) between ``a`` and ``b`` (n, 7).
+    Return the poses at fractions (n,) of the way from ``a`` to ``b`` (n, 7).
 
-    Straight line, shortest rotation.
+    Positions are on the straight line, orientations on the shortest rotation.
     """
     f = fraction[:, None]
     rows = a + f * (b - a)
@@ -122,7 +122,7 @@ def normalized_rows(quaternions: Floats) -> Floats:
 
 
 def keep_hemisphere(poses: Floats) -> None:
-    """Flip signs of quaternions (-q is the same orientation as q) so that rows do not jump."""
+    """Flip quaternions (-q is the same orientation as q) so that they do not jump between rows."""
     dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     poses[1:, 3:] *= signs[:, np.newaxis]

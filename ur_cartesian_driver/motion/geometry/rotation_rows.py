@@ -48,7 +48,7 @@ def log_rows(quaternions: Floats) -> Floats:
 
 
 def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
-    """Return angular velocity [rad/s], acceleration [rad/s^2] (n, 3) of a turn, in base axes."""
+    """Return angular velocities [rad/s] and accelerations [rad/s^2] in base axes, (n, 3) each."""
     r, v, a = turn
     b, b_s, c, c_s = _series(r)
     s = 2.0 * np.einsum('ij,ij->i', r, v)[:, None]  # the derivative of |r|^2
@@ -60,7 +60,7 @@ def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
 
 
 def rotation_rates(r: Floats, w: Floats, e: Floats) -> MotionRows:
-    """Return r (|r| < 2 pi) with the derivatives for which :func:`angular_rates` gives w, e."""
+    """Return r (|r| < 2 pi) and its derivatives, such that :func:`angular_rates` gives w, e."""
     b, _, c, _ = _series(r)
     K = _cross_matrices(r)
     J = np.eye(3) + b[:, :, None] * K + c[:, :, None] * (K @ K)
@@ -71,7 +71,7 @@ def rotation_rates(r: Floats, w: Floats, e: Floats) -> MotionRows:
 
 
 def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return b, its derivative by |r|^2, c and its derivative, each (n, 1)."""
+    """Return b, db / d|r|^2, c and dc / d|r|^2, each (n, 1)."""
     s = np.einsum('ij,ij->i', r, r)[:, None]
     b, b_s, c, c_s = np.zeros((4, *s.shape))
     # Only as many terms as the largest turn needs.

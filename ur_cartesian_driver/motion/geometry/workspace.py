@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Workspace planes, which the arm must not cross, read from their parameter."""
+"""Planes that the arm must not cross, read from the parameter ``workspace_planes``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Plane:
     name: str
     #: A point on the plane, in ``base`` (the frame of the controller, not ``base_link``) [m].
     point: tuple[float, float, float]
-    #: Unit normal in ``base``, pointing into the allowed side.
+    #: Unit normal in ``base``, pointing to the allowed side.
     normal: tuple[float, float, float]
     #: Distance that the arm keeps from the plane [m].
     margin: float = 0.0
@@ -23,9 +23,9 @@ class Plane:
     @classmethod
     def parse(cls, text: str) -> Plane:
         """
-        Read ``name x y z nx ny nz [margin]`` in ``base`` [m]; the normal may have any length.
+        Read ``name x y z nx ny nz [margin]`` [m] in ``base``; the normal is scaled to length 1.
 
-        :raises ValueError: the text does not have this form.
+        :raises ValueError: the text does not have this form, or a number in it is not allowed.
         """
         words = text.split()
         if len(words) not in (7, 8):

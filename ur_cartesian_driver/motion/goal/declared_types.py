@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Values of exactly the types that a dataclass declares.
+Conversion of values to exactly the types that a dataclass declares.
 
 Users of the Python API pass numpy's numbers for floats, and lists or arrays for tuples. The driver
 needs exactly the declared types, because it packs values into messages, compares them and sends
@@ -34,25 +34,27 @@ class WrongType(ValueError):
         """
         Build the sentence.
 
-        :param problem: the fault of the value, a clause.
+        :param problem: the fault of the value, as a clause.
         :param field: the wrong field, for example ``waypoints[2].time``.
         """
         super().__init__(f'{field} {problem}.')
         self.problem, self.field = problem, field
 
     def inside(self, outer: str) -> WrongType:
-        """Return the same error with a field that begins with the name of an outer value."""
+        """Return the same error, with the name of the containing value before its field."""
         separator = '.' if self.field and not self.field.startswith('[') else ''
         return WrongType(self.problem, f'{outer}{separator}{self.field}')
 
 
 def with_declared_types(value: T, kind: type[T], name: str) -> T:
     """
-    Return a value converted to exactly the type ``kind``; so are fields of dataclasses in it.
+    Return a value converted to exactly the type ``kind``; fields of dataclasses are converted too.
 
-    :param name: the first part of the field in the error.
+    A number that an ``IntEnum`` does not have is kept.
+
+    :param name: the name of the value, with which an error text begins.
     :returns: the same object if nothing had to be converted.
-    :raises WrongType: a value cannot be converted. Unknown numbers of an ``IntEnum`` are kept.
+    :raises WrongType: a value cannot be converted.
     """
     converted: T = _convert_part(_converter(kind), value, name)  # type: ignore[arg-type]  # mypy has no TypeForm
     return converted
@@ -104,7 +106,7 @@ def _converter(kind: Hashable) -> Convert:
         return _member_of(kind)
     if isinstance(kind, type) and is_dataclass(kind):
         return _dataclass(kind)
-    return lambda value: value  # checked by the field itself
+    return lambda value: value  # other types are neither converted nor checked here
 
 
 @cache
@@ -159,7 +161,7 @@ def _tuple_of(converters: Sequence[Convert]) -> Convert:
     types = (float,) * count if all(convert is _float for convert in converters) else None
 
     def convert_all(values: Any) -> Any:
-        if type(values) is tuple and tuple(map(type, values)) == types:  # true for most
+        if type(values) is tuple and tuple(map(type, values)) == types:  # the usual case
             return values
         plain = _sequence(values)
         if len(plain) != count:

@@ -6,8 +6,8 @@ The registry of execution modes: their numbers, and the traits that other code a
 A new mode needs a member of :class:`ExecutionMode` (its number is a constant ``EXECUTION_...`` of
 the action), a row of traits in :data:`EXECUTION_MODES`, a row in ``PLANNERS`` of
 ``planning/planner.py``, a row in ``FEEDERS`` of ``driver/loop/goal_machine_factory.py``, and a
-module for its planner or feeder if that is new. Planners and feeders belong to higher layers, and
-so do their tables; a test compares the keys of all three tables.
+module for each new planner or feeder. Planners and feeders belong to higher layers, and so do
+their tables; a test compares the keys of all three tables.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from enum import IntEnum
 
 
 class ExecutionMode(IntEnum):
-    """Execution mode of a goal, numbered as the action's ``execution``."""
+    """Execution mode of a goal, numbered as in the action's field ``execution``."""
 
     AUTO = 0
     PRIMITIVES = 1
@@ -30,7 +30,7 @@ class ExecutionMode(IntEnum):
         """
         The capabilities of the mode.
 
-        :raises KeyError: for AUTO, which planning resolves to another mode.
+        :raises KeyError: the mode is AUTO, which planning resolves to another mode.
         """
         return EXECUTION_MODES[self]
 
@@ -49,7 +49,7 @@ class ModeTraits:
     takes_offsets: bool
 
 
-#: All modes but AUTO.
+#: The traits of all modes but AUTO.
 EXECUTION_MODES: Mapping[ExecutionMode, ModeTraits] = {
     ExecutionMode.PRIMITIVES: ModeTraits(
         is_spline=False,

@@ -5,8 +5,8 @@ The annotations that turn the goal dataclasses into a table of fields, and the r
 
 The goal dataclasses are ``Goal`` and the classes of its parts, all declared in
 :mod:`~ur_cartesian_driver.motion.goal.goal`. Code that treats all fields alike (schema, reading,
-writing, packing, columns, plain checks) iterates over :func:`goal_fields` and distinguishes them
-by :class:`Form`, so it names no single field.
+writing, packing, columns, plain checks) iterates over :func:`goal_fields` and distinguishes the
+fields by :class:`Form`, so it names no single field.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class Sent:
     #: Name of the field in the message, with dots for nested messages; '' = as in the dataclass.
     name: str = ''
     form: Form | None = None
-    #: Whether files list the field even at its default value; None = yes if it has no default,
-    #: otherwise no.
+    #: Whether files list the field even at its default value; None = only if the field has no
+    #: default.
     always: bool | None = None
     #: The field that this one follows in files; '' = the same order as in the dataclass.
     after: str = ''
@@ -78,18 +78,18 @@ class Mark(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The range of a field's numbers, regardless of other fields; all numbers must be finite."""
+    """The range of a field's numbers, the same whatever other fields hold; all must be finite."""
 
     low: float = -inf
     high: float = inf
-    #: Unit of the numbers and advice to the user, for the text of a refusal.
+    #: For the text of a refusal: the unit of the numbers, and the advice to the user.
     unit: str = ''
     remedy: str = ''
     #: Whether ``low`` itself is excluded.
     above: bool = False
-    #: The special meaning of 0, which is then allowed even outside the range; '' = it has none.
+    #: The meaning of 0 if it is special; 0 is then allowed even outside the range. '' = it is not.
     zero: str = ''
-    #: Whether splines may contain NaN, for which the driver chooses a number.
+    #: Whether the field of a spline's point can be NaN; the driver then chooses the number.
     nan_in_splines: bool = False
 
     def holds(self, values: Any) -> Any:
@@ -99,7 +99,7 @@ class Range:
         return in_range | (values == 0.0) if self.zero else in_range
 
     def refusal(self, value: float) -> tuple[str, str]:
-        """Return the fault of a number outside the range, and the remedy."""
+        """Return the fault of a number that is outside the range, and the remedy."""
         if not isfinite(value) and (self.zero or self.high == inf):
             return f'contains {value}; every number must be finite', ''
         return self._problem(value), self.remedy
@@ -123,12 +123,12 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class ColumnOf:
-    """The annotation of a column: the field whose values it holds, a row for each point."""
+    """The annotation of a column: names the field whose values it holds, one for each point."""
 
     field: str
     #: Name of the array in ``PackedPoints``; '' = the name of the column, None = no such array.
     packed: str | None = ''
-    #: Whether that array is filled even if all rows have the default; if not, it is empty then.
+    #: Whether the array is filled even if every row has the default, instead of being empty.
     always: bool = False
     #: The column that this one follows in files; '' = the order of the declarations.
     after: str = ''
@@ -159,7 +159,7 @@ class GoalField:
 
     @property
     def is_always_sent(self) -> bool:
-        """Whether files list the field whatever its value, even if that is the default."""
+        """Whether files list the field even at its default value."""
         return not self.has_default if self.sent.always is None else self.sent.always
 
     @property
@@ -200,20 +200,20 @@ def index_fields(kind: type) -> tuple[GoalField, ...]:
 
 
 def points_of(event: object) -> dict[str, int]:
-    """Return the point indices in an event at points (like ``IOCommand``), by message field."""
+    """Return the point indices of an event (for example an ``IOCommand``), by message field."""
     kind: type = type(event)
     return {each.message_name: getattr(event, each.name) for each in index_fields(kind)}
 
 
 def renumbered(event: E, number: Callable[[int], int]) -> E:
-    """Return an event at points, with each of its point indices replaced by a function of it."""
+    """Return an event with the function ``number`` applied to each of its point indices."""
     kind: type = type(event)
     numbers: Any = {each.name: number(getattr(event, each.name)) for each in index_fields(kind)}
     return replace(event, **numbers)  # type: ignore[type-var]  # a dataclass
 
 
 def shifted(event: E, points: int) -> E:
-    """Return an event at points, with ``points`` added to each of its point indices."""
+    """Return an event with ``points`` added to each of its point indices."""
     return renumbered(event, lambda point: point + points)
 
 
@@ -232,7 +232,7 @@ class GoalColumn:
 
     @property
     def mask(self) -> str:
-        """The name of the array of flags for rows that have a value; '' = all rows have one."""
+        """The name of the array that flags the rows with a value; '' = all rows have one."""
         return f'has_{self.field.name}' if self.field.default is None else ''
 
     @property

@@ -4,27 +4,28 @@
 A goal as the client sent it, in its own frame: the one table of its fields.
 
 Many parts of the driver handle the fields of a goal: messages, YAML files, flat arrays, columns,
-checks, the builder of paths, the goal that is left after a stop. When each of them listed the
-fields itself, a new field took two dozen edits, and a forgotten edit raised no error: the field
+checks, the builder of paths, the resumption after a stop. When each part listed the fields
+itself, a new field took two dozen edits, and a forgotten edit raised no error: the field
 was lost in a file or after a stop. So the dataclasses below declare everything about a field, and
 all other code iterates over them (:func:`~.field_table.goal_fields`).
 
 A field has a type, a unit in its comment, a default, and annotations: :class:`~.field_table.Sent`
 if messages name or represent it differently, :class:`~.field_table.Range` if not every number is
 allowed, :class:`~.field_table.Mark` for other properties. Schema, reading, writing, conversion of
-users' values to the declared types, and checks of ranges and enumerations follow from that. Goals
-have thousands of points and segments, so the driver stores these in columns (:mod:`~.goal_table`):
-``WaypointColumns`` and ``SegmentColumns`` name the column and the flat array of each field. Rules
-that concern more than one field are in ``planning.request``.
+users' values to the declared types, and checks of ranges and enumerations follow from these. Goals
+can have thousands of points, so the driver stores points and segments in columns
+(:mod:`~.goal_table`); ``WaypointColumns`` and ``SegmentColumns`` declare a column for each field,
+and its flat array in messages. Rules that concern more than one field are in ``planning.request``.
 
 To add a number to segments, declare it in MotionSegment.msg and PackedPoints.msg, in ``Segment``
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
-``Path.at(name=...)``. A number of the whole goal is declared in the action, instead of in both
-messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
+``Path.at(name=...)``. A number that belongs to the whole goal is declared in the action instead of
+both messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
 
-There are two drawbacks. The column repeats the field, because type checkers would not know it
-otherwise. And files list a few fields in another order than messages (``after``), or even if they
-are zero (``always``), so that goals are still written in the form of existing files.
+There are two drawbacks. Each column is declared in addition to its field, because type checkers
+would not know it otherwise. And files list a few fields in another order than messages
+(``after``), or even at their defaults (``always``), so that goals are still written in the form of
+existing files.
 
 A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
 (:mod:`~ur_cartesian_driver.motion.plan.plan`) is known to be feasible.
@@ -46,7 +47,7 @@ from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
 
 
 class SegmentType(IntEnum):
-    """The motion to a point; the numbers of ``MotionSegment.type``."""
+    """The kind of motion to a point, numbered as in ``MotionSegment.type``."""
 
     AUTO = 0
     LINEAR = 1
@@ -58,14 +59,14 @@ class SegmentType(IntEnum):
 
 
 class ArcMode(IntEnum):
-    """The orientation along an arc; the numbers of URScript's ``movec``."""
+    """The orientation of the tool along an arc, numbered as in URScript's ``movec``."""
 
     UNCONSTRAINED = 0
     FIXED = 1
 
 
 class FreeAxis(IntEnum):
-    """An axis about which the tool may turn; the numbers of ``MotionSegment.free_axis``."""
+    """An axis about which the tool may turn, numbered as in ``MotionSegment.free_axis``."""
 
     NONE = 0
     X = 1
@@ -83,7 +84,7 @@ class OutputKind(IntEnum):
 
 
 class OnPathTolerance(IntEnum):
-    """The reaction to an arm that leaves the path tolerance."""
+    """The driver's reaction when the arm leaves the path tolerance."""
 
     ABORT = 0
     STALL = 1
@@ -106,7 +107,7 @@ class InputKind(IntEnum):
 
     @property
     def is_analog(self) -> bool:
-        """Whether the input has a level [A] or [V]."""
+        """Whether the input has an analog level [A] or [V]."""
         return self >= InputKind.STANDARD_ANALOG
 
 
@@ -131,7 +132,7 @@ class ContactEnd(IntEnum):
     REQUIRED = 2
 
 
-#: The axes of a frame, and the turns about them.
+#: Names of the axes of a frame, and of the turns about them.
 PRESS_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 
 #: How far the tool may give way in a press, unless the press specifies it [m], [rad].
@@ -150,11 +151,11 @@ class StaleOffset(IntEnum):
 #: Speed [m/s], acceleration [m/s^2] and timeout [s] of path offsets, unless the goal gives them.
 DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 
-#: Largest delay of the end of a goal against its plan, unless the goal specifies it [s]; also the
-#: longest time from the program's SUCCESS until the arm rests inside the goal tolerance.
+#: How much later than planned a goal may end, unless the goal specifies it [s]; also the longest
+#: time from the program's SUCCESS until the arm rests inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
-#: The longest rest and timeout at a point [s]; longer ones must be mistakes.
+#: The longest dwell, and the longest timeout, at a point [s]; longer ones must be mistakes.
 MAX_STOP_TIME = 600.0
 #: The longest time between a point and an output that it switches [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -220,8 +221,9 @@ class Segment:
     """
     The motion that ends at the waypoint of the same index; its blend lies around that waypoint.
 
-    Units by type: LINEAR, CIRCULAR, PROCESS m/s and m/s^2 of the tool (rad/s, rad/s^2 for a pure
-    rotation); JOINT rad/s and rad/s^2 of the leading axis; OPTIMIZED_* fractions in (0, 1].
+    Units of velocity and acceleration, by type: LINEAR, CIRCULAR, PROCESS m/s and m/s^2 of the
+    tool (rad/s and rad/s^2 for a pure rotation); JOINT rad/s and rad/s^2 of the leading axis;
+    OPTIMIZED_* fractions in (0, 1].
     """
 
     type: SegmentType = SegmentType.AUTO
@@ -229,15 +231,16 @@ class Segment:
     blend_radius: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
     #: How long the arm rests at the waypoint [s].
     dwell: Annotated[float, NOT_NEGATIVE, Mark.OF_POINT] = 0.0
-    #: 0 = derived from the times of the goal; without times, the default.
+    #: 0 = derived from the times of the goal, or the default if the goal has none; also for
+    #: ``acceleration``.
     velocity: Annotated[float, NOT_NEGATIVE] = 0.0
     acceleration: Annotated[float, NOT_NEGATIVE] = 0.0
-    #: A pose on the arc, CIRCULAR only.
+    #: A pose on the arc; only for CIRCULAR.
     via: Pose | None = None
     via_posture: Posture = Posture()
     arc_mode: ArcMode = ArcMode.UNCONSTRAINED
-    #: Axis about which the driver may turn the waypoint's pose, by ``free_min`` to ``free_max``
-    #: [rad]; both 0 = by any angle.
+    #: Axis about which the driver may turn the waypoint's pose, by an angle from ``free_min`` to
+    #: ``free_max`` [rad]; both 0 = by any angle.
     free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
     free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
     free_max: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
@@ -254,8 +257,9 @@ class SegmentColumns:
     dwells: Annotated[Floats, ColumnOf('dwell')]
     velocities: Annotated[Floats, ColumnOf('velocity')]
     accelerations: Annotated[Floats, ColumnOf('acceleration', packed='segment_accelerations')]
-    #: (n, 7) poses on the arcs, and (n,) whether a row has such a pose
+    #: (n, 7) poses on the arcs
     vias: Annotated[Floats, ColumnOf('via', after='free_maxima')]
+    #: (n,) whether the row has a pose on its arc
     has_via: Flags
     #: The postures on the arcs that are not empty, by row.
     via_postures: Annotated[Mapping[int, Posture], ColumnOf('via_posture')] = field(
@@ -292,7 +296,8 @@ class InputWait:
     waypoint: Annotated[int, POINT]
     input: InputKind
     pin: int
-    #: Digital 0 or 1; analog the level [A] or [V] to reach, or with ``below`` to fall below.
+    #: Digital 0 or 1; analog the level [A] or [V] that the input must reach, or with ``below``
+    #: fall below.
     value: float
     below: Annotated[bool, Sent(after='timeout')] = False
     #: Longest wait [s].
@@ -330,7 +335,8 @@ class ProportionalOutput:
 
     first_waypoint: Annotated[int, FIRST_POINT]
     last_waypoint: Annotated[int, LAST_POINT]
-    #: Lead times: how long before the first and last waypoint the output begins and ends [s].
+    #: How long before the first waypoint the output begins to follow the speed [s]; how long
+    #: before the last one it ends [s].
     begin_lead: Annotated[float, SMALL_LEAD] = 0.0
     end_lead: Annotated[float, SMALL_LEAD] = 0.0
     pin: Annotated[int, Sent(always=False), Range(0, 1)]
@@ -340,7 +346,7 @@ class ProportionalOutput:
     #: Fraction of the range per speed of the tool [1/(m/s)], and the fraction at speed 0.
     gain: Annotated[float, Sent(always=False), Range(-1000.0, 1000.0)]
     offset: Annotated[float, Range(-100.0, 100.0)] = 0.0
-    #: Bounds of the output, fractions of the range.
+    #: Bounds of the output, as fractions of the range.
     minimum: Annotated[float, FRACTION] = 0.0
     maximum: Annotated[float, ALWAYS, FRACTION] = 1.0
     #: Time constant of a low-pass filter of first order for the speed [s].
@@ -407,8 +413,8 @@ class Tolerance:
 class PathOffset:
     """The bounds of path offsets, which arrive while the arm moves."""
 
-    #: Largest offset along the path, across it and normal to both [m]; 0 = none. The upper bound
-    #: is the default of the controller's own path offsets.
+    #: Largest offset along the path, across it and normal to both [m]; 0 = none. The upper bound,
+    #: 0.1 m, is the default of the controller's own path offsets.
     limits: Annotated[Vector3, Range(0.0, 0.1, 'm')] = ZERO3
     #: Largest speed [m/s] and acceleration [m/s^2] along each axis; 0 = the default.
     speed: Annotated[float, Range(0.0, 0.1, 'm/s')] = 0.0
@@ -438,9 +444,9 @@ class Goal:
     age: Annotated[float | None, Mark.NOT_SENT] = None
     path_tolerance: Tolerance = Tolerance()
     goal_tolerance: Tolerance = Tolerance()
-    #: Largest delay of the end against the plan [s]: 0 = the default, negative = unlimited.
+    #: How much later than planned the goal may end [s]: 0 = the default, negative = any time.
     goal_time_tolerance: Annotated[float, DURATION, FINITE] = 0.0
-    #: Empty, or one for each waypoint.
+    #: Empty, or one segment for each waypoint.
     segments: Sequence[Segment] = ()
     io_commands: tuple[IOCommand, ...] = ()
     input_waits: Annotated[tuple[InputWait, ...], Sent(after='script_calls')] = ()
@@ -450,7 +456,7 @@ class Goal:
     presses: tuple[Press, ...] = ()
     execution: ExecutionMode = ExecutionMode.AUTO
     keep_open: bool = False
-    #: Time ahead of the arm within which points are final [s]; later ones can be replaced.
+    #: Time ahead of the arm within which points are final [s]; later points can be replaced.
     replace_horizon: Annotated[
         float, Range(0.05, 1.0, 's', 'set it to 0.15', zero='nothing is replaced')
     ] = 0.0

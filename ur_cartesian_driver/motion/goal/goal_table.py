@@ -4,8 +4,8 @@
 The points and segments of a goal in columns: a row for each point, an array for each field.
 
 Sliced and scanned paths have up to 100,000 points. Creating an object for each of them would take
-longer than all checks of the arrays. So the driver stores rows, which are still sequences of
-:class:`~ur_cartesian_driver.motion.goal.goal.Waypoint` or
+longer than all checks of the arrays. So the driver stores arrays, in classes that are still
+sequences of :class:`~ur_cartesian_driver.motion.goal.goal.Waypoint` or
 :class:`~ur_cartesian_driver.motion.goal.goal.Segment`: these objects are created on access.
 """
 
@@ -47,7 +47,7 @@ _BLOCK = 4096
 
 
 def rows_where(mask: Flags | np.bool_) -> list[int]:
-    """Return the rows of a mask (n,) that are true, in order."""
+    """Return the indices of the true rows of a mask (n,), in order."""
     rows: list[int] = np.flatnonzero(mask).tolist()
     return rows
 
@@ -61,7 +61,8 @@ class Rows(Sequence[T]):
     """
     Columns of the same length that are also a sequence of objects.
 
-    Arrays are made read-only. Mappings hold, by row, values that only few rows have.
+    A column is usually an array, which is made read-only. A column for which only few rows have a
+    value is a mapping from the index of the row to the value.
     """
 
     __slots__: ClassVar[tuple[str, ...]] = ()
@@ -84,7 +85,7 @@ class Rows(Sequence[T]):
             yield from zip(*(getattr(self, name)[rows].tolist() for name in names), strict=True)
 
     def take(self: R, rows: slice) -> R:
-        """Return some of the rows."""
+        """Return the rows of a slice with a step of 1."""
         first, last, _ = rows.indices(len(self))
         return replace(
             self,
@@ -97,7 +98,7 @@ class Rows(Sequence[T]):
         )
 
     def with_first(self: R, first: R) -> R:
-        """Return the rows with the first one replaced."""
+        """Return the rows with the first one replaced by the only row of ``first``."""
         columns = zip(first._columns(), self.take(slice(1, len(self)))._columns(), strict=True)
         return replace(
             self,
@@ -149,7 +150,7 @@ class GoalRows(Rows[T]):
     """Rows whose columns hold the fields of a goal dataclass."""
 
     __slots__: ClassVar[tuple[str, ...]] = ()
-    #: The goal dataclass of which each row is an object.
+    #: The goal dataclass whose objects the rows are.
     kind: ClassVar[type]
 
     @classmethod
@@ -162,7 +163,7 @@ class GoalRows(Rows[T]):
         """
         Return objects as rows; rows are returned unchanged.
 
-        :param name: the first part of the field in the error; '' = as in a goal.
+        :param name: the name of ``objects`` in an error text; '' = ``waypoints`` or ``segments``.
         :raises WrongType: a value cannot be converted to its type; the text names the field.
         """
         if isinstance(objects, cls):
@@ -179,7 +180,7 @@ class GoalRows(Rows[T]):
 
     @classmethod
     def of_columns(cls: type[G], n: int, columns: Mapping[str, Any]) -> G:
-        """Return n rows; columns that are None or left out have the default."""
+        """Return n rows; columns that are None or left out are filled with the default."""
         whole: dict[str, Any] = {}
         for each in cls.columns():
             if each.mask:
@@ -188,7 +189,7 @@ class GoalRows(Rows[T]):
         return cls(**whole | {name: rows for name, rows in columns.items() if rows is not None})
 
     def is_default(self, column: GoalColumn) -> bool:
-        """Return whether all rows of a column have the default, or 0 if it has no default."""
+        """Return whether each row of a column has the field's default (0 if it declares none)."""
         if column.mask:
             return not getattr(self, column.mask).any()
         rows, default = getattr(self, column.name), column.field.default
@@ -198,7 +199,7 @@ class GoalRows(Rows[T]):
         return not differs.any()
 
     def values(self, column: GoalColumn) -> Iterable[Any]:
-        """Return the values of a column in the types that objects of ``kind`` have."""
+        """Return the values of a column, in the type that ``kind`` declares for the field."""
         rows, form = getattr(self, column.name), column.field.form
         if isinstance(rows, Mapping):
             return (rows.get(i, column.field.default) for i in range(len(self)))
@@ -295,7 +296,7 @@ def goal_table(goal: Goal) -> GoalTable:
 
 
 def default_column(each: GoalField, n: int) -> Any:
-    """Return a column in which all n rows have the field's default, or 0 if it has none."""
+    """Return a column of n rows that all have the field's default (0 if it declares none)."""
     if each.form is Form.RECORD:
         return {}
     if each.form is Form.RATES:
@@ -311,7 +312,7 @@ def _number_type(each: GoalField) -> type:
 
 
 def _array(each: GoalField, values: Sequence[Any]) -> Any:
-    """Return the column of a field from its values; None if they are surely all the default."""
+    """Return the column of a field from its values; None if each is the default object itself."""
     if each.form is Form.RECORD:
         return {i: value for i, value in enumerate(values) if value}
     zero = {Form.RATES: ZERO6, Form.POSE: IDENTITY}.get(each.form)
@@ -323,7 +324,7 @@ def _array(each: GoalField, values: Sequence[Any]) -> Any:
 
 
 def _plain_objects(objects: Iterable[T], kind: type[T], name: str) -> Sequence[T]:
-    """Return objects whose fields have exactly the declared types; few need conversion."""
+    """Return the objects, converted if a field does not have exactly its declared type."""
     if isinstance(objects, tuple | list):
         try:
             if _only({kind}, objects) and all(
@@ -333,7 +334,7 @@ def _plain_objects(objects: Iterable[T], kind: type[T], name: str) -> Sequence[T
                 return objects
         except (AttributeError, TypeError):
             pass
-    return with_declared_types(objects, tuple[kind, ...], name)  # type: ignore[valid-type, arg-type]  # a type made here
+    return with_declared_types(objects, tuple[kind, ...], name)  # type: ignore[valid-type, arg-type]  # the type is built at run time
 
 
 def _are_plain(each: GoalField, values: Sequence[Any]) -> bool:
@@ -343,7 +344,8 @@ def _are_plain(each: GoalField, values: Sequence[Any]) -> bool:
         return _are_floats(values, 6)
     if not _only({each.type}, values):
         return False
-    if each.form is Form.RECORD:  # empty postures only; any() would fail on an array
+    if each.form is Form.RECORD:
+        # Only empty postures are plain. Tuples are tested first, as any() would fail on an array.
         parts = [part for one in values for part in (one.names, one.values)]
         return _only({tuple}, parts) and not any(parts)
     return each.form is not Form.POSE or (
@@ -365,7 +367,7 @@ def _are_floats(vectors: Sequence[tuple[float, ...]], count: int) -> bool:
 
 
 def _vectors(rows: Floats) -> Iterable[Any]:
-    """Return rows (n, 6) as tuples; all rows of zeros share one tuple."""
+    """Return rows (n, 6) as tuples; rows of zeros share one tuple."""
     if not rows.any():
         return (ZERO6,) * len(rows)
     return (vector6(row) if any(row) else ZERO6 for row in rows.tolist())

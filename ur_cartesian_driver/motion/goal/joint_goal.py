@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointPoint:
-    """The joints of a goal at one time, in the order of its ``joint_names``."""
+    """The joints at one time, in the order of the goal's ``joint_names``."""
 
     #: When to reach the point, from the start of the motion [s].
     time: float
@@ -31,7 +31,7 @@ class JointPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointTolerance:
-    """Largest deviations of one joint: 0 = the default (no limit), negative = no limit."""
+    """Largest allowed deviations of one joint; 0 or negative = no limit."""
 
     name: str
     #: [rad]
@@ -53,16 +53,17 @@ class JointGoal:
     age: float | None = None
     path_tolerance: tuple[JointTolerance, ...] = ()
     goal_tolerance: tuple[JointTolerance, ...] = ()
-    #: Largest delay of the end against the plan [s]: 0 = the default, negative = unlimited.
+    #: How much later than planned the goal may end [s]: 0 = the default, negative = any time.
     goal_time_tolerance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointErrorBounds:
-    """Largest deviations of the six joints; zero and negative mean no limit."""
+    """Largest allowed deviations of the six joints; 0 or negative = no limit."""
 
-    #: [rad], [rad/s]
+    #: [rad]
     position: Vector6 = ZERO6
+    #: [rad/s]
     velocity: Vector6 = ZERO6
 
     def __bool__(self) -> bool:
@@ -76,5 +77,5 @@ class JointTolerances:
 
     path: JointErrorBounds = JointErrorBounds()
     goal: JointErrorBounds = JointErrorBounds()
-    #: Joint positions at the end [rad].
+    #: Joint positions at the last point of the goal [rad].
     end: Vector6

@@ -7,7 +7,7 @@ The robot receives poses in ``base``, the frame of its own controller. ``base_li
 description has the same origin, rotated by pi about z.
 
 ``tool0`` is the controller's flange. ``flange`` of the robot description has the same origin and
-the axes of REP-103 (x forward), that is tool0 rotated back by rpy (pi/2, 0, pi/2).
+the axes of REP-103 (x forward): it is tool0 rotated by the inverse of rpy (pi/2, 0, pi/2).
 ``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is relative to
 the pose of the arm at the time of planning.
 
@@ -55,7 +55,7 @@ class StaticFrame:
         """
         Read ``name parent x y z qx qy qz qw`` [m, unit quaternion].
 
-        :raises ValueError: the text does not have this form; the sentence explains the fault.
+        :raises ValueError: the text does not have this form, or a number in it is not allowed.
         """
         words = text.split()
         if len(words) != 9:
@@ -88,7 +88,7 @@ class ArmSnapshot:
 
     @classmethod
     def of(cls, state: RobotState) -> ArmSnapshot:
-        """Return the snapshot of a robot's report, which includes the calibration of the arm."""
+        """Return the snapshot of a robot's reported poses, which include its calibration."""
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
 
@@ -96,18 +96,18 @@ class FrameLookup(Protocol):
     """Looks up the frames of other nodes; ``ros.tf.tf_lookup`` does so in tf2."""
 
     def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
-        """Return the pose of the source frame in the target frame at a time [ns], 0 = now."""
+        """Return the pose of the source frame in the target frame at a time [ns]; 0 = newest."""
 
     def T_static(self, field: str, target: str, source: str) -> Pose:
         """Return the pose of a frame that is fixed to the target frame."""
 
 
 class Frames:
-    """The frames that this driver knows; those of the robot itself have ``tf_prefix``."""
+    """The frames that this driver knows; the robot's own frames have names with ``tf_prefix``."""
 
     def __init__(self, tf_prefix: str = '', static_frames: Iterable[StaticFrame] = ()) -> None:
         """
-        Resolve all static frames down to the base, the flange or the TCP.
+        Resolve each static frame to a pose in the base, the flange or the TCP.
 
         :raises ValueError: a static frame has an unknown parent, a name that is taken, or is its
             own ancestor.
@@ -132,7 +132,7 @@ class Frames:
         )
 
     def with_transforms(self, transforms: FrameLookup | None) -> Frames:
-        """Return these frames, with all unknown ones looked up in tf2."""
+        """Return a copy that looks up unknown frames in ``transforms``."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames
@@ -158,7 +158,7 @@ class Frames:
             goal,
             T_base_frame=self.T_base_frame(frame_id, snapshot, at=at),
             T_flange_controlled=T_flange_controlled,
-            # Empty for the active TCP, also if it was given by name.
+            # Empty for the active TCP, even if the client named it.
             controlled_frame='' if T_flange_controlled is None else controlled_frame,
         )
 
@@ -194,7 +194,7 @@ class Frames:
         """
         Return the pose of a controlled frame in the flange; None for the robot's active TCP.
 
-        :param snapshot: the arm, for frames fixed to its active TCP; None if that is not known.
+        :param snapshot: the arm, for frames fixed to its active TCP; None if the TCP is not known.
         :raises InvalidGoal: the frame is unknown, or not fixed to the flange.
         :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
         """

@@ -24,7 +24,7 @@ def output_name(kind: OutputKind, pin: int) -> str:
 
 
 def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, str] | None:
-    """Return the wrong field, its fault, and a remedy; None if nothing is wrong."""
+    """Return the wrong field of an output, its fault and a remedy; None if nothing is wrong."""
     name, pins = OUTPUTS[kind]
     if not 0 <= pin < pins:
         return 'pin', f'is {pin}, but there are {name}s 0 to {pins - 1}', 'name one of these'
@@ -36,7 +36,7 @@ def output_fault(kind: OutputKind, pin: int, value: float) -> tuple[str, str, st
 
 
 def repeated_output(outputs: Sequence[SafeOutput]) -> int | None:
-    """Return the index of the first output that was named before; None if there is none."""
+    """Return the index of the first output that repeats an earlier one; None if none does."""
     named = [(output.output, output.pin) for output in outputs]
     return next((i for i, one in enumerate(named) if one in named[:i]), None)
 

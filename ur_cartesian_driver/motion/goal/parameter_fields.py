@@ -8,8 +8,8 @@ The annotations with which a dataclass declares parameters, and the check of the
     #: Largest speed of the TCP [m/s]; 0.0: no limit.
     max_tool_speed: Annotated[float, Range(0.0, 10.0)] = 0.25
 
-is the whole declaration. The parameters of the node, their descriptions and ``config/driver.yaml``
-derive from it (:mod:`~ur_cartesian_driver.ros.parameters.parameter_table`).
+is all that declares this parameter. The node's parameters, their descriptions and the contents of
+``config/driver.yaml`` follow (:mod:`~ur_cartesian_driver.ros.parameters.parameter_table`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal.field_table import Mark, Range
 
 T = TypeVar('T')
 
-#: A field that the driver fills in, so that it is no parameter.
+#: The type of a field that the driver fills in; such a field is no parameter.
 Detected: TypeAlias = Annotated[T, Mark.NOT_SENT]
 
 
@@ -44,7 +44,7 @@ class OneOf:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterField:
-    """A row of the table: a field that is a parameter."""
+    """A field of a dataclass that is a parameter."""
 
     name: str
     default: Any
@@ -54,7 +54,7 @@ class ParameterField:
     choices: tuple[str, ...]
 
     def problem(self, value: Any) -> str:
-        """Return the fault of a value that is not within the bounds, else ''."""
+        """Return the fault of a value that is not allowed; '' if the value is allowed."""
         if self.range is not None and not self.range.holds(value):
             zero = f'be 0 ({self.range.zero}) or ' if self.range.zero else ''
             low, high = plain_number(self.range.low), plain_number(self.range.high)
@@ -71,7 +71,7 @@ def plain_number(value: float) -> str:
 
 @cache
 def parameter_fields(kind: type) -> tuple[ParameterField, ...]:
-    """Return the fields of a dataclass that are parameters, in its order."""
+    """Return the fields of a dataclass that are parameters, in the order of the class."""
     hints = declared_hints(kind)
     return tuple(
         _field(each.name, each.default, hints[each.name])
@@ -82,9 +82,9 @@ def parameter_fields(kind: type) -> tuple[ParameterField, ...]:
 
 def check_parameters(instance: object) -> None:
     """
-    Give the fields of a new dataclass their types and check their bounds; for ``__post_init__``.
+    Convert the fields of a new dataclass to their types and check them; for ``__post_init__``.
 
-    :raises ValueError: names the field, its value and the bound.
+    :raises ValueError: a value has the wrong type or is out of bounds; the text names the field.
     """
     declare_types(instance)
     kind: type = type(instance)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-#: Fraction of the acceleration that planned braking uses; the rest is for corrections.
+#: Fraction of the acceleration that planned braking uses; the remainder is for corrections.
 BRAKING_FRACTION = 0.8
 #: A target within this distance is reached [m, rad].
 ARRIVAL_TOLERANCE = 1e-9
@@ -16,11 +16,11 @@ def approach_speed(distance: float, limit: float, acceleration: float, dt: float
     """
     Return the speed of the next cycle for a motion that ends at rest.
 
-    One cycle of length dt at the speed v, followed by braking by b dt in each cycle, covers the
-    distance d if v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2. After each such cycle the formula
-    gives exactly b dt less. The speed of the last cycle is d / dt.
+    With the deceleration b, one cycle of length dt at the speed v, followed by cycles that are
+    each slower by b dt, covers the distance d if v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2. After
+    each such cycle the formula gives exactly b dt less. The speed of the last cycle is d / dt.
 
-    :param distance: to the target, not negative [m, rad].
+    :param distance: distance to the target, not negative [m, rad].
     :param limit: the largest speed.
     """
     if distance < ARRIVAL_TOLERANCE:

@@ -32,9 +32,9 @@ SAME_TIME = 5e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointSpline:
-    """Consecutive pieces; before the first and after the last of them the joints rest."""
+    """Consecutive pieces; the joints are at rest before the first piece and after the last one."""
 
-    #: (n + 1,) [s], increasing.
+    #: (n + 1,) times at which pieces begin or end [s], increasing.
     times: Floats
     #: (n, 6 powers, 6 joints): polynomials in the time since the piece began, [rad / s^power].
     coefficients: Floats
@@ -50,9 +50,10 @@ class JointSpline:
         start_time: float = 0.0,
     ) -> JointSpline:
         """
-        Return the spline of pieces that starts at joint positions [rad].
+        Return the spline of consecutive pieces, of which the first begins at ``start`` [rad].
 
-        :param velocities: at the start [rad/s], like ``accelerations`` [rad/s^2]; None = zero.
+        :param velocities: joint velocities at the start [rad/s]; None = zero.
+        :param accelerations: joint accelerations at the start [rad/s^2]; None = zero.
         :param start_time: when the first piece begins [s].
         """
         pieces = tuple(pieces)
@@ -74,7 +75,7 @@ class JointSpline:
 
     @classmethod
     def through(cls, times: Floats, rows: MotionRows, *, quintic: bool) -> JointSpline:
-        """Return the spline through rows (n + 1, 6) at times (n + 1,) [s]."""
+        """Return the spline that has the states in rows (n + 1, 6) at times (n + 1,) [s]."""
         before, after = (
             MotionRows(*(column[k] for column in rows)) for k in (slice(None, -1), slice(1, None))
         )
@@ -83,14 +84,14 @@ class JointSpline:
 
     @property
     def duration(self) -> float:
-        """The time at which the last piece ends [s]."""
+        """The time at which the last piece ends [s]: the duration if the first begins at 0."""
         return float(self.times[-1])
 
     def followed_by(self, other: JointSpline, since: float) -> JointSpline:
         """
-        Return this spline up to the start of another one, continued by the other one.
+        Return this spline up to the start of another one, followed by the other one.
 
-        :param since: pieces that end before this time are left out [s].
+        :param since: time [s]; pieces that end before it are left out.
         """
         end = int(np.searchsorted(self.times, other.times[0] - SAME_TIME))
         first = min(self.piece(since), end)
@@ -100,12 +101,16 @@ class JointSpline:
         )
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
-        """Return position [rad], velocity [rad/s], acceleration [rad/s^2] (6,) at a time."""
+        """Return positions [rad], velocities [rad/s], accelerations [rad/s^2] at a time, (6,)."""
         q, qd, qdd = self.rows(np.array([time]))
         return q[0], qd[0], qdd[0]
 
     def rows(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the same for times (m,), each (m, 6); outside, the joints rest at an end."""
+        """
+        Return joint positions, velocities and accelerations, (m, 6) each, at times (m,) [s].
+
+        Before the first piece and after the last one, the joints are at rest.
+        """
         inside = np.clip(times, self.times[0], self.times[-1])
         k = np.clip(
             np.searchsorted(self.times, inside, side='right') - 1, 0, len(self.coefficients) - 1
@@ -115,5 +120,5 @@ class JointSpline:
         return q, np.where(outside, 0.0, qd), np.where(outside, 0.0, qdd)
 
     def piece(self, time: float) -> int:
-        """Return the index of the piece that runs at a time."""
+        """Return the index of the piece that runs at a time, or of the nearest piece."""
         return min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)

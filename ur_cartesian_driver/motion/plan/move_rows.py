@@ -4,8 +4,8 @@
 The primitives of a plan in columns: a row for each motion.
 
 Nearly all motions of a long goal go to a pose, or are pieces of a spline. The others (arcs, joint
-targets, waits) are kept as objects, by row, in addition to the columns. Together they are a
-sequence of primitives, which are created on access.
+targets) are kept as objects, by row, in addition to the columns. The rows are still a sequence of
+primitives; those in columns are created on access.
 """
 
 from __future__ import annotations
@@ -42,16 +42,18 @@ class MoveRows(Rows[Primitive]):
     kinds: Int64s
     #: (n, 7) x y z [m], unit quaternion x y z w
     targets: Floats
-    #: (n, 6) [rad], and (n,) whether a row has a ``q_near``
+    #: (n, 6) [rad]
     q_near: Floats
+    #: (n,) whether the row has a ``q_near``
     has_q_near: Flags
-    #: (n,) each; durations of MoveJ and MoveL only
+    #: (n,) each; only MoveJ and MoveL have durations
     velocities: Floats
     accelerations: Floats
     durations: Floats
     #: (n,) also for the rows of ``others``
     blend_radii: Floats
-    #: Primitives of other classes, by row; they replace the columns of that row.
+    #: Primitives that the columns cannot express, by row; of the columns, only ``blend_radii`` is
+    #: used for these rows.
     others: Mapping[int, Primitive]
 
     def __len__(self) -> int:
@@ -113,7 +115,7 @@ class SplineRows(Rows[Primitive]):
 
 
 def blend_radii(primitives: Sequence[Primitive]) -> Floats:
-    """Return the blend radius of each primitive (n,) [m]; splines have none."""
+    """Return the blend radius of each primitive (n,) [m]; 0 = it has none."""
     if isinstance(primitives, MoveRows):
         return primitives.blend_radii
     if isinstance(primitives, SplineRows):

@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, vector3, ZERO3
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 
-#: The axes of the frame, as they are named for users.
+#: The names of the frame's axes, for users.
 OFFSET_AXES = ('along', 'across', 'normal')
 
 
@@ -30,18 +30,19 @@ class AppliedOffset(NamedTuple):
     offset: Vector3 = ZERO3
 
 
-#: The tool is on the path of the goal.
+#: No displacement: the tool is on the path of the goal.
 NO_OFFSET = AppliedOffset()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OffsetFeedback:
-    """One packet of the robot program about the offset that the controller adds to its motion."""
+    """The robot program's report, in one packet, on the offset that the controller applies."""
 
     #: The last sequence number that the robot program has read.
     last_sequence: int
-    #: The offset that the controller applies: along, across, normal [m], and in the base [m].
+    #: The applied offset in the frame of the path: along, across, normal [m].
     offset: Vector3
+    #: The applied offset in the base [m].
     shift: Vector3
 
 
@@ -61,7 +62,7 @@ class OffsetBand:
     step: float
     #: (n, 3 axes, 3) the frame of the path in the base, at the times 0, step, 2 step, ...
     axes: Floats
-    #: (n,) whether offsets are allowed at that time; if not, the offset fades out.
+    #: (n,) whether offsets are allowed at the time of the row; if not, the offset fades out.
     is_open: Flags
 
     def axes_at(self, time: float) -> Floats:

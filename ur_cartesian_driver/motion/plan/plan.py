@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A plan: primitives, the reference path of the tool, and a report of the choices.
+A plan: primitives, the reference path of the tool, and a report of the planner's choices.
 
 ``planning`` makes a plan after all checks have passed. Plans are immutable.
 """
@@ -45,14 +45,14 @@ class ReferencePath:
 
     #: (m, 7) x y z [m], unit quaternion x y z w.
     poses: Floats
-    #: (m,) the index of the goal's point to which the segment of the sample leads.
+    #: (m,) index of the point at the end of the segment on which the sample lies.
     point: Int32s
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
     time: Floats
-    #: (m, 2) [m], [rad] largest distance of the robot's own blend from the sample, 0 outside
-    #: blends: UR publishes the size of blends, but not their shape. Empty = 0 everywhere.
+    #: (m, 2) largest distance [m] and angle [rad] between the robot's own blend and the sample, 0
+    #: outside blends: UR publishes the size of blends, but not their shape. Empty = 0 everywhere.
     blend_tolerance: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    #: (m,) the fraction of the segment before the sample, as in :class:`~.events.PathPlace`.
+    #: (m,) fraction of the segment that lies before the sample, as in :class:`~.events.PathPlace`.
     #: Empty = 0 everywhere.
     fraction: Floats = field(default_factory=lambda: np.empty(0))
 
@@ -76,15 +76,16 @@ class BlendEntry(NamedTuple):
     """
     The state of the controller at the beginning of the blend after a segment.
 
-    The unit of length is that of the blend's parameter, which runs from 0 to 1.
+    Lengths are in units of the blend's parameter, which runs from 0 to 1.
     """
 
     #: The rate of the parameter [1/s].
     rate: float
-    #: Time until the segment would come to rest at its point [s].
+    #: Time until the arm would come to rest at the segment's point if there were no blend [s].
     remaining: float
-    #: Acceleration of the segment [1/s^2] and, if it is sent with a time, its length.
+    #: Acceleration of the segment [1/s^2].
     acceleration: float
+    #: Length of the segment, if it is sent with a time.
     length: float
     #: Time from the beginning of the blend to its middle, where the point is passed [s].
     half: float
@@ -100,15 +101,15 @@ class PlannedSegment:
     primitive: Primitive
     #: Index of the waypoint at the end of the primitive.
     waypoint: int
-    #: Path length of the tool [m] and its turn [rad], from waypoint to waypoint.
+    #: Length of the tool's path [m] and angle of its turn [rad], from waypoint to waypoint.
     length: float
     angle: float
     #: Expected time at full speed [s].
     duration: float
     #: Joint positions predicted at the end of the primitive [rad].
     joints: Joints
-    #: The line in the report; empty if another piece of the same segment has it (a SPLINE can have
-    #: several pieces between two points).
+    #: The line of the report; empty if another piece of the same segment has the line (a SPLINE
+    #: can have several pieces between two points).
     report_line: str
     #: The entry of the blend that follows; None = there is no blend, or it is not known.
     blend_entry: BlendEntry | None = None
@@ -117,13 +118,13 @@ class PlannedSegment:
 
 
 class LateLines(Sequence[str]):
-    """Lines that are made when the first of them is read, because long goals have many."""
+    """Lines of a report, all made when any of them is first read: long goals have many."""
 
     def __init__(self, count: int, make: Callable[[], Sequence[str]]) -> None:
         """
         Keep the function that makes all lines.
 
-        :param count: the number of lines that it makes.
+        :param count: the number of lines that ``make`` returns.
         """
         self._rows, self._lines = range(count), cache(make)
 
@@ -138,7 +139,7 @@ class LateLines(Sequence[str]):
     def __getitem__(self, index: slice) -> LateLines: ...
 
     def __getitem__(self, index: int | slice) -> str | LateLines:
-        """Return a line, or a slice of the lines, which does not make them yet."""
+        """Return a line, or a slice of the lines; taking a slice does not make the lines yet."""
         if isinstance(index, int):
             return self._lines()[self._rows[index]]
         part = LateLines(0, self._lines)
@@ -150,20 +151,21 @@ class LateLines(Sequence[str]):
 class PlannedRows(Rows[PlannedSegment]):
     """The segments of a plan in columns; units as in a planned segment."""
 
-    #: (n,)
+    #: (n,) each
     waypoints: Int32s
     lengths: Floats
     angles: Floats
     durations: Floats
-    #: (n, 5) the blend entries, zeros where there is no blend.
+    #: (n, 5) the blend entries; a row of zeros = there is no entry.
     blend_entries: Floats
     #: (n, 6)
     joints: Floats
     primitives: Sequence[Primitive]
-    #: Lines of the report, and by row what outputs add to some of them.
+    #: Lines of the report, without the notes.
     report_lines: Sequence[str]
+    #: Texts about outputs and stops that are appended to lines of the report, by row.
     notes: Mapping[int, str] = field(default_factory=dict)
-    #: By row, the records of outputs that follow the primitive of the row on the wire.
+    #: The records of outputs that follow the primitive of a row on the wire, by row.
     outputs: Mapping[int, tuple[OutputRecord, ...]] = field(default_factory=dict)
 
     @classmethod
@@ -237,10 +239,9 @@ class Plan:
     start: Joints
     #: The active TCP of the robot at the time of planning.
     T_flange_active: Pose = IDENTITY
-    #: The TCP that the robot gets for the motion, and loses at its end; None = the active TCP
-    #: stays.
+    #: The temporary TCP, which the robot has only during the motion; None = the active TCP stays.
     T_flange_tcp: Pose | None = None
-    #: The controlled frame in the TCP of the motion; they differ only if the TCP must not change.
+    #: The controlled frame in the TCP of the motion: IDENTITY unless the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
     #: The version of the older robot program that the plan is for; '' = the driver's own program.
     older_program: str = ''
@@ -250,9 +251,9 @@ class Plan:
     offset_band: OffsetBand | None = None
     #: The tolerances of a joint goal; None if the goal is Cartesian.
     joint_tolerances: JointTolerances | None = None
-    #: Ignored, slowed or changed requests, and remarks on the whole goal.
+    #: Lines of the report about ignored, slowed or changed requests, or about the whole goal.
     remarks: tuple[str, ...] = field(default=())
-    #: Finds, on demand, where the tool is slower than asked: long goals have many such stretches.
+    #: Finds the slow stretches; called only on demand, because long goals have many.
     find_slow_stretches: Callable[[], tuple[SlowStretch, ...]] = field(default=tuple)
 
     @property

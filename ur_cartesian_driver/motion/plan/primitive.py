@@ -59,9 +59,10 @@ class MoveJ(_MoveNear):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveL(_MoveNear):
     """
-    Straight line of the tool; velocity [m/s] and acceleration [m/s^2] of the tool.
+    Straight line of the tool, with the tool's velocity [m/s] and acceleration [m/s^2].
 
-    A joint target stands for its TCP pose. ``q_near`` is sent too, but the robot ignores it.
+    A joint target means the TCP pose in which these joint positions result. ``q_near`` is sent
+    too, but the robot ignores it.
     """
 
     duration: float = 0.0
@@ -129,13 +130,15 @@ class SwitchOutput:
     #: Pose of the TCP in base at which to switch; None = when the motion before has ended.
     trigger_pose: Pose | None = None
     #: Unit direction of the motion there, linear or angular, in the axes of the trigger pose. The
-    #: output switches when the tool crosses the plane through the pose in this direction.
+    #: output switches when the tool crosses, in this direction, the plane through the pose.
     trigger_direction: Vector6 = ZERO6
-    #: Whether the tool is beyond that plane when the record is read, and will cross it later.
+    #: Whether the tool is beyond this plane when the program reads the record; the output then
+    #: switches only after the tool has been before the plane.
     starts_beyond: bool = False
     #: Delay after the end of the last motion [s].
     delay: float = 0.0
-    #: Whether an analog output follows the speed until its next switch, by the preceding law.
+    #: Whether an analog output follows the speed, by the :class:`SpeedLaw` before this record,
+    #: until the next record switches it.
     follows_speed: bool = False
 
 
@@ -144,8 +147,8 @@ class SpeedLaw:
     """
     Not a motion: the law of the next analog output that follows the speed.
 
-    The fraction of the range is offset + gain * speed of the tool [m/s], within the bounds; the
-    speed is filtered with a time constant [s].
+    The fraction of the range is offset + gain * speed of the tool [m/s], within the bounds;
+    ``filter_time`` is the time constant with which the speed is filtered [s].
     """
 
     gain: float
@@ -212,9 +215,9 @@ class CallFunction:
 
     :param number: the number that ``program.prelude`` gives the function.
     :param arguments: six numbers; those that the function does not use are zeros.
-    :param text: the call as it is written; ``text`` and ``timeout`` are not on the wire, because
-        the driver watches the time.
-    :param timeout: longest time until the function returns [s].
+    :param text: the call as it is written, for messages; not sent.
+    :param timeout: longest time until the function returns [s]; not sent, because the driver
+        watches the time.
     """
 
     number: int
@@ -226,11 +229,12 @@ class CallFunction:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressLaw:
     """
-    The settings with which the controller's force mode begins next.
+    The settings of the controller's force mode for the next :class:`BeginPress`.
 
     :param wrench: force and torque of the tool along compliant axes [N, Nm].
-    :param limits: largest speed of compliant axes [m/s, rad/s], and deviation of others [m, rad].
-    :param zero_sensor: whether the force sensor is zeroed now.
+    :param limits: for a compliant axis the largest speed [m/s, rad/s], for another axis the
+        largest deviation [m, rad].
+    :param zero_sensor: whether the robot program zeroes the force sensor at this record.
     """
 
     wrench: Vector6
@@ -244,9 +248,9 @@ class PressLaw:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeginPress:
     """
-    Force mode begins; if no axis is compliant, only the watch for contact.
+    Force mode begins; if no axis is compliant, only the watch for contact begins.
 
-    :param T_base_task: the frame of the axes.
+    :param T_base_task: the frame of the compliant axes.
     :param follows_tool: whether the frame is that of the TCP, updated in each cycle.
     """
 
@@ -257,7 +261,7 @@ class BeginPress:
 
 @dataclass(frozen=True, slots=True)
 class EndPress:
-    """Force mode ends; the trajectory too if a required contact did not come."""
+    """Force mode ends; if a required contact did not come, the trajectory ends too."""
 
 
 #: An action of the robot program while the arm is at rest; the program counts it as a motion.

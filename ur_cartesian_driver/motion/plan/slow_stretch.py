@@ -3,8 +3,9 @@
 """
 Stretches of a plan on which the tool is slower than the goal asks, and the remedies.
 
-A goal asks for a speed by its points (``velocity`` or a twist), or else by the driver's parameter.
-A goal with times asks for the mean speed of each segment: its length over its time.
+A goal asks for a speed by ``velocity`` of its segments or twists of its points; if it gives none,
+the driver's default speed is asked for. A goal with times asks for the mean speed of each segment:
+its length over its time.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _MAX_LISTED = 5
 
 
 class SlowCause(Enum):
-    """Why the tool is slower than asked; the value is the advice."""
+    """Why the tool is slower than asked; the value of each cause is the advice to the user."""
 
     #: Beginning and end of the motion, and of its parts between joint motions.
     RAMP = 'begin the path before the seam and end it behind, so that the tool has its speed there'
@@ -52,12 +53,12 @@ class SlowStretch:
     cause: SlowCause
     #: The explanation, as a clause.
     reason: str
-    #: The point to which the advice belongs.
+    #: Index of the point that the advice names.
     point: int
 
     @property
     def counts(self) -> bool:
-        """Whether ``min_speed_fraction`` applies: not to ramps, nor blends of unknown speed."""
+        """Whether ``min_speed_fraction`` applies; not to ramps and blends of unknown speed."""
         return self.cause not in (SlowCause.RAMP, SlowCause.IN_BLEND)
 
     @property
@@ -88,7 +89,7 @@ def speed_advice(stretches: Sequence[SlowStretch]) -> list[str]:
 
 
 def name_points(points: Sequence[int]) -> str:
-    """Return a text that lists the first of some points, and the number of the others."""
+    """Return a text that lists the first few points and counts the others."""
     more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
     listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
     return f'{"point" if len(points) == 1 else "points"} {listed}{more}'

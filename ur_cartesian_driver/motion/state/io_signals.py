@@ -20,7 +20,7 @@ class AnalogDomain(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalogChannel:
-    """An analog input or output: its value [A] or [V], as the domain says."""
+    """An analog input or output, whose value is in [A] or [V], depending on the domain."""
 
     domain: AnalogDomain
     value: float
@@ -43,19 +43,19 @@ class DigitalChannels:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
-    """All inputs, outputs and the tool connector at one time."""
+    """All inputs and outputs, and the tool connector, at one time."""
 
     inputs: DigitalChannels
     outputs: DigitalChannels
     analog_inputs: tuple[AnalogChannel, AnalogChannel]
     analog_outputs: tuple[AnalogChannel, AnalogChannel]
     tool_analog_inputs: tuple[AnalogChannel, AnalogChannel]
-    #: Supply of the tool: the voltage that is set [V] and the measured current [A].
+    #: Supply of the tool: the voltage setting [V], and the measured current [A].
     tool_voltage: int = 0
     tool_current: float = 0.0
     #: [degrees Celsius].
     tool_temperature: float = 0.0
-    #: Mode of the tool, in the numbers of the controller.
+    #: Mode of the tool, as the controller numbers it.
     tool_mode: int = 0
     #: Mass of the payload [kg], and its centre of gravity in the flange [m]; NaN = not reported.
     payload: float = nan

@@ -32,9 +32,9 @@ def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> V
     """
     Return the acceleration of a body at another point of it: a + e x r + w x (w x r).
 
-    :param acceleration: linear [m/s^2] and angular [rad/s^2], at the first point.
-    :param twist: at any point.
-    :param offset: from the first point to the other one [m], in the axes of both.
+    :param acceleration: linear [m/s^2] and angular [rad/s^2] acceleration at the first point.
+    :param twist: twist at any point of the body.
+    :param offset: from the first point to the other one [m], in the axes of both vectors.
     """
     a, e, w = acceleration[:3], acceleration[3:], twist[3:]
     return (*add(add(a, cross(e, offset)), cross(w, cross(w, offset))), *e)

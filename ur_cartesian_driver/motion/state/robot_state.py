@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the values that the robot reports by RTDE, and the names of its modes."""
+"""The table of the values that the robot reports by RTDE, and its modes as enumerations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
 
 
 class RobotMode(IntEnum):
-    """State of the arm's power; numbers of the controller."""
+    """State of the arm's power, as the controller numbers it."""
 
     NO_CONTROLLER = -1
     DISCONNECTED = 0
@@ -30,7 +30,7 @@ class RobotMode(IntEnum):
 
 
 class SafetyMode(IntEnum):
-    """State of the safety system; numbers of the controller."""
+    """State of the safety system, as the controller numbers it."""
 
     NORMAL = 1
     REDUCED = 2
@@ -56,7 +56,7 @@ class SafetyMode(IntEnum):
 
 
 class RuntimeState(IntEnum):
-    """State of the robot program; numbers of the controller."""
+    """State of the robot program, as the controller numbers it."""
 
     STOPPING = 0
     STOPPED = 1
@@ -99,24 +99,24 @@ class Rtde:
     name: str
     #: Whether older software lacks the output; the field then has its default.
     optional: bool = False
-    #: Whether goals are monitored with the output; a packet in which it is not finite is refused.
+    #: Whether goals are monitored with the output; packets in which it is not finite are refused.
     monitored: bool = True
 
 
-# A state is never changed, but not frozen: a frozen one takes four times as long to create, and
-# one is created for each packet, before the driver reacts to the packet.
+# A complete state is never changed. The class is still not frozen, because a frozen object takes
+# four times as long to create, and one is created for each packet, before the driver reacts to it.
 @dataclass(slots=True)
 class RobotState:
     """
     One RTDE packet: joints in rad and rad/s, poses of the TCP in the robot's base.
 
-    Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
+    Twists are the linear [m/s] and angular [rad/s] velocity of the TCP in base axes.
 
     This is the only table of these fields: the RTDE recipe, the shared memory and the ``~/status``
     message follow from names, types and :class:`Rtde`. Optional outputs come after the others,
-    and the driver's computed fields come last. A field of the same name in DriverStatus.msg
-    reports the value, but its ``speed_scaling`` carries ``effective_speed``. Values of new RTDE
-    outputs in the simulator are computed in ``sim/interfaces/rtde_output_values.py``.
+    and the fields that the driver computes come last. A field of DriverStatus.msg reports the
+    field of the same name, except that ``speed_scaling`` there is ``effective_speed``. The
+    simulator computes RTDE outputs, also new ones, in ``sim/interfaces/rtde_output_values.py``.
     """
 
     #: The controller's clock [s].
@@ -131,8 +131,9 @@ class RobotState:
     target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
-    #: The slowdown in addition to the slider, and the slider, both 0 to 1 (``effective_speed``).
+    #: The slowdown in addition to the speed slider, 0 to 1 (:mod:`~.effective_speed`).
     speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
+    #: The speed slider, 0 to 1.
     target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
     robot_mode: Annotated[RobotMode, Rtde('robot_mode')] = RobotMode.RUNNING
     safety_mode: Annotated[SafetyMode, Rtde('safety_mode')] = SafetyMode.NORMAL
@@ -141,14 +142,15 @@ class RobotState:
     safety_status: Annotated[SafetyStatus, Rtde('safety_status_bits')] = SafetyStatus.NORMAL_MODE
     #: The active TCP in the flange frame.
     T_flange_tcp: Annotated[Pose, Rtde('tcp_offset', optional=True)] = IDENTITY
-    #: Linear [m/s^2] and angular [rad/s^2], as the twists; None = the robot does not report it.
+    #: Linear [m/s^2] and angular [rad/s^2] acceleration of the TCP in base axes; None = not
+    #: reported.
     actual_tcp_acceleration: Annotated[
         Vector6 | None, Rtde('actual_TCP_acceleration', optional=True, monitored=False)
     ] = None
     target_tcp_acceleration: Annotated[
         Vector6 | None, Rtde('target_TCP_acceleration', optional=True, monitored=False)
     ] = None
-    #: Torque of each joint [Nm], derived from its current; None = the robot does not report it.
+    #: Torque of each joint [Nm], derived from its current; None = not reported.
     joint_torque: Annotated[
         Vector6 | None, Rtde('actual_current_as_torque', optional=True, monitored=False)
     ] = None
@@ -158,7 +160,7 @@ class RobotState:
     program_version: Annotated[int, Rtde('output_int_register_32', optional=True)] = 0
     program_number: Annotated[int, Rtde('output_int_register_33', optional=True)] = 0
     program_run: Annotated[int, Rtde('output_int_register_34', optional=True)] = 0
-    #: The token of the last order for safe outputs that our robot program has carried out.
+    #: Token of the last request to set safe outputs that our robot program has carried out.
     safe_outputs_token: Annotated[int, Rtde('output_int_register_35', optional=True)] = 0
     #: How fast the motion of the program runs, 0 to 1; :mod:`~.effective_speed` computes it from
     #: this packet and the earlier ones.
@@ -169,7 +171,7 @@ class RobotState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateField:
-    """A row of the table: a field of :class:`RobotState`."""
+    """A row of :data:`STATE_TABLE`: a field of :class:`RobotState`."""
 
     name: str
     #: float, int, an enumeration of numbers, Vector6 or Pose; without ``None``.
@@ -177,7 +179,7 @@ class StateField:
     #: Whether the field can hold None (vectors only).
     may_be_none: bool
     default: Any
-    #: None = the driver computes it.
+    #: The RTDE output that the field holds; None = the driver computes the field.
     rtde: Rtde | None
 
 

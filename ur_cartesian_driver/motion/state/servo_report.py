@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Feedback of the robot on streamed set-points, and the report of the driver about them."""
+"""The robot's feedback on streamed set-points, and the driver's report about them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ UNKNOWN6: Vector6 = (nan,) * 6
 
 
 class ServoActivity(IntEnum):
-    """The phase of the streaming; the numbers of ``ServoState``."""
+    """The phase of the stream of set-points, numbered as in ``ServoState``."""
 
     IDLE = 0
     FILLING = 1
@@ -28,8 +28,8 @@ class ServoFeedback:
     """
     The registers of the buffered servo in one RTDE packet.
 
-    Only our own robot program writes the counts; a program written after the manufacturer's guide
-    leaves them at 0.
+    Only our own robot program writes the counts, which are the fields with a default; a program
+    that follows the manufacturer's guide leaves them at 0.
     """
 
     #: The controller's clock [s].
@@ -66,7 +66,7 @@ class ServoReport:
     lag: float
     #: The effective speed, 0 to 1.
     speed_scaling: float
-    #: Target - actual [rad].
+    #: Target minus actual joint positions [rad].
     joint_error: Vector6 = UNKNOWN6
     underruns: int = 0
     overruns: int = 0

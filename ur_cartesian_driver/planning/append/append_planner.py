@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan appended points (keep_open): part by part, each from the end of the previous one.
+Plan the points that are appended to a goal (keep_open) in parts, one after the other.
 
 The last motion of a part is planned to end at rest, because the next point is unknown. The driver
-holds this motion back as the *ending* of the goal. If points come in time, it is planned again
-together with them, so that a blend or a spline passes through its end. Otherwise it is sent, the
-arm rests at its end, and the next part begins there.
+holds this motion back as the *ending* of the goal. If points come in time, the ending is planned
+again together with them, so that a blend or a spline passes through its end. Otherwise the ending
+is sent, the arm comes to rest, and the next part begins there.
 
 Primitives are planned together with the last two points before them, because blends depend on
 these. A spline needs no such context, as position, velocity and acceleration are its whole state;
-its ending is a piece that brakes after the last point
+the ending of a spline is a piece that brakes after the last point
 (:func:`~ur_cartesian_driver.planning.spline.spline_planner.plan_stop`).
 """
 
@@ -61,32 +61,33 @@ from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 #: Number of points that are planned again with the next ones: the last point, whose motion is held
 #: back, and the one before it, whose blend leads into that motion.
 REPLANNED_POINTS = 2
-#: Delays to try for the start of a spline from rest [s]; the first possible one is used.
+#: Delays [s] to try for the start of a spline from rest; the first with a valid plan is used.
 START_DELAYS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-#: Rows of the reference path along a stopping piece.
+#: Number of steps of the reference path along a stopping piece.
 _STOP_ROWS = 16
-# Digits of a client's time [s]: nanoseconds.
+# Decimal places of a client's times [s]: nanoseconds.
 _DIGITS = 9
-#: The numbers of points in sentences of the planner.
+#: Pattern of the numbers of points and segments in texts of the planner.
 _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendPlan:
-    """The plan of appended points, which passed all checks."""
+    """The plan of appended points that passed all checks."""
 
-    #: The plan with the ending; its reference path is in motion time.
+    #: The plan, including the ending; the times of its reference path are motion times.
     plan: Plan
-    #: Number of records that stay before this plan, and the time at which they end [s].
+    #: Number of the goal's records that stay before this plan.
     records_before: int
+    #: Motion time at which these records end [s].
     start_time: float
     #: Number of records of this plan that belong to the ending.
     ending_records: int
-    #: Time at which this plan ends, if the goal has times [s].
+    #: Motion time at which this plan ends [s]; None = the goal has no times.
     end_time: float | None
-    #: Of a spline: the joints in motion time; and the time at which it leaves the previous plan
-    #: [s], if that is before the last point of the previous plan.
+    #: The joints over motion time; None = the goal is no spline.
     spline: JointSpline | None = None
+    #: Motion time at which a spline leaves the previous plan [s]; None = at its last point.
     cut_time: float | None = None
     #: The answer to the client.
     text: str
@@ -95,7 +96,7 @@ class AppendPlan:
 
 
 def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPlan:
-    """Return the first part of a goal, with its ending."""
+    """Return the first part of a goal, with its ending, from the plan of the goal."""
     goal = plan.goal
     base = AppendableGoal(
         goal=replace(
@@ -125,8 +126,8 @@ def plan_append(
     """
     Return the plan of appended points.
 
-    :param from_rest: whether the ending was sent, so that the arm rests or is about to rest.
-    :raises GoalRefused: its text numbers points from the start of the goal.
+    :param from_rest: whether the ending was sent, so that the arm is or will be at rest.
+    :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
     cut = cut_tail(appendable, cut_time(appendable, appended), arm)
     if cut is appendable:
@@ -185,13 +186,13 @@ class _PartPlanner:
         self._before, self._appended, self._arm, self._options = appendable, appended, arm, options
         self._T_flange_tcp = appendable.T_flange_tcp or appendable.T_flange_active
         self._segments = appended.segments or (Segment(),) * len(appended.waypoints)
-        #: The number of points, including this part's.
+        #: Number of points of the goal, including those of this part.
         self._points = appendable.points + len(appended.waypoints)
 
     # -- motions of the robot --------------------------------------------------------------------
 
     def append_moves(self, records_before: int, start_time: float) -> AppendPlan:
-        """Return a part of robot motions, planned together with the last ones before it."""
+        """Return a part of robot motions, planned together with the last motions before it."""
         before, appended = self._before, self._appended
         replannable, q_start, time_before = (
             before.replannable,
@@ -213,7 +214,7 @@ class _PartPlanner:
             io_commands=self._pending_commands(first, start_time),
             keep_open=not appended.last,
         )
-        # The first replanned motion is under way: the next one starts from the blend after it.
+        # The first replanned motion was sent before: planning starts from the blend after it.
         running = replannable[0].planned if len(replannable) == REPLANNED_POINTS else None
         try:
             plan = plan_goal(goal, self._at_rest(q_start), self._arm, self._options, running)
@@ -226,7 +227,7 @@ class _PartPlanner:
     def _pending_commands(self, first: int, start_time: float) -> tuple[IOCommand, ...]:
         """Return the commands of a part, and the earlier commands that are still due."""
         old = []
-        # The last of the points whose motions are planned again although already committed.
+        # Row of the replanned point whose motion is already committed; negative = none.
         committed = len(self._before.replannable) - 2
         for end_time, command in self._before.outputs:
             if command.waypoint == self._before.points - 1:
@@ -236,7 +237,7 @@ class _PartPlanner:
         return (*old, *numbered(self._appended, first))
 
     def moves_part(self, plan: Plan, records_before: int, start_time: float) -> AppendPlan:
-        """Return a part whose last motion is its ending."""
+        """Return a part of robot motions, the last of which is its ending."""
         *others, last = plan.segments
         time = start_time + sum(segment.duration for segment in others)
         replannable = self._replannable(plan)
@@ -279,10 +280,10 @@ class _PartPlanner:
         self, plan: Plan, start_time: float
     ) -> tuple[tuple[float, IOCommand], ...]:
         """
-        Return the commands whose records belong to the ending: the next part places them again.
+        Return the commands whose records belong to the ending; the next part places them again.
 
-        Records before the last motion are committed, even if they are due during that motion. Of
-        commands for the same output, the earlier ones have the earlier records.
+        Records that precede the last motion are committed, even if they are due during it. Among
+        equal commands, the earlier ones have the earlier records.
         """
         ends = _end_times(plan.segments, start_time)
         commands = [
@@ -312,7 +313,11 @@ class _PartPlanner:
     def append_spline(
         self, start: SplineState, records_before: int, time_offset: float
     ) -> AppendPlan:
-        """Return the part of a spline from a state; client time + offset = motion time [s]."""
+        """
+        Return the part of a spline that begins in a state.
+
+        :param time_offset: motion time less client time [s].
+        """
         before = self._before = replace(self._before, time_offset=time_offset)
         goal = self._spline_goal(start)
         found = plan_spline(
@@ -344,10 +349,10 @@ class _PartPlanner:
         return self.spline_part(plan, begin, found.end, records_before)
 
     def _spline_goal(self, start: SplineState) -> GoalTable:
-        """Return the checked goal of the appended points for the TCP, in motion time."""
+        """Return the checked goal of the appended points, for the TCP and with motion times."""
         before, appended = self._before, self._appended
         points = WaypointRows.of(appended.waypoints)
-        # The points are checked as a separate goal, with times since the last point before them.
+        # The points are checked as a goal of their own, with times since the point before them.
         goal = replace(
             before.goal,
             waypoints=replace(
@@ -378,7 +383,8 @@ class _PartPlanner:
         Return a part whose ending is a stopping piece, if the arm moves at its last point.
 
         If outputs are due at the last point or later, the piece to that point also belongs to the
-        ending: the outputs follow it on the wire, and their triggers depend on the next points.
+        ending: the outputs follow that piece on the wire, and their triggers depend on the next
+        points.
         """
         start_time = begin.time
         closing = self._stop(end) if end.is_moving and not self._appended.last else None
@@ -423,7 +429,7 @@ class _PartPlanner:
         return replace(appended, spline=spline)
 
     def _stop(self, end: SplineState) -> tuple[PlannedSegment, ReferencePath]:
-        """Return the piece that brings the arm to rest after the last point, and its path."""
+        """Return the piece that stops the arm after the last point, and the path of the piece."""
         piece = plan_stop(end, self._arm, self._options.keep_open_deceleration)
         times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)
         q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(
@@ -493,7 +499,7 @@ class _PartPlanner:
         *,
         timed: bool,
     ) -> AppendPlan:
-        """Return a part; the counts of points and records are added to its next goal."""
+        """Return a part; its next goal also gets the counts of points and records."""
         last, records = self._appended.last, records_before + _record_count(plan.segments)
         ending_records = _record_count(ending)
         # After the last motion, the robot program waits until its outputs are switched.
@@ -522,7 +528,7 @@ class _PartPlanner:
         return state_at_rest(self._arm, q, self._before.T_flange_active)
 
     def _text(self) -> str:
-        """Return the answer, with remarks on fields of appended points that have no effect."""
+        """Return the answer, with remarks on ineffective fields of the appended points."""
         before, appended = self._before, self._appended
         goal = replace(
             before.goal,
@@ -543,7 +549,7 @@ class _PartPlanner:
 
 
 def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
-    """Return a plan without the motions to points before a waypoint, renumbered and shifted."""
+    """Return a plan from a waypoint on, renumbered by ``first`` and shifted in time."""
     left_out = [s for s in plan.segments if s.waypoint + first < waypoint]
     begin = sum(segment.duration for segment in left_out)
     path = plan.reference
@@ -557,19 +563,19 @@ def _renumber_plan(plan: Plan, first: int, waypoint: int, start_time: float) -> 
             for s in plan.segments[len(left_out) :]
         ),
         reference=_path_from(path, start_time, SAME_TIME),
-        find_slow_stretches=tuple,  # the plan's own would name other points
+        find_slow_stretches=tuple,  # the plan's function would name other points
     )
 
 
 def _renumber_text(text: str, first: int) -> str:
-    """Return a text whose points are numbered from the start of the goal."""
+    """Return a text with its points renumbered from the start of the goal."""
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
 def _path_from(
     path: ReferencePath, start_time: float, tolerance: float = 2.0 * SAME_TIME
 ) -> ReferencePath:
-    """Return copies of the rows of a path from a time on [s]; the other rows can be freed."""
+    """Return copies of a path's rows from a time [s] on, so that the path itself can be freed."""
     row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
     return ReferencePath(
         poses=path.poses[row:].copy(),
@@ -594,7 +600,7 @@ def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
 
 
 def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:
-    """Return the time at which the motion to each waypoint ends [s]."""
+    """Return, by waypoint, the time [s] at which the motion to it ends."""
     ends, now = {}, start_time
     for segment in segments:
         now += segment.duration
@@ -603,7 +609,7 @@ def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[in
 
 
 def _blend_half(segment: PlannedSegment) -> float:
-    """Return the time in the blend after a segment up to the point that is blended [s]."""
+    """Return the time [s] from the beginning of the blend after a segment to its point."""
     return segment.blend_entry.half if segment.blend_entry else 0.0
 
 

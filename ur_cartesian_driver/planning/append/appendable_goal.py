@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
 class Replacement(IntEnum):
-    """The tail that appended points replace; values as in ``AppendPoints``."""
+    """What the appended points replace, if anything; values as in ``AppendPoints``."""
 
     APPEND = 0
     REPLACE_FROM_POINT = 1
@@ -52,14 +52,14 @@ class AppendedPoints:
     io_commands: tuple[IOCommand, ...] = ()
     #: Whether these points are the last of the goal.
     last: bool = False
-    #: The first point that is replaced, or the time from which the motion is replaced, on the
-    #: clock of the points' times [s]. If both are None, the points follow the last point.
+    #: The first point that is replaced. If this and the next are None, no point is replaced.
     replace_from_point: int | None = None
+    #: The time from which the motion is replaced, on the clock of the points' times [s].
     replace_from_time: float | None = None
 
     @property
     def replaces(self) -> bool:
-        """Whether the points replace others."""
+        """Whether these points replace points of the goal."""
         return self.replace_from_point is not None or self.replace_from_time is not None
 
     def in_rows(self) -> AppendedPoints:
@@ -77,48 +77,51 @@ class AppendedPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplannablePoint:
-    """A point that can be planned again, with the state of the arm before it."""
+    """A point that can be planned again, with the arm's joints and the time before it."""
 
     waypoint: Waypoint
     segment: Segment
     q_before: Joints
     time_before: float
-    #: The motion to the point as it was planned last.
+    #: The motion to the point, as last planned.
     planned: PlannedSegment | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendableGoal:
-    """The state of a goal to which points can be appended; it does not grow with the goal."""
+    """The state of a goal to which points can be appended, without the points passed so far."""
 
     #: The goal without its points.
     goal: Goal
     T_flange_active: Pose
     T_flange_tcp: Pose | None
     points: int = 0
-    #: Number of records on the wire, and of those that are committed (not part of the ending).
+    #: Number of planned records.
     records: int = 0
+    #: Number of committed records: all but those of the ending.
     committed_records: int = 0
-    #: Motion times at which the committed records end, and at which all of them end [s].
+    #: Motion time at which the committed records end [s].
     time: float = 0.0
+    #: Motion time at which all records end [s].
     rest_time: float = 0.0
-    #: Client time + offset = motion time [s].
+    #: Motion time less client time [s].
     time_offset: float = 0.0
-    #: Time of the last point, as the client gave it [s].
+    #: Client time of the last point [s].
     last_client_time: float = 0.0
     #: Joint positions at rest after the ending [rad].
     q_rest: Joints
     replannable: tuple[ReplannablePoint, ...] = ()
-    #: Of a spline: the state at its last point.
+    #: State at the last point; None = the goal is no spline.
     state: SplineState | None = None
-    #: Pieces up to that state, with their path, that are sent (again) with the next ones, because
-    #: outputs follow them or a new tail begins in the middle of one.
+    #: Pieces up to ``state``, with their path, that are sent (again) together with the next part,
+    #: because outputs follow these pieces or a new tail begins in the middle of one of them.
     replanned: tuple[tuple[PlannedSegment, ...], ReferencePath] | None = None
-    #: Commands that may not have switched yet, with the time at which they are due [s].
+    #: Commands that may not have been carried out, each with the motion time when it is due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
-    #: Of a spline: the planned parts that are not passed, in the order of planning, each valid
-    #: until the next one begins; and all commands on the spline.
+    #: The planned parts of a spline that are not passed, in the order of planning; each is valid
+    #: until the next one begins.
     parts: tuple[PlannedPart, ...] = ()
+    #: All commands on these parts, each with the motion time when it is due [s].
     commands: tuple[tuple[float, IOCommand], ...] = ()
 
 
@@ -128,7 +131,7 @@ def check_appended_points(
     """
     Make the checks of appended points that do not depend on the state of the arm.
 
-    :raises GoalRefused: its text numbers points from the start of the goal.
+    :raises GoalRefused: the points are wrong; the text numbers points from the goal's start.
     """
     count, first = len(appended.waypoints), appendable.points
     check_list_lengths(
@@ -151,7 +154,7 @@ def check_appended_points(
                 'name one of these',
             )
         check_record(f'io_commands[{i}]', command)
-    # The new commands alone, so that refusals give their numbers in this request.
+    # Only the new commands are checked, so that refusals number them as in this request.
     check_outputs(
         goal_table(
             replace(

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The pieces of a spline that were planned in one go, and the state of the joints on them."""
+"""Spline pieces that were planned together, and the state of the joints on them."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from ur_cartesian_driver.motion.plan.plan import PlannedSegment
 from ur_cartesian_driver.motion.plan.primitive import Spline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
-# Digits of joint rates (further ones are rounding errors) and of times (microseconds).
+# Decimal places of joint rates (further digits are rounding errors) and of times (microseconds).
 _DIGITS, _TIME_DIGITS = 12, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedPart:
-    """The pieces of one append plan; a new tail may begin on them."""
+    """The spline pieces of one append plan; a new tail can begin at any time on these pieces."""
 
-    #: The joints in motion time, including the ending.
+    #: The joints over motion time, including the stop after the last point, if there is one.
     spline: JointSpline
-    #: For each piece up to the last point: the point to which it leads, and the number of records
-    #: of the goal before it.
+    #: For each piece but that stop, the point to which the piece leads.
     waypoints: Int32s
+    #: For each piece but that stop, the number of records of the goal before the piece.
     records_before: Indices
 
     def begin(self, row: int) -> float:
-        """Return the time at which a piece begins, or at which the piece before it ends [s]."""
+        """Return the motion time [s] at which piece ``row`` begins and piece ``row - 1`` ends."""
         return float(self.spline.times[row])
 
     def row_at(self, time: float) -> int:
-        """Return the row of the piece that runs at a time [s]."""
+        """Return the row of the piece that runs at a motion time [s]."""
         times = self.spline.times[: len(self.waypoints)]
         return max(int(np.searchsorted(times, time + SAME_TIME, side='right')) - 1, 0)
 
     def state(self, row: int, time: float) -> SplineState:
-        """Return the state on a piece at a time [s], as the robot program continues from it."""
+        """Return the state at a time [s] on a piece; the acceleration is 0 on a cubic piece."""
         coefficients = self.spline.coefficients[row : row + 1]
         rows = evaluate(coefficients, np.array([time - self.begin(row)]))
         q, qd, qdd = (vector6(values[0].tolist()) for values in rows)
@@ -49,7 +49,7 @@ class PlannedPart:
         return SplineState(time=time, q=q, qd=qd, qdd=ZERO6 if self._is_cubic(row) else qdd)
 
     def piece(self, row: int, end_time: float) -> PlannedSegment:
-        """Return a piece that is cut off at a time [s]."""
+        """Return the piece of a row, cut off at the motion time ``end_time`` [s]."""
         end, duration = self.state(row, end_time), end_time - self.begin(row)
         return PlannedSegment(
             primitive=Spline(

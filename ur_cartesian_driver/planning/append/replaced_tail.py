@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Replace the tail of a spline: keep the goal up to a cut, after which a new tail is appended.
+Replace the tail of a spline: keep the goal up to a cut, from which a new tail is appended.
 
 The new tail begins with the position, velocity and acceleration that the joints have at the cut.
-If the cut is in the middle of a piece, a shorter piece is sent in its place.
+If the cut is in the middle of a piece, a shorter piece is sent in place of that piece.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 #: Shortest piece that a cut leaves [s]: a cycle of the slowest controllers.
 MIN_PIECE_TIME = 0.008
-#: Time for which passed pieces are kept [s], because the newest state of the arm can be old.
+#: Time [s] for which passed pieces are kept, because the newest state of the arm can be this old.
 HISTORY_TIME = 0.5
-# Time between the rows of the path of pieces that are sent again [s].
+# Time between the rows of the path along pieces that are sent again [s].
 _ROW_PERIOD = 0.004
 _TIME_DIGITS = 6
 
 
 def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
     """
-    Return the motion time at which a new tail is to begin [s]; infinite = after the last point.
+    Return the motion time [s] at which a new tail is to begin; infinite = at the last point.
 
-    :raises GoalRefused: there is no such point or time, or the goal has no tail to replace.
+    :raises GoalRefused: the request names both a point and a time, the point does not exist, the
+        time is not finite, or the goal is no spline.
     """
     if not new_points.replaces:
         return inf
@@ -71,10 +72,10 @@ def cut_time(before: AppendableGoal, new_points: AppendedPoints) -> float:
 
 def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
     """
-    Return the first point that can be replaced, and the earliest time for a new tail.
+    Return the first point that can be replaced, and the earliest time at which a tail can begin.
 
     :param time: motion time until which the motion is final [s].
-    :returns: the number of the point, and the client time in whole milliseconds [s].
+    :returns: the number of the point, and the client time [s], in whole milliseconds.
     """
     client_time = ceil(1e3 * (time - before.time_offset) - 1e-6) * 1e-3
     part = _part_at(before, time)
@@ -87,9 +88,9 @@ def first_replaceable(before: AppendableGoal, time: float) -> tuple[int, float]:
 
 def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     """
-    Return a goal without the motion planned from a time on [s]; the same goal if there is none.
+    Return a goal without its motion after a time [s]; ``before`` itself if there is none.
 
-    :raises AlreadySent: the plan of that time is no longer known.
+    :raises AlreadySent: the pieces at that time are no longer kept.
     """
     if time == inf:
         return before
@@ -102,7 +103,8 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
     if found is None:
         raise AlreadySent(*first_replaceable(before, before.parts[0].begin(0)))
     part, row = found, found.row_at(time)
-    # Outputs that are due after the cut follow the piece before it on the wire.
+    # Outputs due on the rest of the cut piece follow the piece before it on the wire, so the piece
+    # before is sent again, too.
     first = row - any(
         time - SAME_TIME <= due < part.begin(row + 1) - SAME_TIME for due, _ in before.commands
     )
@@ -127,7 +129,7 @@ def cut_tail(before: AppendableGoal, time: float, arm: Arm) -> AppendableGoal:
 
 
 def without_passed(before: AppendableGoal, time: float) -> AppendableGoal:
-    """Return a goal without the pieces that the arm has passed at a time [s]."""
+    """Return a goal without the parts that were passed ``HISTORY_TIME`` before a time [s]."""
     first = _part_at(before, time - HISTORY_TIME)
     if first is None or first is before.parts[0]:
         return before
@@ -146,7 +148,7 @@ def state_at(before: AppendableGoal, time: float) -> SplineState:
 
 
 def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
-    """Return the part in effect at a time [s]: the last one that has begun."""
+    """Return the part in effect at a motion time [s]: the last part that has begun by then."""
     for part in reversed(before.parts):
         if part.begin(0) <= time + SAME_TIME:
             return part
@@ -154,7 +156,7 @@ def _part_at(before: AppendableGoal, time: float) -> PlannedPart | None:
 
 
 def _end_time(before: AppendableGoal, point: int) -> float:
-    """Return the time at which a point is reached [s]; -inf = before all parts that are kept."""
+    """Return the motion time [s] at which a point is reached; -inf = before all parts kept."""
     for part in reversed(before.parts):
         if part.waypoints[0] <= point:
             row = int(np.searchsorted(part.waypoints, point, side='right'))
@@ -163,7 +165,7 @@ def _end_time(before: AppendableGoal, point: int) -> float:
 
 
 def _away_from_ends(part: PlannedPart, time: float) -> float:
-    """Return the first time, not before ``time``, at which a cut leaves no short piece [s]."""
+    """Return the first time [s] from ``time`` on at which a cut leaves no short piece."""
     row = part.row_at(time)
     begin, end = part.begin(row), part.begin(row + 1)
     if time - begin < SAME_TIME:
@@ -175,7 +177,7 @@ def _away_from_ends(part: PlannedPart, time: float) -> float:
 def _path(
     before: AppendableGoal, part: PlannedPart, first: int, time: float, arm: Arm
 ) -> ReferencePath:
-    """Return the path of pieces that are sent again."""
+    """Return the path along the pieces that are sent again, from ``first`` to a time [s]."""
     begin = part.begin(first)
     times = np.linspace(begin, time, ceil((time - begin) / _ROW_PERIOD) + 1)
     rows = np.searchsorted(part.spline.times, times - SAME_TIME) - 1

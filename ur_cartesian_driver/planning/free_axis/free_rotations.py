@@ -3,9 +3,9 @@
 """
 Choose the rotations of a goal with a free axis.
 
-The result is the goal with the chosen orientations and without a free axis; it is planned and
-checked like any other. So the search here need not be exact: it uses the ideal arm and samples of
-the path, and ignores blends.
+The result is a goal with the chosen orientations and without a free axis, which is planned and
+checked like any other goal. So the search here need not be exact: it uses the ideal arm and
+samples of the path, and ignores blends.
 """
 
 from __future__ import annotations
@@ -60,22 +60,26 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     OPTIMIZED_TYPES,
 )
 
-#: Samples on a segment: one for each of these lengths [m] or tilts of the axis [rad], to a limit.
+#: Length of a segment [m] for which there is one sample.
 _SAMPLE_LENGTH = 0.02
+#: Tilt of the axis [rad] for which there is one sample, if the tilts need more than the lengths.
 _SAMPLE_TILT = pi / 18.0
+#: Greatest number of samples of a segment (at density 1).
 _MAX_SAMPLES = 32
-#: Where all rotations are allowed, they are chosen at points this far apart [m], [rad], and
-#: interpolated between these.
+#: Where all rotations are allowed, rotations are chosen at points that are this far apart, by
+#: length [m] or tilt [rad], and interpolated between these points.
 _KNOT_LENGTH = 0.01
 _KNOT_TILT = pi / 36.0
 #: Length that adds as much to the size of a path as a tilt of one radian [m].
 _LENGTH_PER_RADIAN = 0.05
-#: Greatest number of searches, each of which avoids the collisions found by those before.
+#: Greatest number of searches; each avoids the collisions found by the earlier ones.
 _MAX_SEARCHES = 8
-#: Costs of a rotation whose clearance exceeds the required one by less than each key [m].
+#: Costs of a small clearance: a rotation whose clearance exceeds the required one by less than a
+#: key [m] costs that key's value; the costs of all such keys are added.
 _NEARNESS = {0.0: 1000.0, 0.003: 100.0, 0.01: 20.0}
-#: Number of smoothing passes, and the greatest change of a rotation by all of them [rad].
+#: Number of smoothing passes.
 _SMOOTHING_PASSES = 40
+#: Greatest change of a rotation by all smoothing passes together [rad].
 _MAX_SMOOTHING = pi / 120.0
 
 #: Greatest change of a rotation per sample of a segment [rad].
@@ -90,13 +94,13 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
 def as_named(goal: GoalTable) -> GoalTable:
-    """Return a goal without a free axis, in its given orientations or the nearest allowed ones."""
+    """Return a goal without a free axis, with the given or nearest allowed orientations."""
     segments = goal.segments
     return _turned(goal, np.clip(0.0, segments.free_minima, segments.free_maxima))
 
 
 def _turned(goal: GoalTable, turns: Floats) -> GoalTable:
-    """Return a goal without a free axis, with poses turned about it by ``turns`` (n,) [rad]."""
+    """Return a goal without free axes, with poses turned about them by ``turns`` (n,) [rad]."""
     points, segments = goal.waypoints, goal.segments
     free, plain = segments.free_axes != FreeAxis.NONE, SegmentRows.plain(len(segments))
     half = 0.5 * turns[free, None]
@@ -137,9 +141,9 @@ def choose_rotations(
     Return a checked goal with its rotations about the free axis chosen.
 
     :param state: state of the robot at the start.
-    :param density: factor on the number of samples; between two samples, the arm may come near a
-        singularity.
-    :raises NoRotation: no rotations lead along the whole path.
+    :param density: factor on the number of samples; a higher one misses fewer singularities
+        between samples.
+    :raises NoRotation: the arm cannot follow the whole path with any choice of rotations.
     """
     path = _FreePath(goal, state, options, density)
     if not path.is_open.any():  # every range is a single rotation
@@ -162,7 +166,7 @@ def choose_rotations(
 
 
 def _search_without_collisions(lattice: RotationLattice, path: _FreePath) -> RotationPath:
-    """Return the best way without collisions; the last one found, if all have some."""
+    """Return the best way without collisions, or the last way found if all have collisions."""
     least = path.options.min_clearance
 
     def too_close(q: Floats, more: float) -> Flags:
@@ -199,7 +203,7 @@ class _FreePath:
         segments = goal.segments
         free = segments.free_axes != FreeAxis.NONE
         first = int(np.argmax(free))
-        #: Whether the controlled frame is or becomes the TCP; others cannot turn on a line.
+        #: Whether the controlled frame is or becomes the TCP; other frames cannot turn on a line.
         self.can_turn = options.allow_tcp_change or (
             T_tcp_controlled.distance_to(IDENTITY) <= SAME_TCP
             and T_tcp_controlled.angle_to(IDENTITY) <= SAME_TCP
@@ -228,7 +232,7 @@ class _FreePath:
             self.is_any[0] = self.is_open[0] = False
 
     def _with_arc_ends(self, poses: Floats) -> Floats:
-        """Return the poses, with those at the ends of FIXED arcs as the arcs arrive there."""
+        """Return the poses, with the poses in which FIXED arcs arrive at their ends."""
         self.arcs: dict[int, ArcCurve] = {}
         segments = self.goal.segments
         for row in np.flatnonzero(segments.types == SegmentType.CIRCULAR).tolist():
@@ -254,8 +258,8 @@ class _FreePath:
         """
         Return the reference orientations (n, 4), and the rotations (n,) of the poses from them.
 
-        Each reference is the previous one, turned the shortest way so that its axis points as the
-        axis of the pose.
+        Each reference is the previous one, turned the shortest way so that its free axis has the
+        direction of the free axis of the pose.
         """
         references = np.empty((len(self.poses), 4))
         reference, axis = self.start.quaternion, rotate(self.start.quaternion, self.axis)
@@ -271,7 +275,7 @@ class _FreePath:
     # -- the lattice -----------------------------------------------------------------------------
 
     def lattice(self, arm: Arm) -> RotationLattice:
-        """Return the lattice of the path, with a layer for each of its ``knots``."""
+        """Return the lattice of the path, with a layer for each of the ``knots``."""
         before = np.concatenate([[self.start.row()], self.poses[:-1]])
         lengths = distance_rows(before, self.poses)
         for arc_row, arc in self.arcs.items():
@@ -314,7 +318,7 @@ class _FreePath:
         )
 
     def _knots(self, lengths: Floats, tilts: Floats) -> Indices:
-        """Return the rows whose rotations are searched; those between are interpolated."""
+        """Return the rows whose rotations are searched; the rows between are interpolated."""
         extent = np.maximum(lengths / _KNOT_LENGTH, tilts / _KNOT_TILT)
         full = np.diff(np.floor(np.cumsum(np.minimum(extent, 1.0))), prepend=0.0) > 0.0
         after_any = np.append(self.is_any[1:] & ~self.is_joint[1:], False)
@@ -325,12 +329,12 @@ class _FreePath:
         # Where the rotation is not free, the change that the goal commands must be possible.
         commanded = np.abs(np.diff(self.rotations, prepend=0.0))
         bound = ~self.is_any | np.append(False, ~self.is_any[:-1])
-        tilted = tilts * self.sizes  # the axis leaves its way by tilt x turn / 8
+        tilted = tilts * self.sizes  # the axis deviates by tilt x turn / 8
         layers: list[Layer] = []
         begin = first = 0
         for number, (end, row) in enumerate(zip(ends.tolist(), self.knots.tolist(), strict=True)):
             change = inf
-            if first:  # the way to the first point has no such bound
+            if first:  # no such bound on the way to the first
                 share = float(tilted[first : row + 1].max()) / whole[number]
                 change = 8.0 * MAX_AXIS_DEVIATION / max(share, 1e-9)
             change = min(change, (end - begin) * _MAX_CHANGE_PER_SAMPLE / self.density)
@@ -364,7 +368,7 @@ class _FreePath:
         return layers
 
     def _times(self, lengths: Floats) -> Floats:
-        """Return the duration of each segment (n,) [s], inf = not known."""
+        """Return the duration of each segment (n,) [s]; inf = unknown."""
         goal, segments = self.goal, self.goal.segments
         if is_timed(goal):
             return np.where(self.is_joint, inf, np.diff(goal.waypoints.times, prepend=0.0))
@@ -377,7 +381,7 @@ class _FreePath:
     # -- the choice ------------------------------------------------------------------------------
 
     def turns(self, layers: Sequence[Layer], found: RotationPath) -> Floats:
-        """Return the turn of each pose (n,) [rad], smoothed and within its range."""
+        """Return the smoothed turn (n,) [rad] of each pose, within the range of its segment."""
         chosen = self._smoothed(layers, found.rotations)
         at = np.cumsum(self.sizes)
         at_knots = at[self.knots]
@@ -390,7 +394,7 @@ class _FreePath:
         return np.where(self.free, turns, 0.0)
 
     def _smoothed(self, layers: Sequence[Layer], rotations: Floats) -> Floats:
-        """Return rotations (layers,), smoothed to remove the discrete steps of the search."""
+        """Return rotations (layers,) without the discrete steps of the search."""
         low, high = rotations - _MAX_SMOOTHING, rotations + _MAX_SMOOTHING
         for number, layer in enumerate(layers):
             if not layer.is_any:
@@ -412,7 +416,7 @@ class _FreePath:
     def with_postures(
         self, goal: GoalTable, layers: Sequence[Layer], found: RotationPath
     ) -> GoalTable:
-        """Return the goal with postures for joint moves to points with a free rotation."""
+        """Return the goal with a posture for each joint move to a point of free rotation."""
         names = tuple(self.options.tf_prefix + name for name in JOINT_NAMES)
         postures = dict(goal.waypoints.postures)
         for number, row in enumerate(self.knots.tolist()):
@@ -422,7 +426,7 @@ class _FreePath:
         return replace(goal, waypoints=replace(goal.waypoints, postures=postures))
 
     def remark(self, goal: GoalTable, turns: Floats) -> str:
-        """Return the remark on the choice."""
+        """Return the remark on the chosen turns."""
         rows = np.flatnonzero(self.is_open)
         points = f'points {rows[0]} to {rows[-1]}' if len(rows) > 1 else f'point {rows[0]}'
         low, high = degrees(turns[rows].min()), degrees(turns[rows].max())
@@ -435,7 +439,7 @@ class _FreePath:
         return f'{text}; between points the axis leaves its way by up to {deviation:.1f} degrees'
 
     def _axis_deviation(self, goal: GoalTable) -> float:
-        """Return the greatest deviation of the axis from the shortest way between points [rad]."""
+        """Return the greatest deviation [rad] of the axis from the shortest way between points."""
         poses = transform_rows(goal.T_base_frame, goal.waypoints.poses)
         counts = self.free[1:] & ~self.is_joint[1:]
         if not counts.any():

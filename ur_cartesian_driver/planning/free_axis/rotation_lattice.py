@@ -4,16 +4,16 @@
 Search the rotation about a free axis along a path by dynamic programming over a lattice.
 
 A *layer* is a place at which the rotation can be chosen, and its *nodes* are rotations. An *edge*
-connects nodes of two layers; along it, the rotation changes linearly, as on a line of the robot,
-and the arm is solved on the *samples* in between. Each branch has a closed-form solution, so all
-rotations of all samples are solved at once into a table, in which edges look up their joints. Each
-node keeps the joints of the best way to it, so that full turns are tracked and joint limits hold
-along that way.
+connects nodes of two layers; along an edge, the rotation changes linearly, as on a line of the
+robot, and the arm is solved at the *samples* between the layers. Each branch has a closed-form
+solution, so all rotations of all samples are solved at once into a table, in which edges look up
+their joints. Each node keeps the joints of the best way to it, so that full turns are tracked and
+joint limits hold along that way.
 
 The search is first coarse, over all rotations, then finer and finer around the best way.
 
 Rotations are angles [rad] about the axis from the reference orientation, which goes along the path
-without turning about the axis. They are not wrapped: rotations that differ by a full turn are
+without turning about the axis. Rotations are not wrapped: those that differ by a full turn are
 different nodes, because their joints differ.
 """
 
@@ -44,36 +44,40 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
     SINGULARITY_MEASURES,
 )
 
-#: Number of rotations in a full turn in the coarse search, and its step [rad]. Each finer search
-#: has a third of the previous step, and tries ``_FINE_REACH`` rotations to each side of the best.
+#: Number of rotations in a full turn in the coarse search.
 TURN_COUNT = 72
+#: Step of the coarse search [rad].
 COARSE_STEP = tau / TURN_COUNT
+#: Steps of the finer searches [rad].
 _FINE_STEPS = tuple(COARSE_STEP / 3**k for k in (1, 2, 3))
+#: Number of rotations that a finer search tries on each side of the previous best.
 _FINE_REACH = 3
 #: Numbers of full turns that are added to rotations to make further nodes.
 _COPIES = (-1, 0, 1)
-#: Greatest change of the rotation from layer to layer [rad]: below half a turn, whose direction is
-#: ambiguous.
+#: Greatest change of the rotation from layer to layer [rad]: less than half a turn, because the
+#: direction of a half turn is ambiguous.
 _MAX_CHANGE = 0.95 * pi
-#: A joint that turns farther than this between two samples counts as jumping [rad].
+#: A joint that turns farther than this [rad] between two samples counts as jumping.
 _MAX_JOINT_STEP = 1.0
-#: Greatest deviation of the axis from the shortest way between two points, which results from
-#: turning and tilting at once [rad].
+#: Greatest deviation [rad] of the axis from the shortest way between two points; the axis deviates
+#: if the tool turns and tilts at once.
 MAX_AXIS_DEVIATION = pi / 180.0
 
-#: The cost of an edge is the sum of the turns of all joints [rad]; a quadratic part, which spreads
-#: the change of the rotation evenly;
+# The cost of an edge is the sum of the turns of all joints [rad] and of the terms that follow.
+#: Weight of the squared change of the rotation, which spreads the change evenly.
 _EVENNESS = 2.0
-#: nearness to joint limits [rad] and singularities (fraction of their scale) within this margin,
-#: per unit of the path;
+#: Distances from joint limits [rad] and singularities (as a fraction of their scale) cost if they
+#: are below this.
 _WIDE_MARGIN = 0.6
+#: Weight of the cost of these distances, per unit of the path.
 _NEARNESS = 1.0
-#: and penalties for what the planner would refuse: too near to a singularity; too fast for a joint
-#: [1/rad]; off the posture of a point [1/rad].
+#: Penalty per unit of the path where the planner would refuse the nearness to a singularity.
 _REFUSED = 50.0
+#: Penalty for a turn beyond the speed limit of a joint [1/rad].
 _TOO_FAST = 50.0
+#: Penalty for a distance from the posture of a point [1/rad].
 _OFF_POSTURE = 20.0
-#: Greatest number of nodes, the best ones, from which joint moves are tried.
+#: Joint moves are tried from at most this many nodes, the cheapest ones.
 _JOINT_SOURCES = 24
 _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
 
@@ -82,19 +86,20 @@ _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
 class Layer:
     """A place at which the rotation can be chosen, and the samples of the path to it."""
 
-    #: Slice of the samples; the last sample is the place itself.
+    #: The samples have the rows ``begin`` to ``end - 1``; the last of them is the place itself.
     begin: int
     end: int
     #: Allowed rotations [rad]: any, or from ``low`` to ``high`` plus any number of full turns.
     low: float = -inf
     high: float = inf
-    #: Whether a joint move leads to the place, which may change branch and full turns; and whether
-    #: it leads to the nearest solution, as the rotation is fixed and there is no posture.
+    #: Whether a joint move, which may change branch and full turns, leads to the place.
     is_joint: bool = False
+    #: Whether a joint move must end in the nearest solution, because the rotation is fixed and no
+    #: posture is given.
     is_nearest: bool = False
     #: Largest change of the rotation from the previous layer [rad].
     max_change: float = _MAX_CHANGE
-    #: Requested joint positions [rad], NaN for joints without one.
+    #: Requested joint positions [rad]; NaN = no request for that joint.
     posture: Joints | None = None
 
     def turns(self, rotation: float) -> float:
@@ -113,11 +118,11 @@ class RotationSamples:
 
     #: (n, 7) the reference pose of the controlled frame in base.
     poses: Floats
-    #: Fractions of the way from the previous layer to the next one, in (0, 1].
+    #: Fractions, in (0, 1], of the way from the previous layer to the next one.
     fractions: Floats
-    #: The length of the path from the previous sample, in units of 5 cm or a radian, and the time
-    #: for that length [s], inf = not known.
+    #: Size of the path from the previous sample: lengths in units of 5 cm plus tilts [rad].
     sizes: Floats
+    #: Time from the previous sample [s]; inf = unknown.
     times: Floats
 
     def __len__(self) -> int:
@@ -126,17 +131,18 @@ class RotationSamples:
 
 @dataclass(slots=True)
 class RotationPath:
-    """The rotation at each layer, and the arm there."""
+    """The chosen rotation at each layer, and the branch and joints of the arm there."""
 
     #: (layers,) rotations [rad].
     rotations: Floats
-    #: (layers,) number of the branch; (layers, 6) joint positions [rad].
+    #: (layers,) numbers of the branches.
     branches: Int64s
+    #: (layers, 6) joint positions [rad].
     joints: Floats
 
 
 class NoRotation(Exception):
-    """There is no way through the lattice; ``layer`` is the first that cannot be reached."""
+    """There is no way through the lattice; ``layer`` is the first one that cannot be reached."""
 
     def __init__(self, layer: int) -> None:
         super().__init__(layer)
@@ -146,22 +152,25 @@ class NoRotation(Exception):
 @dataclass(slots=True)
 class _Tables:
     """
-    The arm on each sample: joints (n, 6, branches, rotations), costs (n, branches, rotations).
+    The arm at each sample: joints (n, 6, branches, rotations), costs (n, branches, rotations).
 
-    The axis of the joints comes early, as in all arrays of the search: numpy sums over an outer
-    axis many times faster than over the innermost one.
+    The array axis of the joints comes early, as in all arrays of the search: numpy sums over an
+    outer array axis many times faster than over the innermost one.
     """
 
-    #: First rotation of each sample (n,) [rad], step, and whether the rotations fill a full turn.
+    #: (n,) first rotation at each sample [rad].
     first: Floats
+    #: Step from rotation to rotation [rad].
     step: float
+    #: Whether the rotations fill a full turn.
     is_round: bool
-    #: Joint positions [rad], and their cost: inf = no solution.
+    #: Joint positions [rad].
     q: Floats
+    #: Costs of these joint positions; inf = no solution.
     cost: Floats
 
     def look_up(self, sample: int, rotations: Floats) -> Int64s:
-        """Return the numbers of the nearest rotations."""
+        """Return the indices, in the table, of the nearest rotations."""
         index: Int64s = np.rint((rotations - self.first[sample]) / self.step).astype(np.int64)
         count = self.q.shape[3]
         return np.mod(index, count) if self.is_round else np.clip(index, 0, count - 1)
@@ -183,7 +192,7 @@ class RotationLattice:
     layers: Sequence[Layer]
     q_start: Joints
     options: PlanningOptions
-    #: Additional costs of coarse rotations (8, 72), by sample.
+    #: By sample: additional costs of the coarse rotations (8 branches, 72 rotations).
     _charges: dict[int, Floats] = field(default_factory=dict)
     _coarse: _Tables | None = None
     _speeds: Floats = field(init=False)
@@ -199,7 +208,7 @@ class RotationLattice:
         """
         Return the best way through the lattice.
 
-        :raises NoRotation: there is none.
+        :raises NoRotation: no way leads through all layers.
         """
         if self._coarse is None:
             branches = range(8) if any(layer.is_joint for layer in self.layers) else (self._start,)
@@ -214,7 +223,7 @@ class RotationLattice:
         return found
 
     def along(self, rotations: Floats) -> Floats:
-        """Return the rotation (n,) at each sample, interpolated between the layers."""
+        """Return the rotation at each sample (n,), interpolated between the layers."""
         begins = [layer.begin for layer in self.layers]
         counts = np.diff([*begins, len(self.samples)])
         number = np.repeat(np.arange(len(begins)), counts)
@@ -225,20 +234,20 @@ class RotationLattice:
         return along
 
     def joints_along(self, path: RotationPath) -> Floats:
-        """Return the joint positions (n, 6) [rad] at each sample, up to full turns."""
+        """Return the joint positions (n, 6) [rad] at the samples, possibly off by full turns."""
         rotations = self.along(path.rotations)
         tables = self._tables(rotations, COARSE_STEP, 1, self.sample_branches(path))
         return tables.q[:, :, 0, 0]
 
     def charge(self, sample: int, branch: int, costs: Floats) -> None:
-        """Add costs to the coarse rotations (72,) at a sample, in a branch."""
+        """Add ``costs`` (72,) to the coarse rotations of a branch at a sample."""
         known = self._charges.setdefault(sample, np.zeros((8, TURN_COUNT)))
         known[branch] += costs
         if self._coarse is not None:
             self._coarse.cost[sample, branch if self._coarse.cost.shape[1] > 1 else 0] += costs
 
     def coarse_joints(self, sample: int, branch: int) -> Floats:
-        """Return the joint positions (72, 6) [rad] of all coarse rotations at a sample."""
+        """Return the joint positions (72, 6) [rad] of a branch's coarse rotations at a sample."""
         poses = self._flange_poses(
             np.full(TURN_COUNT, sample), COARSE_STEP * np.arange(TURN_COUNT, dtype=np.float64)
         )
@@ -246,7 +255,7 @@ class RotationLattice:
         return solution.q.T
 
     def sample_branches(self, path: RotationPath) -> Int64s:
-        """Return the branch of a path at each sample (n,)."""
+        """Return the branch of a rotation path at each sample (n,)."""
         begins = [layer.begin for layer in self.layers]
         return np.repeat(path.branches, np.diff([*begins, len(self.samples)]))
 
@@ -257,7 +266,7 @@ class RotationLattice:
     # -- tables ----------------------------------------------------------------------------------
 
     def _flange_poses(self, samples: Int64s, rotations: Floats) -> Floats:
-        """Return the flange (n, 7) at rotated samples."""
+        """Return the flange poses (n, 7) at samples that are rotated about the free axis."""
         half = 0.5 * rotations[:, None]
         turn = np.concatenate([np.sin(half) * np.array(self.axis), np.cos(half)], axis=1)
         rows = self.samples.poses[samples].copy()
@@ -268,9 +277,9 @@ class RotationLattice:
         self, first: Floats, step: float, count: int, branches: tuple[int, ...] | Int64s
     ) -> _Tables:
         """
-        Solve the arm on all samples.
+        Return the table of the arm at all samples.
 
-        :param branches: the same for all samples, or the branch of each sample (n,).
+        :param branches: a tuple of branches for all samples, or one branch for each sample (n,).
         """
         n = len(self.samples)
         sample = np.repeat(np.arange(n), count)
@@ -301,7 +310,7 @@ class RotationLattice:
         return _Tables(first=first, step=step, is_round=is_round, q=q, cost=cost)
 
     def _solve(self, solution: BranchSolution) -> tuple[Floats, Floats]:
-        """Return joints (n, 6), and costs of nearness to singularities per unit of path (n,)."""
+        """Return joints (n, 6), and costs (n,) of nearness to singularities per unit of path."""
         q = solution.q.T
         distances = singularity_distance_rows(self.arm, q)
         bounds = np.array([getattr(self.options, m.option) for m in SINGULARITY_MEASURES])
@@ -314,7 +323,7 @@ class RotationLattice:
     # -- nodes -----------------------------------------------------------------------------------
 
     def _coarse_nodes(self, layer: Layer) -> Floats:
-        """Return the rotations of a layer in the coarse search, ascending."""
+        """Return the ascending rotations of a layer in the coarse search."""
         if layer.is_any:
             one = COARSE_STEP * (np.arange(TURN_COUNT) - TURN_COUNT // 2)
         else:
@@ -324,7 +333,7 @@ class RotationLattice:
         return np.concatenate([one + tau * k for k in _COPIES])
 
     def _refined(self, path: RotationPath, step: float) -> RotationPath:
-        """Return the best way close to another one, with a finer step."""
+        """Return the best way in the neighbourhood of ``path``, with a finer step."""
         first = self.along(path.rotations) - _FINE_REACH * step
         tables = self._tables(first, step, 2 * _FINE_REACH + 1, self.sample_branches(path))
         offsets = step * np.arange(-_FINE_REACH, _FINE_REACH + 1)
@@ -343,7 +352,7 @@ class RotationLattice:
         self, tables: _Tables, nodes: list[Floats], step: float, around: RotationPath | None
     ) -> RotationPath:
         """
-        Return the best way through nodes.
+        Return the best way through the nodes of all layers.
 
         :param around: the way near which the nodes lie; None = all branches are searched.
         """
@@ -376,7 +385,7 @@ class RotationLattice:
         """
         Return the way to the best node of the last layer.
 
-        :param branches: (layers, b) the branch for each value of the nodes' first index.
+        :param branches: (layers, b) the branches that the first index of the nodes selects.
         """
         n = len(back)
         path = RotationPath(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 6)))
@@ -399,7 +408,7 @@ class RotationLattice:
         q: Floats,
         step: float,
     ) -> tuple[Floats, Floats, Int64s, Floats]:
-        """Return cost (b, k), joints (6, b, k) and source (b, k) of the nodes of a layer."""
+        """Return costs (b, k), joints (6, b, k), sources (b, k) and rotations (k,) of a layer."""
         reach = min(layer.max_change, _MAX_CHANGE) + 1e-9
         alive = np.flatnonzero(np.isfinite(cost).any(axis=0))
         first, last = int(alive[0]), int(alive[-1]) + 1
@@ -457,9 +466,9 @@ class RotationLattice:
         near: Floats | None,
     ) -> tuple[Floats, Floats, Int64s, Floats]:
         """
-        Return the same as :meth:`_edges` for a joint move, which connects any two nodes.
+        Return what :meth:`_edges` returns, for a joint move, which connects any two nodes.
 
-        :param near: joint positions near which the move ends; None = anywhere.
+        :param near: joint positions near which the move has to end; None = anywhere.
         """
         sample = layer.end - 1
         flat = cost.ravel()
@@ -490,7 +499,7 @@ class RotationLattice:
         return total[b, k, best], end[:, b, k, best], sources[best], targets
 
     def _limits(self, q: Floats, size: float) -> Floats:
-        """Return the costs (...) of nearness to joint limits on a part of the path."""
+        """Return the costs of nearness to joint limits on a path of a size; inf beyond a limit."""
         low, high = self._ranges
         margin = np.minimum(q - low, high - q).min(axis=0)
         return np.where(margin < 0.0, inf, _nearness(margin) * size)
@@ -504,7 +513,7 @@ class RotationLattice:
 
 
 def _column(joints: Sequence[float]) -> Floats:
-    """Return joints (6, 1, 1, 1)."""
+    """Return a value for each joint as an array (6, 1, 1, 1)."""
     return np.array(joints)[:, None, None, None]
 
 

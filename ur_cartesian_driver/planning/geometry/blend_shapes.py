@@ -27,7 +27,7 @@ from ur_cartesian_driver.planning.geometry.curves import (
     MAX_TURN_PER_SAMPLE,
 )
 
-# Within this angle [rad], segments continue straight on or straight back, without a circle.
+# Segments that continue straight on or straight back to within this angle [rad] have no circle.
 _STRAIGHT = 1e-6
 # Least radius of the circle between segments that go straight back [m].
 _MIN_RADIUS = 1e-9
@@ -66,7 +66,7 @@ class BlendShapes:
         radius: Floats,
         fillet: Flags,
     ) -> None:
-        """Measure turns and openings."""
+        """Measure the turns, and the angles between the segments."""
         self.start, self.middle, self.end = start[:, :3], middle[:, :3], end[:, :3]
         self.radius, self.fillet = radius, fillet
         self.before = angle_rows(start[:, 3:], middle[:, 3:])
@@ -75,7 +75,7 @@ class BlendShapes:
         self.opening = opening_rows(self.start, self.middle, self.end)
 
     def lengths(self) -> Floats:
-        """Return the lengths [m] of the blends, as parabolas or circles between straight lines."""
+        """Return the lengths of the blends [m]: parabolas, or arcs, between straight lines."""
         arc = self._circle_radii() * (np.pi - self.opening)
         there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
             self.end - self.middle, axis=1
@@ -88,7 +88,7 @@ class BlendShapes:
         return lengths
 
     def arc_radii(self) -> Floats:
-        """Return the radii of the circles [m]; inf for other blends."""
+        """Return the radii of the circular blends [m]; inf for the others."""
         radii: Floats = np.where(self.fillet, self._circle_radii(), np.inf)
         return radii
 
@@ -130,7 +130,7 @@ def fillet_radius(radius: Floats, opening: Floats) -> Floats:
 
 
 def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
-    """Return positions (n, 3) on circles that touch both segments; even in ``s`` along the arc."""
+    """Return positions (n, 3) on circles that touch both segments; ``s`` is even along the arc."""
     opening = opening_rows(start, waypoint, end)
     rho = fillet_radius(radius, opening)
     inwards = _units(_units(start - waypoint) + _units(end - waypoint))
@@ -140,8 +140,8 @@ def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s:
     depth = rho / np.maximum(np.sin(0.5 * opening), 1e-12) - rho * np.cos(phi)
     circle = waypoint + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
     # Without a circle the blend is its chord. If the segments go straight on, the chord leads
-    # through the waypoint. If they go straight back, it is the point where the first segment is
-    # left: there the circle shrinks to a point as the opening goes to zero.
+    # through the waypoint. If they go straight back, the chord is the point at which the first
+    # segment is left, to which the circle shrinks as the opening goes to zero.
     chord = start + s[:, None] * (end - start)
     has_circle = (opening > _STRAIGHT) & (opening < np.pi - _STRAIGHT)
     return np.where(has_circle[:, None], circle, chord)
@@ -149,11 +149,11 @@ def fillet_rows(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s:
 
 def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """
-    Return the lengths of parabolas with these control points [m].
+    Return the lengths of parabolas with the control points a, p and b [m].
 
-    The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b, the root of some A s^2 + B s + C. Its
-    integral is elementary, but has special cases. Gauss-Legendre quadrature has none: eight points
-    are exact to a millionth, and to a thousandth for blends that go back nearly straight.
+    The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b: the square root of a quadratic in s.
+    Its integral is elementary, but has special cases. Gauss-Legendre quadrature has none: with
+    eight points it is exact to a millionth, for blends nearly straight back to a thousandth.
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
     nodes, weights = np.polynomial.legendre.leggauss(8)

@@ -59,10 +59,10 @@ class CurveSequence(Protocol):
         """
 
     def extent(self, number: int) -> tuple[float, float]:
-        """Return the length of a curve [m], and its turn of tool or leading joint [rad]."""
+        """Return the length of a curve [m], and the turn of tool or leading joint on it [rad]."""
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
-        """Return the segments (n,) to which places belong, and the fractions (n,) of them."""
+        """Return the segments (n,) of places on curves, and the fractions (n,) of these."""
 
 
 class CurveRows:
@@ -76,7 +76,7 @@ class CurveRows:
     def __init__(self, start: Floats, end: Floats, others: Mapping[int, SegmentCurve]) -> None:
         """Measure the lines."""
         self.start, self.end = start, end
-        #: (n,) length [m] and turn of the tool [rad], and travel of the leading joint [rad].
+        #: (n,) each: length [m]; turn of the tool [rad]; travel of the leading joint [rad].
         self.length = distance_rows(start, end)
         self.angle = angle_rows(start[:, 3:], end[:, 3:])
         self.joint_travel = np.zeros(len(start))
@@ -96,7 +96,7 @@ class CurveRows:
         return curve
 
     def put(self, row: int, curve: SegmentCurve) -> None:
-        """Replace a curve."""
+        """Replace the curve of a row by one that is not a line."""
         self.start[row], self.end[row] = curve.start.row(), curve.end.row()
         self.length[row], self.angle[row] = curve.length, curve.angle
         self.joint_travel[row] = curve.joint_travel
@@ -158,21 +158,21 @@ class BlendedPath:
         """Begin without blends."""
         n = len(curves)
         self.curves = curves
-        #: The ``u`` at which each curve begins after the blend before it, and ends at the blend
-        #: after it.
+        #: The ``u`` at which the previous blend joins each curve; the ``u`` at which the next
+        #: blend leaves it.
         self.u_join, self.u_leave = np.zeros(n), np.ones(n)
-        #: Of the blend after each curve: the distance from the waypoint at which the blend begins
-        #: and ends [m], 0 = no blend; whether it is a circular arc between lines (``movep``).
+        #: The distance from the waypoint at which the blend after each curve begins and ends [m],
+        #: 0 = no blend; whether this blend is a circular arc between lines (``movep``).
         self.radius, self.fillet = np.zeros(n), np.zeros(n, dtype=np.bool_)
-        #: Radius of the arc [m]; inf if the blend is no arc.
+        #: Radius of this arc [m]; inf if the blend is no arc.
         self.arc_radius = np.full(n, np.inf)
-        #: Length of the blend [m], turn of the tool in it [rad], and the number of chords that
-        #: follow it.
+        #: Length of the blend [m]; turn of the tool in the blend [rad]; number of chords that
+        #: follow the blend closely enough.
         self.blend_length, self.blend_angle = np.zeros((2, n))
         self.blend_samples = np.zeros(n, dtype=np.intp)
-        #: (n, 2) how far the robot's own blend may be from this one [m], [rad]. The robot's blend
-        #: may come arbitrarily close to the waypoint, or cut straight across; this one lies
-        #: half-way between. The turn of the tool may lead or lag its position.
+        #: Largest distance of the robot's own blend from the modelled one (n, 2) [m], [rad]. The
+        #: robot's blend may come arbitrarily close to the waypoint, or cut straight across; the
+        #: modelled one lies half-way between. On it, the tool's turn may lead or lag the position.
         self.blend_tolerance = np.zeros((n, 2))
 
     @property
@@ -191,11 +191,11 @@ class BlendedPath:
         self.u_join[first + 1 : stop + 1] = 0.0
 
     def leave(self, row: Indices, radius: Floats) -> None:
-        """End curves where blends will begin, while the curves after them are not known yet."""
+        """End curves where blends will begin, while the next curves are not known yet."""
         self.u_leave[row] = self.curves.trim(row, radius, at_end=True)
 
     def make_blends(self, row: Indices, radius: Floats, fillet: Flags) -> None:
-        """Make the blends after curves."""
+        """Make the blends after the curves of some rows."""
         if not len(row):
             return
         curves, after = self.curves, row + 1

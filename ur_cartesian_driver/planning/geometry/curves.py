@@ -4,9 +4,9 @@
 The curves of the robot's motions: lines, arcs and joint lines.
 
 A curve maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
-the leading quantity of the motion (length of a line or an arc, travel of the joints). It runs from
-waypoint to waypoint. :mod:`~.blended_path` holds the curves of a goal in columns, and rounds the
-transitions.
+the leading quantity of the motion (length of a line or an arc, travel of the joints). Each curve
+leads from waypoint to waypoint. :mod:`~.blended_path` holds the curves of a goal in columns, and
+adds the blends between them.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.goal.goal import ArcMode
 
-#: If a line turns the tool by half a turn within this angle [rad], rounding on the wire and the
-#: arm's actual pose decide in which direction.
+#: If a line turns the tool by half a turn, to within this angle [rad], rounding on the wire and
+#: the arm's actual pose decide the direction of the turn.
 HALF_TURN = 1e-3
 
 #: Poses that differ by less than the resolution of the wire [m], [rad] are the same.
@@ -54,7 +54,8 @@ SAME_ANGLE = 1e-6
 MIN_ARC_HEIGHT = 1e-5
 #: How far rounding to micrometres on the wire moves three points relative to each other [m].
 _ROUNDING = 1.5e-6
-#: Largest turn of the tool by such rounding at the end of an arc whose tangent it follows [rad].
+#: Largest turn that this rounding may add at the end of an arc whose tangent the tool follows
+#: [rad].
 MAX_ARC_TURN_ERROR = 0.005
 #: Arcs through points that are farther apart than this [m] are refused: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
@@ -63,7 +64,8 @@ ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
-#: Where a joint line leaves a ball is searched by dividing it into these numbers of parts in turn.
+#: To find where a joint line leaves a ball, ever shorter intervals of the line are divided into
+#: these numbers of parts.
 _TRIM_DIVISIONS = (32,) * 6
 
 
@@ -73,8 +75,8 @@ class ArcCurve:
     The tool on a circular arc.
 
     The position turns about ``axis`` through ``center`` by ``sweep`` in (0, 2 pi). The orientation
-    goes from the start's to the end's by the shortest rotation (UNCONSTRAINED) or turns along
-    with the tangent (FIXED), as the modes of URScript's ``movec``.
+    changes from the start's to the end's by the shortest rotation (UNCONSTRAINED) or turns along
+    with the tangent (FIXED), like the modes of URScript's ``movec``.
     """
 
     start: Pose
@@ -96,7 +98,7 @@ class ArcCurve:
         In mode FIXED the orientation of ``end`` is replaced by the one in which the arc arrives.
 
         :raises ValueError: the three positions make no circle, or in mode FIXED an inexact one;
-            the text is a clause that says why.
+            the text is a clause that gives the reason.
         """
         center, axis, radius = _circle(start.position, via, end.position)
         if mode is ArcMode.FIXED:
@@ -138,14 +140,14 @@ class ArcCurve:
         return rows
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the ``u`` at which the arc leaves a ball of a radius [m] at its start, or end."""
+        """Return the ``u`` at a distance ``radius`` [m] from the start of the arc, or its end."""
         u = min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
         return 1.0 - u if at_end else u
 
 
 @dataclass(frozen=True, slots=True)
 class JointLineCurve:
-    """A straight line in joint space; the tool follows from the forward kinematics."""
+    """A straight line in joint space; forward kinematics gives the poses of the tool."""
 
     arm: Arm
     T_flange_tcp: Pose
@@ -156,7 +158,7 @@ class JointLineCurve:
     length: float
     #: Number of chords that follow the curve of the tool closely enough.
     samples: int
-    #: Peak speed of the tool over its mean speed.
+    #: Ratio of the tool's peak speed to its mean speed.
     unevenness: float
 
     @classmethod
@@ -219,7 +221,7 @@ class JointLineCurve:
         return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
     def trim(self, radius: float, *, at_end: bool) -> float:
-        """Return the first ``u`` outside a ball of a radius [m] about the start, or the end."""
+        """Return the ``u`` nearest to the start, or end, that is at least ``radius`` [m] away."""
         center = np.array([(self.end if at_end else self.start).row()])
         low, high = 0.0, 1.0
         for n in (max(16, self.samples), *_TRIM_DIVISIONS):
@@ -272,8 +274,9 @@ def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
     """
     Refuse an arc at whose end the rounding of its points turns the tool too far.
 
-    Rounding tilts the circle by rounding / height of the triangle. The turn by the sweep makes
-    2 sin(sweep / 2) times this tilt, which the law of sines expresses in the distances of the via.
+    Rounding tilts the circle by rounding / height of the triangle. At the end of the arc this tilt
+    turns the tool by 2 sin(sweep / 2) times as much. The law of sines expresses this error by the
+    distances of the via.
     """
     from_start, to_end = distance(a, b), distance(b, c)
     error = 2.0 * _ROUNDING * max(from_start, to_end, distance(a, c)) / (from_start * to_end)
@@ -286,6 +289,6 @@ def _check_turn_error(a: Vector3, b: Vector3, c: Vector3) -> None:
 
 
 def _angle_on(e1: Vector3, e2: Vector3, v: Vector3) -> float:
-    """Return the angle of a vector in the plane of e1 and e2, in (0, 2 pi]."""
+    """Return the angle of a vector from e1 towards e2, in (0, 2 pi]."""
     angle = atan2(dot(e2, v), dot(e1, v))
     return angle if angle > 0.0 else angle + 2.0 * pi

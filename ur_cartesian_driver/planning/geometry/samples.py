@@ -4,8 +4,8 @@
 Samples along the path of a goal: on parts of curves, and on the blends between them.
 
 Samples are at most 2 mm and one degree apart, and there are at least eight on each piece. Pieces
-up to 11.2 mm and 5.6 degrees have fewer, at most 1.6 mm and 0.8 degrees apart: a path of 5 mm
-steps has four samples on each step. Where the joints turn fast,
+up to 11.2 mm and 5.6 degrees have fewer, at most 1.6 mm and 0.8 degrees apart: four on a piece of
+5 mm. Where the joints turn fast,
 :mod:`~ur_cartesian_driver.planning.preflight.joint_path_solver` adds samples.
 """
 
@@ -25,22 +25,22 @@ from ur_cartesian_driver.planning.geometry.blended_path import BlendedPath, Curv
 
 T = TypeVar('T', bound=np.generic)
 
-#: Maximum distance of two samples [m], [rad].
+#: Maximum distance between neighbouring samples [m], [rad].
 STEP_LENGTH = 0.002
 STEP_ANGLE = pi / 180.0
-#: Minimum number of samples on a piece. A short piece has fewer: as many as bring them no farther
-#: apart than the maximum distance divided by _MIN_REFINEMENT.
+#: Minimum number of samples on a piece. A short piece has fewer: enough that neighbouring samples
+#: are no farther apart than the maximum distance divided by _MIN_REFINEMENT.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
 
 
 def joined(columns: Sequence[NDArray[T]]) -> NDArray[T]:
-    """Return arrays joined to one; a single array is not copied."""
+    """Return arrays joined into one; a single array is not copied."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
 def counted(counts: Indices) -> tuple[Indices, Indices]:
-    """Return for counts (n,) the rows 0, 0, ..., 1, 1, ... and the numbers 1, 2, ..., 1, 2, ..."""
+    """Return 0, 0, ..., 1, 1, ..., each k ``counts[k]`` times, and 1, 2, ... from 1 for each k."""
     rows = np.repeat(np.arange(len(counts)), counts)
     return rows, np.arange(1, len(rows) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
 
@@ -63,7 +63,7 @@ def first_least(values: Floats, segments: Int32s) -> Indices:
 
 
 def last_greatest(values: Floats, segments: Int32s) -> Indices:
-    """Return the row of the greatest value of each segment; see :func:`first_least`."""
+    """Return the row of the greatest value of each segment, the last one if there are several."""
     return len(values) - 1 - first_least(-values[::-1], -segments[::-1])[::-1]
 
 
@@ -74,7 +74,8 @@ class CurvePieces:
     path: CurveSequence
     #: Index of the waypoint at the end of the path's first segment.
     first: int
-    #: The number of the curve, and the range on it: ``u`` of a segment's curve, ``s`` of a blend.
+    #: Number of each piece's curve; where the piece begins and ends on this curve: ``u`` of a
+    #: segment's curve, ``s`` of a blend.
     number: Indices
     begin: Floats
     end: Floats
@@ -84,12 +85,12 @@ class CurvePieces:
     def of(
         cls, path: BlendedPath, first: int, number: Indices, begin: Floats, end: Floats
     ) -> CurvePieces:
-        """Return parts of the curves of segments, and whole blends, of a path."""
+        """Return pieces of a path: parts of the segments' curves, and whole blends."""
         length, turn = path.extents(number)
         part, is_blend = end - begin, number % 2 == 1
         steps = np.maximum(length * part / STEP_LENGTH, turn * part / STEP_ANGLE)
         count = np.maximum(
-            np.maximum(1.0 + is_blend, np.ceil(steps)),  # on both sides of a blend's waypoint
+            np.maximum(1.0 + is_blend, np.ceil(steps)),  # on a blend: one on each half
             np.minimum(MIN_SAMPLES, np.ceil(_MIN_REFINEMENT * steps)),
         )
         return cls(
@@ -128,12 +129,12 @@ class CurvePieces:
         return self.path.rows(self.number[piece], t)
 
     def locate(self, piece: Indices, t: Floats) -> tuple[Int32s, Floats]:
-        """Return the segments (n,) to which places on pieces belong, and the fractions of them."""
+        """Return the segments (n,) of places on pieces, and the fractions (n,) of these."""
         row, fraction = self.path.locate(self.number[piece], t)
         return (self.first + row).astype(np.int32), fraction
 
     def locate_one(self, k: int, t: float) -> tuple[int, float]:
-        """Return the segment to which a place on a piece belongs, and the fraction of it."""
+        """Return the segment of a place on a piece, and the fraction of this segment."""
         segment, fraction = self.locate(np.array([k]), np.array([t]))
         return int(segment[0]), float(fraction[0])
 
@@ -142,7 +143,7 @@ class CurvePieces:
 class PoseSamples:
     """Rows of samples on pieces: the number of the piece, the parameter, and the pose."""
 
-    #: (n,) not decreasing.
+    #: (n,) the number of the piece, not decreasing.
     piece: Indices
     #: (n,) the ``u`` of a segment's curve, or ``s`` of a blend.
     t: Floats
@@ -151,7 +152,7 @@ class PoseSamples:
 
 
 def sample_poses(pieces: CurvePieces) -> PoseSamples:
-    """Return the samples on Cartesian pieces; the start of a piece belongs to the one before."""
+    """Return samples on Cartesian pieces; the start of a piece is a sample of the previous one."""
     piece, t = sample_parameters(pieces)
     return PoseSamples(piece, t, pieces.rows(piece, t))
 

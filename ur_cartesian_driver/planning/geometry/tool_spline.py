@@ -3,9 +3,10 @@
 """
 The tool spline: the pose of the tool over time in a SPLINE or SERVO goal.
 
-From point to point the position is a polynomial, and so is the rotation vector from the
-orientation at the start of the piece (:mod:`~.rotation_rows`): cubic if only twists are given,
-quintic if accelerations are given, too. The given values are met exactly at the points.
+A piece of the spline leads from one point to the next. On each piece, the position of the tool and
+the rotation vector since the start of the piece (:mod:`~.rotation_rows`) are polynomials in time:
+cubic if only twists are given, quintic if accelerations are given, too. At each point the spline
+has exactly the given values.
 """
 
 from __future__ import annotations
@@ -40,24 +41,23 @@ from ur_cartesian_driver.motion.geometry.rotation_rows import (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolPoints:
-    """Pose, twist and acceleration of the tool at n + 1 times, of which the first is the start."""
+    """Pose, twist and acceleration of the tool at the start of a spline and at n later times."""
 
     #: (n + 1,) [s], increasing.
     times: Floats
-    #: (n + 1, 7)
+    #: (n + 1, 7) x y z [m], unit quaternion x y z w
     poses: Floats
-    #: (n + 1, 6) [m/s], [rad/s] along the axes of the frame.
+    #: (n + 1, 6) [m/s], [rad/s], in the axes of the frame that the poses refer to.
     twists: Floats
-    #: (n + 1, 6) [m/s^2], [rad/s^2]
+    #: (n + 1, 6) [m/s^2], [rad/s^2], likewise
     accelerations: Floats
-    #: Whether the accelerations are used: the pieces are quintic, not cubic.
+    #: Whether the pieces are quintic and have the given accelerations; if not, they are cubic.
     quintic: bool
 
 
 class ToolRows(NamedTuple):
-    """The tool at m times."""
+    """Poses (m, 7), twists (m, 6) and accelerations (m, 6) of the tool at m times."""
 
-    #: (m, 7), (m, 6), (m, 6)
     poses: Floats
     twists: Floats
     accelerations: Floats
@@ -65,19 +65,20 @@ class ToolRows(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolSpline:
-    """A spline of n pieces, in the robot's base."""
+    """A spline of n pieces, in the frame of its points."""
 
-    #: (n + 1,) [s]
+    #: (n + 1,) the times of the points [s]
     times: Floats
-    #: (n, 6 powers, 3) [m / s^power]
+    #: (n, 6 powers, 3) coefficients of the position [m / s^power]
     positions: Floats
-    #: (n, 6 powers, 3) [rad / s^power], rotation vectors from ``orientations`` (n, 4)
+    #: (n, 6 powers, 3) coefficients of the rotation vector [rad / s^power]
     turns: Floats
+    #: (n, 4) the orientation at the start of each piece, where its rotation vector is zero
     orientations: Floats
 
     @classmethod
     def through(cls, points: ToolPoints) -> ToolSpline:
-        """Return the curve through points in base."""
+        """Return the spline through points."""
         begin, end = slice(None, -1), slice(1, None)
         x, v, a = points.poses[:, :3], points.twists, points.accelerations
         orientations = points.poses[:, 3:]
@@ -93,7 +94,7 @@ class ToolSpline:
                 MotionRows(x[begin], v[begin, :3], a[begin, :3]),
                 MotionRows(x[end], v[end, :3], a[end, :3]),
             ),
-            # At the start the vector is 0, so its derivatives are the angular rates.
+            # At the start of a piece the vector is 0, so its derivatives are the angular rates.
             turns=between(
                 durations,
                 MotionRows(zero, v[begin, 3:], a[begin, 3:]),
@@ -103,37 +104,38 @@ class ToolSpline:
 
     def rows(self, piece: Indices, t: Floats) -> ToolRows:
         """
-        Return the tool on pieces (m,).
+        Return poses, twists and accelerations of the tool at m times.
 
-        :param t: (m,) time since the piece began [s].
+        :param piece: (m,) the piece to which each time belongs.
+        :param t: (m,) time since this piece began [s].
         """
         return ToolRows(self.poses(piece, t), *self.rates(piece, t))
 
     def rates(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
-        """Return the twists and the accelerations of :meth:`rows` (m, 6)."""
+        """Return the twists and the accelerations that :meth:`rows` returns, (m, 6) each."""
         x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
         w, e = angular_rates(turn)
         return np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1)
 
     def poses(self, piece: Indices, t: Floats) -> Floats:
-        """Return the poses of :meth:`rows` (m, 7)."""
+        """Return the poses (m, 7) that :meth:`rows` returns."""
         position, turn = self.vectors(piece, t)
         turned = multiply_rows(exp_rows(turn), self.orientations[piece])
         return np.concatenate([position, normalized_rows(turned)], axis=1)
 
     def vectors(self, piece: Indices, t: Floats) -> tuple[Floats, Floats]:
-        """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
+        """Return positions [m] and rotation vectors since the piece began [rad], (m, 3) each."""
         return values(self.positions[piece], t), values(self.turns[piece], t)
 
     def at(self, times: Floats) -> ToolRows:
-        """Return the tool at times (m,) [s]; where two pieces meet, on the later piece."""
+        """Return the tool's motion at times (m,) [s]; where two pieces meet, on the later one."""
         piece = np.clip(
             np.searchsorted(self.times, times, side='right') - 1, 0, len(self.positions) - 1
         )
         return self.rows(piece, times - self.times[piece])
 
     def stretch_times(self, factor: float) -> ToolSpline:
-        """Return the same path with all times multiplied by a factor."""
+        """Return the same path with the time since the start multiplied by a factor."""
         powers = factor ** -np.arange(6.0)[:, None]
         return replace(
             self,
@@ -145,7 +147,7 @@ class ToolSpline:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolSplinePath:
-    """The pieces of a spline as a :class:`~.blended_path.CurveSequence`, each a segment."""
+    """A spline as a :class:`~.blended_path.CurveSequence`, in which each piece is a segment."""
 
     rests_at_points: ClassVar[bool] = False
     spline: ToolSpline
@@ -158,7 +160,7 @@ class ToolSplinePath:
         return self.spline.poses(piece, t * np.diff(self.spline.times)[piece])
 
     def extent(self, number: int) -> tuple[float, float]:
-        """See :class:`~.blended_path.CurveSequence`; measured along the chords of its samples."""
+        """See :class:`~.blended_path.CurveSequence`; measured along chords between samples."""
         t = np.linspace(0.0, 1.0, int(self.sample_count[number // 2]) + 1)
         a, b = (rows := self.rows(np.full(len(t), number), t))[:-1], rows[1:]
         turn = angle_rows(a[:, 3:], b[:, 3:]).sum()

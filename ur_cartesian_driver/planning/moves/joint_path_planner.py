@@ -4,9 +4,9 @@
 Plan the joint path of a whole goal: the curve of each segment and its joint configurations.
 
 Consecutive lines and arcs, with the blends between them, form a *run*. The poses of a run are
-known beforehand, so its joints are solved in one pass. A joint move ends a run, because it begins
-in the configuration in which the run arrives. A line that has to become a joint move
-(``on_posture_change: movej``) also ends a run: it is replaced, and the rest is solved again.
+known beforehand, so its joints are solved in one pass. A joint move ends a run, because the move
+begins in the configuration in which the run arrives. A line or an arc that has to become a joint
+move (``on_posture_change: movej``) also ends its run, which is then solved again up to that move.
 """
 
 from __future__ import annotations
@@ -66,26 +66,27 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 from ur_cartesian_driver.planning.request.program_features import check_wait
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
-#: Solutions that differ by less than this are the same [rad].
+#: Joint solutions that differ by at most this [rad] count as the same.
 SAME_SOLUTION = 1e-6
-#: Largest distance of the arm from a joint line where the blend into the line ends [rad].
+#: Largest difference [rad] between the arm's joints and a joint line at the end of the blend into
+#: that line.
 _MAX_LINE_OFFSET = 0.05
-#: Maximum length of the first run, in segments, if lines may become joint moves; the maximum
+#: Maximum number of segments in the first run, if lines may become joint moves; the maximum
 #: doubles after each solved run, and is reset after a replacement.
 _FIRST_RUN = 8
 
 _JOINT, _PROCESS = SegmentType.JOINT, SegmentType.PROCESS
-#: Refusals of a line or an arc that a joint move may avoid.
+#: Refusals after which a line or an arc can be replaced by a joint move.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
 
 class JointPathPlanner:
     """
-    Plans the segments of one goal, one after the other, from the pose of the robot.
+    Plans the joint paths of the segments of one goal in order, beginning at the robot's pose.
 
     :param targets: the poses of all waypoints in base (n, 7).
     :param remarks: list to which remarks on changed or ignored fields are appended.
-    :param reasons: by waypoint, lists to which the reasons for a special primitive are appended.
+    :param reasons: for each waypoint, the list to which reasons for a special primitive are added.
     """
 
     def __init__(
@@ -97,9 +98,10 @@ class JointPathPlanner:
         remarks: list[str],
         reasons: dict[int, list[str]],
     ) -> None:
-        """Begin with no segment."""
-        #: All samples of the goal, and those in its blends; set by :meth:`geometries`.
+        """Store the goal; no segment is solved yet."""
+        #: All samples of the goal; set by :meth:`geometries`.
         self.samples: PathSamples
+        #: The samples in the goal's blends; set by :meth:`geometries`.
         self.blend_samples: BlendSamples
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
@@ -144,9 +146,9 @@ class JointPathPlanner:
 
     def _run(self, k: int, stop: int) -> int:
         """
-        Solve the segments from k to stop; return the row to continue with.
+        Solve the segments from row k up to row ``stop``; return the row with which to continue.
 
-        The row is k again if a segment of the run has become a joint move.
+        That row is ``stop``, or k again if a segment of the run has become a joint move.
         """
         drafts = self._drafts
         self._make_blends(k, stop)
@@ -177,7 +179,7 @@ class JointPathPlanner:
             self._q = vector6(joint_path.q[-1].tolist())
 
     def _make_blends(self, k: int, stop: int) -> None:
-        """Make the blends of a run and the one before it; leave room for the one after it."""
+        """Make the blends of a run and the blend into it; leave room for the blend after it."""
         drafts, path, first = self._drafts, self._path, max(k - 1, 0)
         path.remove_blends(first, stop)
         rows = first + np.flatnonzero(drafts.is_blended[first:stop])
@@ -190,7 +192,7 @@ class JointPathPlanner:
             check_blend_parameters(drafts.begin + first + row, float(u_join), float(u_leave))
 
     def _pieces(self, k: int, stop: int) -> CurvePieces:
-        """Return the pieces from the end of the solved path to the end of the last segment."""
+        """Return the pieces from the end of the solved path to the end of the run."""
         path, rows = self._path, np.arange(k, stop)
         begin, end = path.u_join[rows], path.u_leave[rows]
         after_blend, before_blend = path.has_blend_before[rows], path.has_blend_after[rows]
@@ -206,7 +208,7 @@ class JointPathPlanner:
         )
 
     def _entry(self, k: int) -> Floats:
-        """Return the piece before a segment: the blend, or the rest of the previous segment."""
+        """Return the piece before a segment: blend, rest of the previous segment, or none."""
         if k > 0 and self._path.radius[k - 1] > 0.0:
             return np.array([(2.0 * k - 1.0, 0.0, 1.0)])
         if k > 0 and self._drafts.solved_until[k - 1] < 1.0:
@@ -214,7 +216,7 @@ class JointPathPlanner:
         return np.empty((0, 3))
 
     def _curve_pieces(self, pieces: Floats) -> CurvePieces:
-        """Return the pieces given by rows of curve number, begin and end."""
+        """Return the curve pieces of rows (n, 3): curve number, begin and end of each piece."""
         number, begin, end = pieces.T
         return CurvePieces.of(self._path, self._drafts.begin, number.astype(np.intp), begin, end)
 
@@ -228,7 +230,7 @@ class JointPathPlanner:
         rounded = np.flatnonzero(self._path.u_leave[k:stop] < 1.0)
         if len(rounded):
             # The arm does not reach a blended waypoint, but the report and joint moves that begin
-            # at the waypoint need its configuration.
+            # at the waypoint need a configuration there.
             ends = self._path.curves.end[k + rounded]
             there = nearest_rows(
                 self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
@@ -237,7 +239,7 @@ class JointPathPlanner:
         return q
 
     def _posture_refusal(self, row: int, posture: Posture, q: Joints) -> InvalidPosture | None:
-        """Return the refusal of a line or an arc that misses its posture."""
+        """Return the refusal if a line or an arc misses its posture, else None."""
         point = self._drafts.begin + row
         clause = self.kinematics.explain_missed_posture(
             pose_from_row(self._path.curves.end[row]),
@@ -254,7 +256,7 @@ class JointPathPlanner:
         )
 
     def _replace(self, row: int, refusal: GoalRefused) -> None:
-        """Replace a segment by a joint move, or refuse the goal."""
+        """Replace a segment by a joint move, or raise its refusal."""
         point = self._drafts.begin + row
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
@@ -299,8 +301,8 @@ class JointPathPlanner:
         solved_until = self._drafts.solved_until[k - 1]
         if solved_until == 1.0 or self._path.curves.is_joint_line[k - 1]:
             return vector6(self._drafts.joints[k - 1].tolist())
-        # A blended waypoint may be out of reach, but not one at which a joint line begins: the
-        # line starts from the configuration in which the rest of the segment would arrive.
+        # A blended waypoint may be out of reach, unless a joint line begins there: the line starts
+        # from the configuration in which the rest of the previous segment would arrive.
         rest = self._curve_pieces(np.array([(2.0 * k - 2.0, solved_until, 1.0)]))
         joint_path = solve_joint_path(self.kinematics, rest, self._q)
         if joint_path.refusal is not None:
@@ -374,13 +376,13 @@ class JointPathPlanner:
         return geometries
 
     def _has_no_motion(self) -> Flags:
-        """Return whether each segment leaves the tool and the joints where they are (n,)."""
+        """Return whether each segment (n,) moves neither the tool nor the joints."""
         curves = self._path.curves
         turn = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         return (curves.length <= SAME_POSITION) & (turn <= SAME_ANGLE)
 
     def _at_first_point(self, geometries: SegmentGeometries) -> SegmentGeometries:
-        """Return the geometries for a first segment that ends where the robot already is."""
+        """Return the geometries, adapted to a first segment that ends where the robot is."""
         time = float(geometries.times[0])
         waits = time > 0.0
         wait_clause = f', and waits {time:g} s' if waits else ''

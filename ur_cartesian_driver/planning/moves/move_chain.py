@@ -1,14 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The timing of a chain of moves, as the controller carries it out; a row for each move.
+The timing of a chain of moves as the controller executes them, with a row for each move.
 
 The controller looks one move ahead, and plans each move to come to rest at its waypoint. Where the
-blend begins, the next move is called: the current path is cut there, the rate in the blend changes
-linearly over time, and the rest of the next move begins with the speed at the end of the blend. So
-a move depends on the previous one only through the handover (:class:`Handover`), and what most
-moves hand over does not depend on what they received. All rows are computed at once; then those
-whose handover has changed are computed again, until no handover changes.
+blend begins, the next move is called: the current path is cut there, the rate of the blend's
+parameter changes linearly over time, and after the blend the next move continues at the speed with
+which the blend ends. So a move depends on the previous one only through the handover
+(:class:`Handover`), and most moves hand over the same state whatever they received. All rows are
+computed at once; then the rows that received a changed handover are computed again, until no
+handover changes.
 
 Lengths are measured as by the robot: in metres, or in radians if the turn or a joint leads.
 """
@@ -24,17 +25,19 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.plan.plan import BlendEntry
 
-#: After a blend, a late move with a time goes at most this many times faster than its mean speed.
+#: After a blend, a late move that has a time runs at most at this multiple of its mean speed.
 _MAX_CATCH_UP = 2.0
 #: Relative change below which a handover counts as unchanged.
 _SAME = 1e-10
-#: Largest deviation at which a point is in time [s]; greatest number of rounds of fits.
+#: A move whose duration deviates by at most this [s] counts as in time.
 _IN_TIME = 1e-7
+#: Greatest number of rounds of fits.
 _MAX_FITS = 60
-#: Greatest number of steps of a fit; relative error of the times below which it ends.
+#: Greatest number of steps of a fit.
 _FIT_STEPS = 14
+#: A fit ends when the relative errors of all times are below this.
 _SAME_TIME = 1e-13
-#: No move is slowed below this fraction of the mean speed that its time requires.
+#: No move is slowed below this fraction of the mean speed that its wanted time requires.
 _MIN_RATE = 0.2
 _TINY = 1e-300
 
@@ -54,36 +57,40 @@ class _Columns:
         return type(self)(*[getattr(self, name)[rows] for name in self.__slots__])
 
     def put(self, rows: Indices, other: Self) -> None:
-        """Replace the given rows."""
+        """Replace the given rows by the rows of ``other``."""
         for name in self.__slots__:
             getattr(self, name)[rows] = getattr(other, name)
 
 
 @dataclass(slots=True)
 class Moves(_Columns):
-    """Per-move parameters on the wire; lengths in m or rad, whichever leads."""
+    """The parameters of moves; lengths are in m or rad, the unit of the leading quantity."""
 
-    #: Length from waypoint to waypoint, with the greatest speed and acceleration.
+    #: Length from waypoint to waypoint.
     length: Floats
+    #: Greatest speed.
     speed: Floats
+    #: Greatest acceleration.
     acceleration: Floats
     #: Time on the wire [s]; 0 = speed and acceleration apply.
     time: Floats
-    #: Fraction of its time for which a move with a time speeds up; it brakes as long.
+    #: For a move with a time: the fraction of the time for which it speeds up, and that for which
+    #: it brakes.
     ramp_part: Floats
     #: Length within which the move brakes from full speed; inf = it brakes with its acceleration.
     stops_within: Floats
-    #: Lengths in the blends before and after the move; 0 = the arm rests there.
+    #: Length of the move within the blend before it; 0 = no blend, the move begins at rest.
     head: Floats
+    #: Length of the move within the blend after it; 0 = no blend, the move ends at rest.
     tail: Floats
-    #: Length per unit of the blend's parameter ``s``: at the end of the blend before the move, and
-    #: at the beginning of the blend after it.
+    #: Length per unit of the parameter ``s`` at the end of the blend before the move.
     exit_rate: Floats
+    #: Length per unit of the parameter ``s`` at the beginning of the blend after the move.
     entry_rate: Floats
 
     @property
     def accelerations(self) -> Floats:
-        """Accelerations; for a move with a time, the one that it needs from rest to rest."""
+        """Accelerations; of a move with a time, the acceleration needed from rest to rest."""
         p = self.ramp_part
         by_time = self.length / np.maximum(p * (1.0 - p) * self.time**2, _TINY)
         return np.where(self.time > 0.0, by_time, self.acceleration)
@@ -100,10 +107,11 @@ class Handover(_Columns):
 
     #: Rate of the blend's parameter ``s`` [1/s]; 0 = no blend.
     rate: Floats
-    #: Time until the first of the two moves would rest at its waypoint [s].
+    #: Time until the first of the two moves would come to rest at its waypoint [s].
     remaining: Floats
-    #: Acceleration of the first move and, if it has a time, its length; in units of ``s``.
+    #: Acceleration of the first move, in units of ``s`` [1/s^2].
     acceleration: Floats
+    #: Length of the first move in units of ``s`` if the move has a time, else 0.
     length: Floats
 
 
@@ -112,22 +120,30 @@ class MoveTimes(_Columns):
     """
     The execution of moves by the controller.
 
-    Each move has a profile from the end of the blend before it to rest at its waypoint: its speed
-    changes to the cruising speed, and from there to 0. The blend after the move cuts off the end.
+    Each move has a profile from the end of the blend before it to rest at its waypoint: the speed
+    changes to the cruising speed, and later to 0. The blend after the move cuts off the end of the
+    profile.
     """
 
-    #: Rates of ``s`` at the beginning and end of the blend before the move [1/s]; 0 = no blend.
+    #: Rate of ``s`` at the beginning of the blend before the move [1/s]; 0 = no blend.
     begin_rate: Floats
+    #: Rate of ``s`` at the end of that blend [1/s]; 0 = no blend.
     end_rate: Floats
-    #: The profile: length, speeds at its beginning and while cruising, and accelerations.
+    #: Length of the profile.
     length: Floats
+    #: Speed at the beginning of the profile.
     enter: Floats
+    #: Cruising speed.
     cruise: Floats
+    #: Acceleration with which the speed changes to the cruising speed.
     acceleration: Floats
+    #: Deceleration to rest.
     braking: Floats
-    #: Length that the blend after the move cuts off; time until the cut [s], and the speed there.
+    #: Length that the blend after the move cuts off.
     tail: Floats
+    #: Time from the beginning of the profile to this cut [s].
     between: Floats
+    #: Speed at the cut.
     leave: Floats
 
     @property
@@ -137,7 +153,7 @@ class MoveTimes(_Columns):
 
     @property
     def blend_half(self) -> Floats:
-        """Time in the first half of the blend before each move, up to the point [s]."""
+        """Time in the first half of the blend before each move, up to its waypoint [s]."""
         return ramp_time(self.begin_rate, self.end_rate, 0.5)
 
     @property
@@ -154,7 +170,7 @@ class MoveTimes(_Columns):
         return np.cumsum(blend + self.between) - self.between
 
     def time_at(self, distance: Floats) -> Floats:
-        """Return the time from the beginning of the profile to a distance on it [s]."""
+        """Return the time [s] from the beginning of each profile to a distance on it."""
         enter, cruise = self.enter, np.maximum(self.cruise, _TINY)
         ramp_in = _ramp_distance(enter, cruise, self.acceleration)
         ramp_out = _ramp_distance(0.0, cruise, self.braking)
@@ -165,13 +181,13 @@ class MoveTimes(_Columns):
         speed = np.sqrt(np.maximum(enter * enter + 2.0 * rate * x, 0.0))
         time = 2.0 * x / np.maximum(enter + speed, _TINY)
         time += np.clip(distance - ramp_in, 0.0, even) / cruise
-        # Time spent braking: the whole braking time less what is left of it.
+        # Time spent braking: the whole braking time less the braking time still to come.
         to_come = np.sqrt(2.0 * np.minimum(left, ramp_out) / self.braking)
         time += np.maximum(cruise / self.braking - to_come, 0.0)
         return time
 
     def speed_at(self, distance: Floats) -> Floats:
-        """Return the speed at a distance on the profile."""
+        """Return the speed at a distance on each profile."""
         rate = np.copysign(self.acceleration, self.cruise - self.enter)
         changed = np.sqrt(np.maximum(self.enter**2 + 2.0 * rate * distance, 0.0))
         bound = np.minimum(changed, self.cruise)
@@ -182,15 +198,15 @@ class MoveTimes(_Columns):
 
     @property
     def knots(self) -> Floats:
-        """Distances (n, 4) on the profile at which to sample its time."""
+        """Distances (n, 4) on the profiles at which their times are sampled."""
         a = _ramp_distance(self.enter, self.cruise, self.acceleration)
         b = _ramp_distance(0.0, self.cruise, self.braking)
-        # The quarters of the ramps keep the chords between the knots close to the parabola.
+        # A knot on each ramp keeps the chords between the knots close to the ramp's parabola.
         return np.stack((0.25 * a, a, self.length - b, self.length - 0.25 * b), axis=1)
 
 
 def ramp_time(begin: Floats, end: Floats, s: Floats | float) -> Floats:
-    """Return the time to reach ``s`` (n,) in blends whose rates change linearly over time [s]."""
+    """Return the times (n,) [s] to reach ``s`` in blends whose rates change linearly over time."""
     there = np.sqrt(np.maximum(begin**2 + (end**2 - begin**2) * s, 0.0))
     time: Floats = np.where(end > 0.0, 2.0 * s / np.maximum(begin + there, _TINY), 0.0)
     return time
@@ -220,7 +236,7 @@ class MoveChain:
 
     @property
     def blend_entries(self) -> Floats:
-        """The :class:`BlendEntry` of the blend after each move (n, 5), zeros without one."""
+        """The :class:`BlendEntry` (n, 5) of the blend after each move; zeros = no blend."""
         handed = (getattr(self._handed, name) for name in Handover.__slots__)
         before = np.stack((*handed, self.times.blend_half), axis=1)
         return np.concatenate((before[1:], np.zeros((1, 5))))
@@ -242,7 +258,7 @@ class MoveChain:
             self._handed.put(rows, new.take(np.flatnonzero(changed)))
 
     def durations_with(self, rows: Indices, moves: Moves) -> Floats:
-        """Return the durations of rows with other moves, each as if only it had changed [s]."""
+        """Return the durations [s] of rows with other moves, each as if only it had changed."""
         times = _carry_out(moves, self._handed.take(rows))
         after = np.minimum(rows + 1, len(self.moves.length) - 1)
         handed = _hand_over(moves, times)
@@ -258,11 +274,11 @@ class MoveChain:
         at_rate: Callable[[Indices, Floats], Moves],
     ) -> None:
         """
-        Change speeds so that the moves take the wanted times, as far as possible.
+        Change the speeds so that the moves take the wanted times, as far as possible.
 
         :param wanted: times from point to point (n,) [s]; NaN = the move stays as it is.
         :param rate: rates of the moves (n,) [1/s], changed in place up to ``max_rate``.
-        :param at_rate: returns the moves of given rows at given rates.
+        :param at_rate: function of rows and rates that returns the moves.
         """
         asked = np.isfinite(wanted)
         asked[0] &= self._first is None
@@ -270,7 +286,7 @@ class MoveChain:
         for _ in range(_MAX_FITS):
             spent = self.times.durations
             off = spent - wanted
-            # If a move is early and cannot be slower, the next one makes up for it.
+            # If a move is early and cannot be slower, the next move takes longer instead.
             early = np.where((rate <= lowest) & (off < -_IN_TIME), -off, 0.0)
             if self._first is not None:
                 early[0] = -off[0]
@@ -295,12 +311,12 @@ def _carry_out(moves: Moves, handed: Handover) -> MoveTimes:
     begin, end = _blend_rates(moves, handed)
     enter = end * moves.exit_rate
     rest, braking = moves.length - moves.head, moves.braking
-    # By speed: the greatest speed from which the move can still brake.
+    # Moves with a speed: the greatest speed from which the move can still brake.
     a = moves.acceleration
     peak = np.minimum(
         moves.speed, np.sqrt((2.0 * rest + enter**2 / a) / (1.0 / a + 1.0 / braking))
     )
-    # By time: blend and profile take the move's own time and the rest of the previous move's.
+    # Moves with a time: blend and profile take that time and what the previous move has left.
     timed, time = moves.time > 0.0, moves.time + handed.remaining
     left = np.maximum(
         time - ramp_time(begin, end, 1.0),
@@ -343,10 +359,11 @@ def _blend_rates(moves: Moves, handed: Handover) -> tuple[Floats, Floats]:
     """
     Return the rates at which blends begin and end.
 
-    The rate changes to the cruising speed of the next move, within three bounds: neither move may
-    exceed its acceleration in the blend (r'' = 2 r s'^2), and the rest of the next move must
-    suffice to brake. A move with a time has the acceleration that it needs from rest to rest; the
-    move before the blend also that of the next one, in proportion to their lengths, if greater.
+    The rate changes towards the cruising speed of the move after the blend, within three bounds:
+    neither move may exceed its acceleration in the blend (r'' = 2 r s'^2), and the remainder of
+    the move after the blend must be long enough to brake. The acceleration of a move with a time
+    is the one that it needs from rest to rest. If the move before the blend has a time, its bound
+    is at least the next move's acceleration, scaled by the ratio of the two lengths.
     """
     blended, timed = handed.rate > 0.0, moves.time > 0.0
     time = np.maximum(moves.time + handed.remaining, _TINY)
@@ -369,7 +386,7 @@ def _fit(
     highest: Floats,
 ) -> Floats:
     """
-    Return the rates at which moves take the wanted times, or the bounds.
+    Return the rates at which moves take the wanted times; if none does, the nearer bound.
 
     Times are nearly powers of the rate, so the secant method is applied to logarithms.
     """
@@ -381,7 +398,7 @@ def _fit(
         slow = f > 0.0
         low, f_low_new = np.where(slow, x, low), np.where(slow, f, f_low)
         high, f_high_new = np.where(slow, high, x), np.where(slow, f_high, f)
-        # Illinois method: the value at an end that stays a second time is halved.
+        # Illinois method: the value at a bound that is kept a second time is halved.
         f_high = np.where(slow & (side > 0.0), 0.5 * f_high_new, f_high_new)
         f_low = np.where(~slow & (side < 0.0), 0.5 * f_low_new, f_low_new)
         side = np.where(slow, 1.0, -1.0)

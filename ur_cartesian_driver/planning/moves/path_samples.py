@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The samples along the path of a goal, and how fast the joints are there."""
+"""The samples along the path of a goal, and the times that joint speed limits require there."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ _MIN_STEP = 1e-12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointSpeedBounds:
-    """The times of whole segments at the speed limits of the joints; columns (n,)."""
+    """The times of whole segments as bounded by the joint speed limits; columns (n,)."""
 
-    #: Time at the rate that the sample with the fastest joints allows [s]; the leading joint in
-    #: that sample, and its fraction of the segment.
+    #: Time of the segment at the rate that the sample with the fastest joints allows [s].
     times: Floats
+    #: Joint that is nearest to its speed limit in that sample.
     joints: Indices
+    #: Fraction of the segment at that sample.
     fractions: Floats
-    #: Time at the rate that the sample with the slowest joints allows [s]; time if some joint is
-    #: at its limit everywhere [s].
+    #: Time of the segment at the rate that the sample with the slowest joints allows [s].
     shortest_times: Floats
+    #: Time of the segment if some joint is at its speed limit everywhere [s].
     times_at_limits: Floats
 
 
@@ -38,13 +39,15 @@ class JointSpeedBounds:
 class BlendSamples:
     """The samples in all blends of a goal; columns (n,)."""
 
-    #: Waypoint that the blend rounds; its parameter ``s`` half-way from the previous sample.
+    #: Waypoint that the blend rounds.
     index: Int32s
+    #: Parameter ``s`` of the blend half-way between the previous sample and this one.
     s: Floats
-    #: Per unit of ``s``: the time at the joint speed limits [s], the joint that takes longest, and
-    #: the distance that the tool moves [m].
+    #: Time per unit of ``s`` at the joint speed limits [s].
     joint_time: Floats
+    #: Joint that needs this time.
     joint: Indices
+    #: Distance that the tool moves per unit of ``s`` [m].
     tool_distance: Floats
 
 
@@ -53,16 +56,18 @@ class PathSamples(NamedTuple):
 
     segment: Int32s
     fraction: Floats
-    #: Joint positions (n, 6) [rad], tool poses (n, 7), and distances from singularities (n, 3),
-    #: inf where singularities do not matter.
+    #: Joint positions (n, 6) [rad].
     q: Floats
+    #: Tool poses (n, 7).
     poses: Floats
+    #: Distances from singularities (n, 3); inf where singularities do not matter.
     measures: Floats
     #: Index of the waypoint at the end of the curve, or of the one that the blend rounds.
     waypoint: Int32s
     is_blend: Flags
-    #: The parameter on the curve, and its change from the previous sample.
+    #: The parameter on the curve.
     t: Floats
+    #: Change of the parameter from the previous sample.
     step: Floats
 
     @classmethod
@@ -70,7 +75,7 @@ class PathSamples(NamedTuple):
         """
         Return the samples of a joint path.
 
-        :param measures: (n, 3) distances from singularities, inf where they do not matter.
+        :param measures: (n, 3) distances from singularities, inf where these do not matter.
         """
         pieces, piece, t = path.pieces, path.piece, path.t
         is_first = np.diff(piece, prepend=-1) != 0
@@ -113,8 +118,8 @@ def speed_bounds(
         joint=joint[on_blend],
         tool_distance=(np.append(0.0, distance) / step)[on_blend],
     )
-    # A sample in a blend adds half its time to each segment, and does not bound the rate of
-    # either: joints may reverse there.
+    # A sample in a blend adds half its time to each of the two segments, and bounds the rate of
+    # neither: joints may reverse there.
     joint_time[on_blend] *= 0.5
     local_time[on_blend], rate[on_blend] = np.inf, 0.0
     rows = np.concatenate([np.arange(len(rate)), on_blend])

@@ -25,9 +25,9 @@ def segment_lines(
     reasons: Mapping[int, Sequence[str]],
 ) -> LateLines:
     """
-    Return the lines of all segments.
+    Return the report lines of all segments.
 
-    :param reasons: by point, the reasons for the choice of its primitive.
+    :param reasons: for each point, the reasons for the choice of its primitive.
     """
 
     def make() -> list[str]:

@@ -16,7 +16,7 @@ from ur_cartesian_driver.planning.moves.move_chain import MoveTimes, ramp_time
 
 #: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8
-#: Rows that are computed at a time, so that intermediate arrays stay in the CPU cache.
+#: Number of rows that are computed at once, so that intermediate arrays stay in the CPU cache.
 _BLOCK = 8192
 
 
@@ -24,9 +24,10 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     """
     Return the path that the robot is expected to follow, blends included.
 
-    Lines are sampled at their ends and where their acceleration changes, other curves so that
-    their chords stay close (see :mod:`~ur_cartesian_driver.planning.geometry.curves`); successive
-    rows differ by at most 10 degrees.
+    Lines are sampled at their ends and where the acceleration changes. Other curves are sampled so
+    that chords between the samples stay close to the curve (see
+    :mod:`~ur_cartesian_driver.planning.geometry.curves`). Successive rows differ by at most
+    10 degrees.
 
     :param begin: index of the waypoint at the end of the first segment.
     """
@@ -36,7 +37,7 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
     blend_tolerance = np.where(is_blend[:, None], path.blend_tolerance[row], 0.0)
     poses = np.concatenate([[start.row()], path.rows(number, at)])
     keep_hemisphere(poses)
-    # Each half of a blend belongs to one of its segments.
+    # The first half of a blend belongs to the segment before it, the second to the one after it.
     behind = np.append(path.u_join[1:], 0.0)[row]
     rounded = np.where(
         at > 0.5, (2.0 * at - 1.0) * behind, 1.0 - (1.0 - 2.0 * at) * (1.0 - path.u_leave[row])
@@ -52,11 +53,11 @@ def reference_path(start: Pose, begin: int, path: BlendedPath, times: MoveTimes)
 
 
 def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
-    """Return the curve numbers (n,) of all rows but the start, and the parameters there (n,)."""
+    """Return curve number and curve parameter, each (n,), of all rows but the start."""
     curves, rows = path.curves, np.arange(len(path.u_join))
     begin, span = path.u_join, np.maximum(path.u_leave - path.u_join, 0.0)
     n = np.maximum(1, np.ceil(curves.samples * span)).astype(np.intp)
-    # Joint moves are sampled evenly, because preview finds the joint positions by counting rows.
+    # Joint moves are sampled evenly, because the preview finds joint positions by counting rows.
     n = np.where(curves.is_joint_line, np.maximum(n, _MIN_JOINT_SAMPLES), n)
     row, k = counted(n - 1)
     between = begin[row] + span[row] * k / n[row]
@@ -70,7 +71,7 @@ def _places(path: BlendedPath, times: MoveTimes) -> tuple[Indices, Floats]:
         order = np.lexsort((at_knots, own))
         own, at_knots = own[order], at_knots[order]
     blends = np.flatnonzero(path.has_blend_after)
-    # An even number of pieces puts one sample at the point.
+    # An even number of pieces puts one sample in the middle of the blend.
     n = path.blend_samples[blends] + path.blend_samples[blends] % 2
     blend, k = counted(n)
     number = np.concatenate([2 * own, 2 * rows, 2 * blends[blend] + 1])

@@ -34,13 +34,13 @@ from ur_cartesian_driver.planning.request.validate import arc_through_via
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: Motions on straight lines in joint space.
+#: Types of segments that are straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 _IN_JOINT_SPACE = type_table(JOINT_SPACE_TYPES)
-#: Smallest length that blends leave of a segment [m]: more than the rounding of two poses and two
-#: radii to micrometres.
+#: Smallest length [m] between the two blends of a segment: more than the rounding of two poses and
+#: two radii to micrometres.
 _MIN_BLEND_GAP = 5e-6
-#: By type of motion: the only types from which the robot can blend into it.
+#: By type of segment: the only types from which the robot can blend into it (all, if absent).
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
     SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
@@ -57,7 +57,7 @@ _CAN_BLEND = np.array(
 
 class SegmentDrafts:
     """
-    The segments from a waypoint on, a row for each, while their curves and joints are being found.
+    The segments from a waypoint on, one per row, while their curves and joints are being found.
 
     :param targets: poses of all waypoints in base (n, 7).
     :param begin: index of the first waypoint with a motion.
@@ -80,11 +80,11 @@ class SegmentDrafts:
         self.begin, self.targets = begin, targets[begin:]
         self.segments = goal.motions[begin:]
         types = self.segments.types
-        #: (n,) numbers of types: AUTO is resolved, JOINT also if it replaces a line or an arc.
+        #: (n,) type numbers: AUTO is resolved; a line or an arc that was replaced is JOINT.
         self.kinds = np.where(types == SegmentType.AUTO, SegmentType.LINEAR, types)
         #: (n,) whether each segment is a straight line in joint space.
         self.is_joint_move: Flags = _IN_JOINT_SPACE[self.kinds]
-        # Remarks with their rows, so that they can be put in order.
+        # Remarks with their rows, by which they are sorted below.
         found: list[tuple[int, str]] = []
         #: (n,) blend radii [m].
         self.radii = self._radii(found)
@@ -95,7 +95,7 @@ class SegmentDrafts:
         self._find_blends()
         #: (n, 6) the configuration at each waypoint [rad].
         self.joints = np.zeros((len(self), 6))
-        #: (n,) the ``u`` up to which each curve is solved.
+        #: (n,) the curve parameter ``u`` up to which each curve is solved.
         self.solved_until = np.ones(len(self))
 
     def __len__(self) -> int:
@@ -108,12 +108,12 @@ class SegmentDrafts:
     def _find_blends(self) -> None:
         can_blend = np.append(_CAN_BLEND[self.kinds[:-1], self.kinds[1:]], True)
         wants_blend = self.radii > SAME_POSITION  # the wire rounds smaller radii to 0
-        #: (n,) whether each segment is blended into the next one, or stops because the robot
-        #: cannot blend these two.
+        #: (n,) whether each segment is blended into the next one; (n,) whether it stops instead,
+        #: because the robot cannot blend the two types.
         self.is_blended, self.stops_instead = wants_blend & can_blend, wants_blend & ~can_blend
 
     def stop_at(self, row: int) -> None:
-        """Do not blend a segment into the next one."""
+        """Remove the blend from a segment into the next one."""
         self.radii[row] = 0.0
         self._find_blends()
 
@@ -135,7 +135,7 @@ class SegmentDrafts:
     # -- curves ----------------------------------------------------------------------------------
 
     def _curves(self, start: Pose, remarks: list[tuple[int, str]]) -> CurveRows:
-        """Return the lines and arcs; rows of joint moves have no meaning."""
+        """Return the curves of lines and arcs; the rows of joint moves have no meaning."""
         starts = np.concatenate([[start.row()], self.targets[:-1]])
         arcs: dict[int, ArcCurve] = {}
         refusal, end = None, len(self)
@@ -159,7 +159,7 @@ class SegmentDrafts:
         return curves
 
     def _arc(self, row: int, start: Pose) -> tuple[ArcCurve, str]:
-        """Return the arc of a segment that begins at a pose, and a remark on it or ''."""
+        """Return the arc of a segment from the pose ``start``, and a remark on it ('' = none)."""
         segments, index, target = self.segments, self.begin + row, self.target(row)
         mode = ArcMode(int(segments.arc_modes[row]))
         if mode != ArcMode.FIXED:
@@ -209,7 +209,8 @@ class SegmentDrafts:
         """
         Shorten blends that touch each other or the end of a segment.
 
-        Rounded to micrometres they could overlap on the wire, and the robot would skip a point.
+        Such blends, rounded to micrometres for the wire, could overlap: the robot would skip a
+        point.
         """
         radii = self.radii
         positions = np.concatenate([[start.position], self.targets[:, :3]])

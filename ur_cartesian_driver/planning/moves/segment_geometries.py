@@ -20,12 +20,11 @@ _IS_OPTIMIZED = type_table(OPTIMIZED_TYPES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentGeometries:
-    """The segments of a goal with curves and joints, still without speeds; a row for each."""
+    """The segments of a goal with curves and joints, still without speeds; one per row."""
 
     #: Index of the waypoint at the end of the first segment.
     begin: int
-    #: (n,) the numbers of the types that are sent: AUTO is resolved, JOINT also if it replaces a
-    #: line or an arc.
+    #: (n,) type numbers as sent: AUTO is resolved; a line or an arc that was replaced is JOINT.
     kinds: Int64s
     waypoints: WaypointRows
     segments: SegmentRows
@@ -33,10 +32,11 @@ class SegmentGeometries:
     path: BlendedPath
     #: (n, 6) configurations at the ends of the segments [rad].
     joints: Floats
-    #: (n,) durations from the goal [s]; NaN = the segment has a speed instead.
+    #: (n,) durations of the segments by the goal's times [s]; NaN = no times, speeds apply.
     times: Floats
-    #: Joint speed bounds of the segments; their distances from singularities and joint limits.
+    #: Joint speed bounds of the segments.
     speed_bounds: JointSpeedBounds
+    #: The segments' smallest distances from singularities and joint limits.
     tightest_margins: TightestMargins
     #: Whether the arm is already at the first point, and waits there until the point's time.
     waits: bool = False
@@ -46,7 +46,7 @@ class SegmentGeometries:
 
     @property
     def is_optimized(self) -> Flags:
-        """(n,) whether a segment's speed is a fraction of the robot's limits."""
+        """(n,) whether each segment's speed is a fraction of the robot's limits."""
         return _IS_OPTIMIZED[self.kinds]
 
     @property

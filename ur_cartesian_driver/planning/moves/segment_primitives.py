@@ -59,7 +59,7 @@ _CLASSES = {
     SegmentType.OPTIMIZED_JOINT: OptimoveJ,
     SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
-#: Kind of the row of numbers, by type of segment; without meaning for an arc.
+#: For each type of segment, the index of its primitive in MOVES; not used for arcs.
 _MOVE_OF = np.array([MOVES.index(_CLASSES.get(kind, MoveL)) for kind in SegmentType])
 _HAS_Q_NEAR = type_table(JOINT_SPACE_TYPES)
 
@@ -70,9 +70,9 @@ def segment_primitives(
     """
     Return the primitive of each segment.
 
-    :param paths: planner of the segments' joints; gets further remarks and reasons.
+    :param paths: planner that found the segments' joints; remarks and reasons are added to it.
     :raises NotAvailable: the robot program does not support a primitive.
-    :raises InvalidPosture: the arm passes a via in a configuration other than its posture's.
+    :raises InvalidPosture: the arm would not pass a via in the configuration of the via's posture.
     """
     kinds = geometries.kinds
     moves = MoveRows(
@@ -100,7 +100,7 @@ class _SpecialPrimitives:
         self._postures = geometries.waypoints.postures
 
     def by_row(self) -> Mapping[int, Primitive]:
-        """Return these primitives by row."""
+        """Return the special primitives by row."""
         geometries = self._geometries
         special = geometries.kinds == SegmentType.CIRCULAR
         special |= not takes_q_near(self._options)
@@ -113,7 +113,7 @@ class _SpecialPrimitives:
         point, kind = geometries.begin + row, geometries.kinds[row]
         joints = vector6(geometries.joints[row].tolist())
         primitive: Primitive
-        if geometries.waits and row == 0:  # by a spline that rests, as no move of the robot waits
+        if geometries.waits and row == 0:  # a spline at rest: no move of the robot waits
             primitive = Spline(
                 target=self._paths.q_start,
                 velocities=ZERO6,
@@ -133,7 +133,7 @@ class _SpecialPrimitives:
         return primitive
 
     def _q_near(self, row: int, joints: Joints) -> Joints:
-        """Return the chosen solution, or a full posture itself if it selects that solution."""
+        """Return the chosen solution, or the full posture of the point if it selects it."""
         posture = self._postures.get(row)
         wanted = posture and full_posture(named_joints(posture, self._options.tf_prefix))
         if wanted:
@@ -147,7 +147,7 @@ class _SpecialPrimitives:
         return pose_from_row(self._moves.targets[row].tolist())
 
     def _arc(self, row: int, joints: Joints) -> MoveC:
-        """Return the arc, with joint positions for a target or via that has a posture."""
+        """Return the arc move; a target or via that has a posture becomes joint positions."""
         point, segments = self._geometries.begin + row, self._geometries.segments
         segment_via = segments.via(row)
         assert segment_via is not None
@@ -189,7 +189,8 @@ class _SpecialPrimitives:
         location = segment_field(point, 'via')
         first, last = np.searchsorted(samples.segment, (point, point + 1))
         nearest = int(first + np.argmin(np.abs(samples.fraction[first:last] - arc.u_via)))
-        # The via's orientation does not shape the arc, so solve its pose from the arc's joints.
+        # The arm need not pass the via in the via's orientation, so the arc's joints are only the
+        # seed from which the via's pose is solved.
         q = self._kinematics.nearest(via, vector6(samples.q[nearest].tolist()), location)
         chosen, clause = self._kinematics.compare_posture(
             via, geometries.segments.via_postures[row], q, location, self._options.tf_prefix

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Find the speed of each segment that meets its time within the limits.
+Find, for each segment, the speed that meets the segment's time within the limits.
 
 ``movel`` and ``movej`` accept a time on the wire. ``movec`` and ``movep`` do not: their speed is
 chosen so that they meet the time. :mod:`~.move_chain` computes the times of moves and blends in
@@ -31,18 +31,18 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     type_table,
 )
 
-#: Times that differ by less than the first factor are the same. A time that is exceeded by less
-#: than the second factor counts as met.
+#: Times that differ by less than the factor ``_NEARLY`` are the same. A time that is exceeded by
+#: less than the factor ``_KEPT`` counts as met.
 _NEARLY, _KEPT = 1.0 + 1e-5, 1.002
-#: Smallest speed that the wire carries accurately enough: it transmits millionths.
+#: Smallest speed or acceleration that the wire, which transmits millionths, carries accurately.
 MIN_SPEED = 1e-5
-#: Motions whose blend the robot skips if it would cover the blend radius in one control cycle.
+#: Motions whose blend the robot skips if the tool covers the blend radius in one control cycle.
 _NEEDS_A_CYCLE = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
-#: A limit exceeded by less than this factor counts as kept. Greatest number of rounds in which
-#: moves that are too fast are slowed.
+#: A limit exceeded by less than this factor counts as kept.
 _WITHIN = 1.0 + 1e-6
+#: Greatest number of rounds in which moves that are too fast are slowed.
 _MAX_ROUNDS = 40
-#: A point that is passed early by at most this is in time [s].
+#: A point that is passed early by at most this [s] counts as passed in time.
 _EARLY = 0.001
 
 
@@ -50,7 +50,7 @@ def shortest_duration(
     length: Floats, speed: Floats, acceleration: Floats, ramps: Floats | float
 ) -> Floats:
     """
-    Return the shortest times of motions that are sent with a speed instead of a time [s].
+    Return the shortest times [s] of motions that are sent with a speed instead of a time.
 
     From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a).
 
@@ -63,16 +63,18 @@ def shortest_duration(
 
 class SegmentTimings:
     """
-    The speeds of segments that meet the times within the limits; columns (n,).
+    The speeds with which segments meet their times within the limits; columns (n,).
 
     :param running: the first segment as it was planned before, if it has already been sent.
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire, or a blend is too small.
     """
 
-    #: Values on the wire; time 0 = speed and acceleration apply.
+    #: Speeds on the wire.
     velocities: Floats
+    #: Accelerations on the wire.
     accelerations: Floats
+    #: Times on the wire [s]; 0 = speed and acceleration apply.
     wire_times: Floats
     #: Expected times from point to point [s]; blended points are passed in mid-blend.
     durations: Floats
@@ -88,8 +90,8 @@ class SegmentTimings:
         """Begin with the requested speeds and times, and change them until all limits are kept."""
         self._geometries, self._options, self._model = geometries, options, model
         self._samples = blend_samples
-        # Times per unit of the blend's parameter [s]: at the tool's speed limit, and at the
-        # speed at which the blend's arc needs the greatest linear acceleration.
+        # Times per unit of the blend's parameter [s]: at the tool's speed limit (_tool_time), and
+        # at the speed whose arc needs the greatest linear acceleration (_arc_time).
         distance = blend_samples.tool_distance
         self._tool_time = distance / (options.max_tool_speed or inf)
         radius = geometries.path.arc_radius[blend_samples.index - geometries.begin]
@@ -102,9 +104,9 @@ class SegmentTimings:
         self._speed = requests.speed
         self._least, self._most = requests.acceleration, requests.max_acceleration
         self._wanted = np.maximum(self._time, requests.min_time)
-        #: How long before its time each point is passed, so that the next one is in time [s].
+        #: Lead [s] with which each point is passed early, so that the next point is in time.
         self._ahead = np.zeros(n)
-        #: Index of the blend sample that slows each segment; -1 = its own limits do, if any.
+        #: Index of the blend sample that slows each segment; -1 = none does.
         self._slowed_at: Indices = np.full(n, -1)
         self._moves = requests.moves()
         # Even blended moves get no less time on the wire than they need from rest to rest.
@@ -137,9 +139,9 @@ class SegmentTimings:
 
     def _go_ahead(self, late: Floats) -> bool:
         """
-        Pass points early if the next one would be late otherwise; return whether any changed.
+        Pass points early if the next point would be late otherwise; return whether leads changed.
 
-        In the blend between a slow move and a fast one, both have the same speed.
+        A fast move loses time in a blend with a slow one, as both have the same speed there.
         """
         moves = self._moves
         if not late.any():
@@ -151,7 +153,7 @@ class SegmentTimings:
         alone = shortest_duration(moves.length, self._speed, self._most, 2.0)
         late = late - back
         late = np.where(self._timed | (self._wanted > alone), late, 0.0)
-        # How much shorter each move can be, so that its own point is passed early.
+        # Time by which each move can be shortened, so that its own point is passed early.
         spare = np.where(
             self._timed,
             1.0 / self._rate - 1.0 / self._max_rate,
@@ -178,7 +180,7 @@ class SegmentTimings:
         self.wire_times = moves.time
 
     def _at_rate(self, rows: Indices, rate: Floats) -> Moves:
-        """Return moves at given rates; a rate beyond the greatest speed adds acceleration."""
+        """Return the moves at given rates; beyond the greatest speed, their acceleration grows."""
         moves, speed = self._moves.take(rows), self._speed[rows]
         asked = rate * moves.length
         more = np.maximum(asked / speed, 1.0) ** 2
@@ -188,7 +190,7 @@ class SegmentTimings:
         return moves
 
     def _allow_acceleration(self) -> None:
-        """Extend the rates of moves that meet a time by speed, up to their acceleration limit."""
+        """Raise the greatest rates of moves that meet times by speed to the acceleration limit."""
         self._max_rate = np.where(
             self._timed | np.isnan(self._time),
             self._max_rate,
@@ -271,10 +273,11 @@ class SegmentTimings:
 
     def bounds(self) -> tuple[Floats, Floats]:
         """
-        Return the least and greatest times of segments, for any law of passing blends [s].
+        Return the least and greatest times [s] of segments, however the robot passes blends.
 
-        In the greatest times the arm rests at each point. In the least ones it cruises between the
-        blends and crosses each blend in a straight line, at the faster of the segments' speeds.
+        For the greatest times, the arm comes to rest at each point. For the least times, the arm
+        cruises between the blends and crosses each blend in a straight line, at the higher speed
+        of the two segments.
         """
         times, moves, path = self.chain.times, self._moves, self._geometries.path
         before, after = path.has_blend_before, path.has_blend_after
@@ -287,7 +290,7 @@ class SegmentTimings:
         least = shortest_duration(between, speed, acceleration, ramps)
         greatest = shortest_duration(moves.length, speed, acceleration, 2.0)
         tool_speed = speed * np.maximum(path.curves.length, 1e-9) / moves.length
-        # With legs of length r and a chord c, no blend is longer than r + c / 2: this bounds c.
+        # A blend with legs of length r and a chord c is at most r + c / 2 long: a bound on c.
         across = np.where(after, 2.0 * np.maximum(path.blend_length - path.radius, 0.0), 0.0)
         least[:-1] += across[:-1] / np.maximum(tool_speed[:-1], tool_speed[1:])
         return (
@@ -301,7 +304,7 @@ class SegmentTimings:
         """
         Remark on moves that are slower than requested, and on points that are passed early.
 
-        :raises GoalRefused: a time is too short, a speed too low, a blend too small.
+        :raises GoalRefused: a time is too short or long, a speed too low, or a blend too small.
         """
         requests, path, timed = self.requests, self._geometries.path, ~np.isnan(self._time)
         is_late = self._wanted > self._time * _NEARLY
@@ -375,7 +378,7 @@ class SegmentTimings:
         )
 
     def _too_small(self, row: int, speed: float) -> InvalidGoal:
-        """Return the refusal of a blend that the robot would skip, to stop instead (its C171)."""
+        """Return the refusal of a blend that the robot would skip to stop at the point (C171)."""
         return InvalidGoal(
             segment_field(self._geometries.begin + row, 'blend_radius'),
             f'is {1e3 * self._geometries.path.radius[row]:g} mm, less than the '

@@ -25,17 +25,17 @@ from ur_cartesian_driver.planning.moves.segment_timing import SegmentTimings
 from ur_cartesian_driver.planning.request.goal_fields import OPTIMIZED_TYPES, type_table
 
 _IS_FREE = type_table((SegmentType.JOINT, *OPTIMIZED_TYPES))
-#: Unit directions whose dot product is at most this reverse.
+#: The path reverses if the dot product of its unit directions before and after is at most this.
 _REVERSAL = -0.98
-#: Fraction of the allowance for a blend that consists of chords, because their speed is a mean.
+#: Fraction of ``slower_by`` that is allowed in blends made of chords, as their speeds are means.
 _CHORD_PART = 0.5
 _TINY = 1e-12
-#: Rows of the reference path less than this apart have the same time [s].
+#: Rows of the reference path whose times differ by less than this [s] count as equal.
 _SAME_TIME = 1e-6
 
 
 def unknown_speeds(geometries: SegmentGeometries) -> tuple[list[int], list[int]]:
-    """Return the points with blends, and the points of motions without a requested tool speed."""
+    """Return the points with blends, and the ends of motions without a requested tool speed."""
     begin, free = geometries.begin, _IS_FREE[geometries.kinds]
     return (
         [begin + row for row in rows_where(geometries.path.has_blend_after)],
@@ -52,10 +52,10 @@ def slow_move_stretches(
     """
     Return the slow stretches of a plan of moves, in the order of the path.
 
-    :param reference: the reference path, without rests.
-    :param slower_by: the fraction of the requested speed by which a slow stretch falls short.
+    :param reference: the reference path of the motions, before stops are inserted.
+    :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
-    with np.errstate(over='ignore', invalid='ignore'):  # any speeds may be asked for
+    with np.errstate(over='ignore', invalid='ignore'):  # a goal may ask for any speed
         return _SlowMoves(geometries, timings, reference, slower_by).stretches()
 
 
@@ -75,8 +75,9 @@ class _SlowMoves:
         requests, times = timings.requests, timings.chain.times
         curves = geometries.path.curves
         self._free: Flags = _IS_FREE[geometries.kinds]
-        #: (n,) whether the tool is carried along a path; the requested speed [m/s], else NaN.
+        #: (n,) whether each segment carries the tool along a path.
         self._carries = ~self._free & requests.limits.translates
+        #: (n,) the requested speed [m/s]; NaN if the segment does not carry the tool.
         self._asked = np.where(self._carries, requests.asked, np.nan)
         #: Distance that the tool moves per unit of the length that the robot uses.
         self._ratio = curves.length / np.maximum(timings.chain.moves.length, _TINY)
@@ -92,7 +93,7 @@ class _SlowMoves:
 
     @cached_property
     def _is_short(self) -> Flags:
-        """(n,) whether each segment ends before the tool reaches its speed."""
+        """(n,) whether each segment is too short for the tool to reach the requested speed."""
         moves = self._timings.chain.moves
         untimed = (moves.time <= 0.0) & ~self._turns
         return self._too_slow & untimed & (moves.speed >= self._wanted)
@@ -106,7 +107,7 @@ class _SlowMoves:
         return turns
 
     def _ramps(self) -> tuple[Floats, Floats]:
-        """Return the distances at which each move's slow start ends and slow end begins (n,)."""
+        """Return where on its profile each move (n,) becomes fast enough, and too slow again."""
         times = self._timings.chain.times
         full = times.length - times.tail
         slow = (1.0 - self._slower_by) * times.cruise
@@ -124,7 +125,7 @@ class _SlowMoves:
         return speeds_up, brakes
 
     def _fractions(self, distances: Floats) -> Floats:
-        """Return the fractions of segments at distances on their profiles (n,)."""
+        """Convert distances (n,) on the profiles to fractions of the segments."""
         path, times = self._geometries.path, self._timings.chain.times
         full = np.maximum(times.length - times.tail, _TINY)
         fractions: Floats = path.u_join + (path.u_leave - path.u_join) * distances / full
@@ -139,7 +140,8 @@ class _SlowMoves:
         )
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(brakes), self._fractions(speeds_up)
-        # Whether each segment is the first one after a joint move, and the last one before one.
+        # Whether each segment is the first after a joint move, and whether it is the last before
+        # one.
         opens, closes = self._runs()
         heads, tails = speeds_up > 0.0, brakes < times.length - times.tail
         entering, leaving = times.enter * self._ratio, times.leave * self._ratio
@@ -176,7 +178,7 @@ class _SlowMoves:
             yield self._stretch((*start, *end), 0.0, cause, reason, begin + row)
 
     def _runs(self) -> tuple[Flags, Flags]:
-        """Return whether each segment is the first, and the last, between joint moves (n,)."""
+        """Return whether each segment (n,) is the first, and the last, between joint moves."""
         run, carries = np.cumsum(self._free), self._carries
         opens, closes = np.zeros((2, len(run)), dtype=np.bool_)
         rows = np.flatnonzero(carries)
@@ -195,7 +197,7 @@ class _SlowMoves:
     # -- whole segments --------------------------------------------------------------------------
 
     def _cruises(self) -> Iterator[SlowStretch]:
-        """Return the stretches whose greatest speed is too low."""
+        """Return the stretches of segments whose cruising speed is too low."""
         geometries, timings, times = self._geometries, self._timings, self._timings.chain.times
         speeds_up, brakes = self._ramps()
         begins, ends = self._fractions(speeds_up), self._fractions(brakes)
@@ -239,7 +241,7 @@ class _SlowMoves:
         middle = 0.5 * (reference.time[1:] + reference.time[:-1])
         first, last = np.searchsorted(middle, begin), np.searchsorted(middle, end)
         asked = np.fmin(self._asked[rows], self._asked[rows + 1])
-        # The last blend may end with the last speed; reduceat needs one element more.
+        # The last blend may end at the last speed, and reduceat needs an element after it.
         lowest = np.minimum.reduceat(
             np.append(speeds, np.inf), np.stack((first, last), axis=1).ravel()
         )[::2]
@@ -272,7 +274,7 @@ class _SlowMoves:
         point: int,
         asked: float | None = None,
     ) -> SlowStretch:
-        """Return a stretch from a fraction of one row to a fraction of another one."""
+        """Return the stretch at a place: first row and fraction, last row and fraction."""
         first, begin, last, end = place
         base = self._geometries.begin
         return SlowStretch(

@@ -5,7 +5,7 @@ The leading quantities of segments and their speed limits.
 
 A move of the robot has a single number as its speed, which limits both the translation [m/s] and
 the turn [rad/s] of the tool. So the larger of length and turn *leads* a segment; in a joint move,
-the joint that turns farthest leads. Tool, joints and accelerations limit the leading quantity.
+the joint that turns farthest leads. All limits are expressed as limits of the leading quantity.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class SpeedLimits:
     def __init__(
         self, geometries: SegmentGeometries, options: PlanningOptions, model: RobotModel
     ) -> None:
-        """Find the largest quantities, and the smallest limits."""
+        """Find the leading quantities, and their smallest limits."""
         self._bounds, self._options, self._model = geometries.speed_bounds, options, model
         curves, kinds = geometries.path.curves, geometries.kinds
-        #: Whether the tool's position changes; if not, the segment only turns it.
+        #: Whether the tool's position changes; if not, the segment only turns the tool.
         self.translates: Flags = curves.length > SAME_POSITION
         self.is_optimized = geometries.is_optimized
         turns_with_arc = (kinds == SegmentType.CIRCULAR) & (
@@ -48,9 +48,9 @@ class SpeedLimits:
         )
         travel = np.where(curves.is_joint_line, curves.joint_travel, curves.angle)
         length = np.where(self.is_turn, travel, curves.length)
-        # For an OPTIMIZED move, the time if some joint is always at its limit leads.
+        # An OPTIMIZED move is led by the time that it takes if some joint is always at its limit.
         length = np.where(self.is_optimized, self._bounds.times_at_limits, length)
-        #: Length of the leading quantity [m], [rad], or [s] of an OPTIMIZED move.
+        #: Length of the leading quantity: [m], [rad], or for an OPTIMIZED move [s].
         self.length: Floats = np.maximum(length, _MIN_LENGTH)
         times = np.where(self.is_optimized, 0.0, self._bounds.times)
         joint_speed = np.where(times > 0.0, self.length / np.maximum(times, 1e-300), inf)
@@ -60,11 +60,13 @@ class SpeedLimits:
             joint_speed[rows], self._joint[rows] = self._joint_moves(rows, curves)
         tool_speed = self._tool_speed(curves)
         self._is_joint_limit = joint_speed < tool_speed
-        #: Maximum speed and acceleration of the leading quantity.
+        #: Maximum speed of the leading quantity.
         self.speed: Floats = np.minimum(joint_speed, tool_speed)
+        #: Maximum acceleration of the leading quantity.
         self.acceleration = self._acceleration(curves)
-        # Lower limits, so that they hold even if the robot turns the tool faster than it moves it.
-        turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by its angle
+        # Lower the limits, so that they hold even if the robot turns the tool at up to
+        # ``turn_ratio`` rad/s for each m/s.
+        turn = np.minimum(curves.angle, self.length)  # a FIXED arc turns the tool by the arc angle
         counted = np.maximum(curves.length, turn / options.turn_ratio) / self.length
         ahead = (kinds == SegmentType.CIRCULAR) | (kinds == SegmentType.PROCESS)
         faster = np.where(ahead, np.minimum(1.0, counted), 1.0)
@@ -93,7 +95,7 @@ class SpeedLimits:
         )
 
     def _joint_moves(self, rows: Indices, curves: CurveRows) -> tuple[Floats, Indices]:
-        """Return the greatest speeds of joint moves (m,), and the joints that limit them."""
+        """Return the greatest speeds (m,) of joint moves, and the joints (m,) that limit them."""
         travel = np.array([curves.joint_line(row).travel for row in rows.tolist()])
         speeds = np.array(self._model.max_joint_speed) * self.length[rows, None]
         speeds = np.where(travel > 0.0, speeds / np.maximum(travel, 1e-300), inf)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The speeds and times requested of moves: by the goal's times or speeds, or by the defaults.
+The speeds and times requested of moves, from the goal's times, its speeds or the defaults.
 
 All numbers refer to the leading quantity of a segment, see :mod:`~.speed_limits`.
 """
@@ -26,22 +26,22 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field, type_table
 from ur_cartesian_driver.planning.request.program_features import takes_times
 
-#: The robot stretches the trapezoid given by speed and acceleration to the time of the move, if it
-#: has one (recorded on a UR3). We send 1.5 d/T and 4.5 d/T^2, for which accelerating, cruising and
-#: braking take a third of the time each; we assume the same of robots that ignore the two.
+#: If a move has a time T, the robot stretches the trapezoid of its speed and acceleration to T
+#: (recorded on a UR3). We send 1.5 d/T and 4.5 d/T^2, for which accelerating, cruising and braking
+#: take T/3 each; we assume these thirds also of robots that ignore speed and acceleration.
 RAMP_SHARE = 1.0 / 3.0
 #: Assumed acceleration of an OPTIMIZED move at fraction 1 [rad/s^2]; the robot's own limits are
-#: not published. It only serves to estimate the time of such a move.
+#: not published. It is only used to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 #: Motions that accept a time on the wire.
 _TIMED_ON_WIRE = type_table((SegmentType.LINEAR, SegmentType.JOINT))
 #: Motions that accept no time, and whose speed has not been measured if the turn leads.
 _UNMEASURED_TURNS = type_table((SegmentType.CIRCULAR, SegmentType.PROCESS))
-#: Ratio of peak speed to mean speed of a timed move: of the trapezoid in thirds; and of the
-#: triangle to which the same numbers lead on a line whose turn leads, if the robot turns the tool
-#: faster than it moves it.
+#: Ratios of peak speed to mean speed of a timed move: ``_PEAK`` for the trapezoid in thirds;
+#: ``_PEAK_OF_TURN`` for the triangle that results on a line whose turn leads, if the robot turns
+#: the tool at a higher number [rad/s] than it moves the tool [m/s].
 _PEAK, _PEAK_OF_TURN = 1.0 / (1.0 - RAMP_SHARE), 2.0
-#: Greatest acceleration of a segment without any motion, which has no limit.
+#: Acceleration limit of a segment without motion, which has no limit of its own.
 _UNLIMITED = 1e9
 #: Times that are longer by less than this factor get no remark.
 _NOTICEABLY = 1.001
@@ -49,7 +49,7 @@ _NOTICEABLY = 1.001
 _ROUNDED = 1.0 - 1e-9
 #: Smallest speed and acceleration in computations; 1 / 1e-310 overflows.
 _TINY = 1e-300
-#: Where a speed comes from, for the report.
+#: The sources of speeds, as the report names them.
 _BOTH = 'speed from linear_velocity and angular_velocity, as the turn leads'
 _SOURCES = (
     'speed from segments[{}].velocity',
@@ -64,7 +64,7 @@ _SOURCES = (
 
 def min_duration(length: Floats, speed: Floats, acceleration: Floats, peak: Floats) -> Floats:
     """
-    Return the shortest times on the wire that keep the peaks from rest to rest within bounds [s].
+    Return the shortest times [s] on the wire that keep peaks within bounds, from rest to rest.
 
     :param peak: ratio of peak speed to mean speed; 2 if the profile might be a triangle, whose
         acceleration is lower.
@@ -81,17 +81,20 @@ class SpeedRequests:
     :raises InvalidGoal: it is not known how fast the robot would run a segment.
     """
 
-    #: Greatest speeds; accelerations, and the greatest ones that may follow from a time.
+    #: Greatest speeds.
     speed: Floats
+    #: Accelerations.
     acceleration: Floats
+    #: Greatest accelerations to which meeting a time may lead.
     max_acceleration: Floats
-    #: Greatest accelerations that goal and limits allow, for full lengths instead of those that
-    #: the robot uses.
+    #: Greatest accelerations that goal and limits allow, for the leading quantity instead of the
+    #: length that the robot uses.
     allowed_acceleration: Floats
     #: Rates: 1 / time on the wire, or speed / length [1/s].
     rate: Floats
-    #: Requested times, NaN = none; shortest times on the wire that the limits allow, 0 = any.
+    #: Requested times [s]; NaN = none.
     time: Floats
+    #: Shortest times on the wire that the limits allow [s]; 0 = any.
     min_time: Floats
 
     def __init__(
@@ -107,14 +110,14 @@ class SpeedRequests:
         self.length: Floats = limits.length
         self._turn_leads_line = limits.is_turn & (self._kinds == SegmentType.LINEAR)
         self.peak = np.where(self._turn_leads_line, _PEAK_OF_TURN, _PEAK)
-        # Fraction of the length that the robot uses, according to the turn ratio.
+        # The length that the robot uses, by the turn ratio, as a fraction of the leading length.
         counted = np.maximum(self._curves.length, self.length / options.turn_ratio) / self.length
         self._counted = np.where(self._turn_leads_line, counted, 1.0)
-        #: Acceleration of the leading quantity for a unit of the acceleration that is sent.
+        #: Acceleration of the leading quantity per unit of the acceleration that is sent.
         self.acceleration_unit = np.where(
             limits.is_optimized, _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed), 1.0
         )
-        #: Whether the wire carries a time.
+        #: (n,) whether each segment is sent with a time.
         self.has_wire_time = _TIMED_ON_WIRE[self._kinds] & takes_times(options)
         #: Remarks on changes due to the limits, by row.
         self.remarks: dict[int, str] = {}
@@ -146,9 +149,9 @@ class SpeedRequests:
     @property
     def asked(self) -> Floats:
         """
-        Requested speeds of the tool (n,) [m/s], valid for segments that carry it.
+        Requested tool speeds (n,) [m/s], valid for segments that carry the tool along a path.
 
-        If the goal has times: the mean speeds that result from them.
+        If the goal has times, these are the mean speeds that result from the times.
         """
         if not self.is_timed:
             return self._wanted
@@ -160,7 +163,8 @@ class SpeedRequests:
         before, after = path.has_blend_before, path.has_blend_after
         head = np.where(before, counted * path.u_join, 0.0)
         tail = np.where(after, np.maximum(counted * (1.0 - path.u_leave), 1e-12), 0.0)
-        # Ramps of the trapezoid of 1.5 d/T and 4.5 d/T^2 over the length that the robot uses.
+        # Fraction of T in each ramp, if 1.5 d/T and 4.5 d/T^2 apply to the length that the robot
+        # uses.
         ramp = np.where(
             self._turn_leads_line, 1.0 / (1.0 + np.maximum(1.0, 2.0 * self._counted)), RAMP_SHARE
         )
@@ -234,14 +238,14 @@ class SpeedRequests:
         """Return the speeds that the goal asks for."""
         options, segments, kinds = self._options, self.geometries.segments, self._kinds
         limits, twists = self.limits, self.geometries.waypoints.twists
-        with np.errstate(over='ignore'):  # any number may come
+        with np.errstate(over='ignore'):  # a goal may contain any number
             speeds = np.where(
                 limits.translates,
                 np.linalg.norm(twists[:, :3], axis=1),
                 np.linalg.norm(twists[:, 3:], axis=1),
             )
-        # A single speed limits translation and turn: as the turn leads, it may be the default of
-        # the turn [rad/s], but no more than the greatest tool speed [m/s].
+        # One number limits translation and turn. Since the turn leads, this number can be the
+        # default of the turn [rad/s], but no more than the greatest tool speed [m/s].
         fastest = options.max_tool_speed or options.angular_velocity
         both = max(options.linear_velocity, min(options.angular_velocity, fastest))
         choices = (
@@ -272,9 +276,9 @@ class SpeedRequests:
         """
         Request times for lines on which the turn leads.
 
-        At a given speed, the robot may turn the tool as slowly as it moves it, or several times as
-        fast. So a time is sent instead. In either case, the tool then keeps to its speed [m/s] and
-        turns no faster than the default (on a turn on the spot: than requested).
+        For a speed of v m/s, the robot may turn the tool at v rad/s or several times as fast. So a
+        time is sent instead. With this time, the tool exceeds neither its speed [m/s] nor the
+        default turn rate (for a turn on the spot: the requested one), however the robot turns it.
         """
         rows = np.flatnonzero(self._turn_leads_line)
         if not len(rows):
@@ -326,8 +330,8 @@ class SpeedRequests:
         own = self._own_accelerations()
         most = np.minimum(np.where(own > 0.0, own, inf), limits.acceleration)
         self.allowed_acceleration, most = most, np.minimum(most, _UNLIMITED)
-        # Speeding up, cruising and braking take a third of the time each, and braking for the
-        # point begins only in the blend.
+        # Speeding up, cruising and braking take a third of the time each; a move that is blended
+        # begins to brake for its point only in the blend.
         brakes = path.has_blend_after & (self._kinds != SegmentType.PROCESS)
         tail = np.where(brakes, self.length * (1.0 - path.u_leave), inf)
         needed = np.maximum(4.5 * length / self.time**2, (length / self.time) ** 2 / tail)
@@ -336,7 +340,7 @@ class SpeedRequests:
         self.speed = limits.speed * self._counted
         self.acceleration, self.max_acceleration = least * self._counted, most * self._counted
         self.rate = 1.0 / self.time
-        # A move with a time is planned to rest at its waypoint even if it is blended.
+        # The robot plans a move with a time to come to rest at its waypoint, even before a blend.
         alone = min_duration(self.length, limits.speed, limits.acceleration, self.peak)
         self.min_time = np.where(timed, alone, 0.0)
 

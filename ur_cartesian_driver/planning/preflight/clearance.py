@@ -3,11 +3,12 @@
 """
 Check the clearance of the arm from itself and from the workspace planes along its whole path.
 
-Cylinders are checked in every row; where they come close, meshes measure exactly, for the models
-that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether less than
-`min_clearance` refuses or warns depends on `self_collision` and the model, never on installed
-meshes. An arm that starts too close can move away: a pair that is too close at the start passes
-while its distance only grows. Once it is clear, it is treated like all other pairs.
+Cylinders are checked in every row. Where they come close, the distance of the meshes is measured,
+for models that have them (:mod:`~ur_cartesian_driver.kinematics.collision_meshes`). Whether a
+distance below `min_clearance` is refused or only reported depends on `self_collision` and the
+model, never on whether meshes are installed. An arm that starts too close can move away: a pair
+that is too close at the start is accepted while its distance only grows. Once the pair is clear,
+it is treated like all others.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Rows that are checked together: blocks bound the memory, and a refusal ends the check early.
+# Rows per block: blocks bound the memory, and a refusal ends the check early.
 _BLOCK = 4096
 # A pair still separates if its distance shrinks by no more than this [m]: samples are not exact.
 _RECEDING_TOLERANCE = 1e-4
-# Rounding that is allowed to a tool that works on a plane without a margin [m].
+# How far a tool that works on a plane without a margin may be below it, by rounding [m].
 _ON_PLANE = 1e-6
 
 
@@ -43,11 +44,11 @@ _ON_PLANE = 1e-6
 class Violation:
     """The first row at which a pair is too close."""
 
-    #: Index into the rows that were given.
+    #: The row, as an index of the checked configurations.
     row: int
     #: A clause: the pair that is too close, its distance, and the bound.
     text: str
-    #: What to do.
+    #: A clause: how to avoid the violation.
     remedy: str
 
 
@@ -59,8 +60,8 @@ class ClearanceResult:
     violation: Violation | None
     #: The violation of which the report only warns.
     warning: Violation | None
-    #: The smallest distance of all rows [m], negative where cylinders overlap or a plane is
-    #: crossed, infinite where nothing is checked; between cylinders it is a lower bound.
+    #: The smallest distance in all rows [m]: negative if cylinders overlap or a plane is crossed,
+    #: infinite if nothing is checked, a lower bound if measured between cylinders.
     margin: float
     #: The pair with that distance, and the shapes between which it was measured.
     description: str
@@ -71,11 +72,11 @@ class Clearance:
     The clearance of one arm with one tool.
 
     :param T_flange_tcp: the TCP of the goal; the cylinder of the tool leads from the flange to it.
-    :param options: self_collision, min_clearance, tool_radius, workspace_planes.
+    :param options: of these, self_collision, min_clearance, tool_radius and workspace_planes.
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
-        """Prepare bodies and planes."""
+        """Create the checkers."""
         bodies = _bodies(arm, T_flange_tcp, options.tool_radius)
         self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
         if options.self_collision != 'off':
@@ -84,7 +85,7 @@ class Clearance:
             self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
 
     def too_close(self, q: Floats) -> Flags:
-        """Return which configurations (n, 6) [rad] are too close, wherever the arm starts."""
+        """Return whether each configuration (n, 6) [rad] is too close, regardless of the start."""
         close = np.zeros(len(q), dtype=np.bool_)
         for checker in self._checkers:
             exact = np.zeros(len(checker.bounds), dtype=np.bool_)
@@ -99,9 +100,9 @@ class Clearance:
         Return the first row that is too close, and the smallest distance.
 
         :param q: (n, 6) [rad], all configurations of a goal, in order of time.
-        :param q_start: the start; pairs that are too close there may separate.
+        :param q_start: the start configuration; pairs that are too close there may separate.
         """
-        #: The first violations, by whether they refuse the goal.
+        #: The first violation for which the goal is refused (True), and the first warning (False).
         found: dict[bool, Violation] = {}
         margin, description = inf, ''
         start = np.array([q_start])
@@ -139,8 +140,8 @@ def clearance_remarks(clear: ClearanceResult, segment: Int32s, fraction: Floats)
     Return the report lines about the clearance.
 
     :param segment: (n,) the segment of each row.
-    :param fraction: (n,) the fraction of it, 0..1.
-    :raises CollisionPredicted: a row is refused.
+    :param fraction: (n,) the fraction of that segment, 0..1.
+    :raises CollisionPredicted: there is a violation for which the goal is refused.
     """
     if clear.violation is not None:
         row = clear.violation.row
@@ -171,7 +172,7 @@ def clearance_lines(
     fraction: Floats,
 ) -> list[str]:
     """
-    Return the report lines about the clearance with each of some tool tips.
+    Return the report lines about the clearance with each of several tool tips.
 
     For parameters and errors see :meth:`Clearance.check` and :func:`clearance_remarks`.
     """
@@ -191,13 +192,13 @@ class _InitialViolations:
     def __init__(self, checker: _SelfCollisionChecker | _PlaneChecker, start: Floats) -> None:
         lower, distances = checker.measure(start, np.ones(len(checker.bounds), dtype=np.bool_))
         self._bounds = checker.bounds
-        #: Whether a pair is still too close, by column.
+        #: Whether each pair has been too close since the start.
         self.pending: Flags = distances[0] < checker.bounds
         self._lower, self._reached = lower[0], distances[0]
 
     def refused(self, lower: Floats, distances: Floats) -> Flags:
         """
-        Return which (rows, columns) are refused.
+        Return whether each pair is refused in each row (rows, columns).
 
         :param lower: the distances of the cylinders, which still change while the meshes touch.
         :param distances: the distances to compare with the bounds.
@@ -215,7 +216,7 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return the largest value of each column so far, and which values are no smaller."""
+    """Return the largest value of each column, and which values are no less than all before."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -230,7 +231,7 @@ class _SelfCollisionChecker:
         self._bodies, self._tcp, self._options = bodies, T_flange_tcp, options
         self._name = bodies.arm.model.name
         self._bound = options.min_clearance
-        #: The minimum distance by column, and whether less is refused.
+        #: The minimum distance of each pair; whether a smaller distance is refused.
         self.bounds = np.full(len(bodies.pairs), self._bound)
         self.refuses = refuses_self_collision(self._name, options)
 
@@ -245,7 +246,7 @@ class _SelfCollisionChecker:
             return None
 
     def description(self, column: int, lower: float) -> str:
-        """Return the words for a pair and its shapes, given the distance of its cylinders."""
+        """Return the names of a pair and of the shapes whose distance was measured."""
         a, b = self._bodies.pairs[column]
         exact = lower < self._bound and self._meshes is not None
         return f'{a} and {b} ({self._mesh_name if exact else "cylinders"})'
@@ -256,10 +257,10 @@ class _SelfCollisionChecker:
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
-        Return the distances (n, columns) of the cylinders, and those to compare with the bounds.
+        Return the distances of cylinders, and those to compare with the bounds, (n, columns) each.
 
-        :param pending: the columns that need exact distances; in the others a distance below the
-            bound is returned as 0, which is faster.
+        :param pending: whether a column needs exact distances; in other columns a distance below
+            the bound is returned as 0, which is faster.
         """
         lower = self._bodies.distances(q, inf if pending.any() else self._bound)
         close = np.flatnonzero((lower < self._bound).any(axis=0))
@@ -295,7 +296,7 @@ class _SelfCollisionChecker:
 
 
 def refuses_self_collision(name: str, options: PlanningOptions) -> bool:
-    """Return whether a goal is refused if an arm of a model comes too close to itself."""
+    """Return whether goals are refused in which an arm of a model comes too close to itself."""
     choice = options.self_collision
     return choice == 'refuse' or (choice == 'auto' and name in MODELS_WITH_MESHES)
 
@@ -306,7 +307,7 @@ def self_collision_remark(name: str, options: PlanningOptions) -> str:
     if not missing or options.self_collision == 'off':
         return ''
     if name not in MODELS_WITH_MESHES and not refuses:
-        return ''  # there are none to install, and nothing is refused
+        return ''  # no meshes exist, and nothing is refused
     verdict = 'refuse' if refuses else 'warn of'
     return (
         f'{missing[0].upper()}{missing[1:]}: cylinders that contain the arm {verdict} '
@@ -334,7 +335,7 @@ class _PlaneChecker:
         self.refuses = True
 
     def description(self, column: int, lower: float) -> str:
-        """Return the words for the pair of a column."""
+        """Return the names of a link and a plane."""
         number, which = divmod(column, len(self._names))
         return f'{self._names[which]} and the plane "{self._planes[number].name}"'
 
@@ -372,7 +373,7 @@ def _first(
     q: Floats,
     begin: int,
 ) -> Violation | None:
-    """Return the violation by the closest pair in the first refused row, or None."""
+    """Return the violation of the pair farthest below its bound in the first refused row."""
     rows = np.flatnonzero(refused.any(axis=1))
     if not len(rows):
         return None

@@ -3,7 +3,7 @@
 """
 Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
-All samples of a goal are solved together. Between two samples the arm may move more than these
+All samples of a goal are solved together. Between two samples the arm may move farther than they
 show: near a singularity joints swing round within a millimetre, and after a long step the closest
 solution then belongs to another branch. So where a joint turns far from one sample to the next,
 where the branch changes, or where there is no solution, samples are added in between, down to
@@ -36,16 +36,17 @@ from ur_cartesian_driver.planning.geometry.samples import (
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import max_joint_change, TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Samples are added until no joint turns farther than this from one to the next [rad].
+#: Samples are added until no joint turns farther than this from one sample to the next [rad].
 _MAX_STEP = 0.1
 #: No samples are added between two that are this close [m], [rad]. If a joint still turns farther
-#: than _MAX_JUMP [rad] from one to the other, it jumps.
+#: than _MAX_JUMP [rad] between them, this is a jump.
 _MIN_LENGTH = 2e-6
 _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
 #: Configurations that differ by less than this [rad] are the same.
 _SAME = 1e-6
-#: Samples solved at a time after a refinement; each later block is _GROWTH times as long.
+#: Number of samples in the first block after a refinement; each later block is _GROWTH times as
+#: long.
 _FIRST_BLOCK = 64
 #: Number of samples that measure how far a joint would go beyond its range.
 _SAMPLES_BEYOND = 16
@@ -54,23 +55,24 @@ _GROWTH = 8
 
 @dataclass(frozen=True, slots=True)
 class JointPath:
-    """The samples on consecutive pieces that the arm reaches, with their joint positions."""
+    """The samples that the arm reaches on consecutive pieces, with their joint positions."""
 
     pieces: CurvePieces
-    #: (n,) the number of the piece, not decreasing; (n,) the parameter; (n, 7); (n, 6) [rad].
+    #: (n,) number of the piece, not decreasing; (n,) parameter on it; (n, 7) TCP pose in base;
+    #: (n, 6) joint positions [rad].
     piece: Indices
     t: Floats
     poses: Floats
     q: Floats
-    #: Why the arm does not reach all samples, None = it does; and the segment of the refusal.
+    #: Why the arm does not reach all samples (None = it reaches them); segment of this refusal.
     refusal: GoalRefused | None = None
     refused_segment: int = -1
-    #: (n,) segment of each sample, and the fraction (n,) of it.
+    #: (n,) segment of each sample; (n,) fraction of this segment.
     segments: Int32s = field(init=False)
     fractions: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find the segments."""
+        """Find segment and fraction of each sample."""
         segments, fractions = self.pieces.locate(self.piece, self.t)
         object.__setattr__(self, 'segments', segments)
         object.__setattr__(self, 'fractions', fractions)
@@ -93,13 +95,13 @@ class _Refinement:
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: The parameter at which the path cannot go on, and the solution there to which the arm would
-    #: have to jump, if there is one.
+    #: The parameter at which the path cannot go on; the solution there to which the arm would have
+    #: to jump, None = there is none.
     stop: float | None = None
     jump: Joints | None = None
 
     def samples(self, piece: int) -> _Samples:
-        """Return the samples of a piece."""
+        """Return the samples as those of a piece with this number."""
         return (
             np.full(len(self.t), piece),
             np.array(self.t),
@@ -111,7 +113,7 @@ class _Refinement:
 def sample_joint_move(
     kinematics: TcpKinematics, pieces: CurvePieces, path: BlendedPath
 ) -> JointPath:
-    """Return the samples on the one piece of a curve in joint space."""
+    """Return the samples on a single piece, which is in joint space."""
     piece, t = sample_parameters(pieces)
     q = path.joint_rows(int(pieces.number[0]), t)
     return JointPath(pieces, piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
@@ -181,7 +183,7 @@ def _refine(
     row: int,
     q: Joints,
 ) -> _Refinement:
-    """Return the samples from the row before up to a row, as dense as the joints require."""
+    """Return samples after the previous row up to a row, as dense as the joint motion requires."""
     k = int(samples.piece[row])
     length, turn = pieces.extent(k)
     is_first = row == 0 or samples.piece[row - 1] != k
@@ -209,7 +211,7 @@ def _refine(
 def _refusal_at(
     kinematics: TcpKinematics, pieces: CurvePieces, k: int, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
-    """Return the refusal of a path that cannot go on from a configuration, and its segment."""
+    """Return the refusal of a path that cannot go on from a configuration, and the segment."""
     stop = refinement.stop
     assert stop is not None
     index, fraction = pieces.locate_one(k, stop)
@@ -223,7 +225,7 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not pieces.is_blend[k] and fraction < 1.0:
-        # Here the value is just beyond its bound; at the waypoint it shows how far beyond it gets.
+        # Here the value is only just beyond its bound; the value at the waypoint says more.
         end = pieces.pose(k, 1.0)
         at_end = kinematics.no_solution_error(end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(end, q) is None:
@@ -232,7 +234,7 @@ def _refusal_at(
 
 
 def describe_location(index: int, fraction: float) -> str:
-    """Return the words for a fraction of the segment to a point."""
+    """Return a phrase for the place at a fraction of the segment to a point."""
     field_name = point_field(index, 'pose')
     return (
         field_name
@@ -243,7 +245,7 @@ def describe_location(index: int, fraction: float) -> str:
 
 def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> bool:
     """
-    Return whether the arm may do more than turn straight from one configuration to the other.
+    Return whether the arm may leave the straight joint line between two configurations.
 
     Near a singularity another branch may be closer after a long step, while in small steps the
     arm swings round and stays on its branch.
@@ -255,7 +257,7 @@ def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> boo
 
 
 def max_path_length(kinematics: TcpKinematics) -> float:
-    """Return the length of a line or an arc [m] that no arm can follow to its end."""
+    """Return the length [m] beyond which the arm can follow no line or arc to its end."""
     # In a ball of radius r a circle is no longer than 2 pi r.
     return (
         2.0

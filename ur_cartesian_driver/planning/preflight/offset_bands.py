@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The band in which path offsets may move the tool (``path_offset``): frame, gaps, and checks.
+The band in which path offsets may move the tool (``path_offset``): its frames, gaps and checks.
 
-The frame of the path turns with the path. Where it turns so fast that the turn alone would move or
-accelerate a displaced tool more than an offset is allowed to, no offset is possible: in corners
-where the arm stops, and in arcs that are too tight. The offset fades out before these places, and
-before the end.
+The frame of the path turns with the path. No offset is possible where this turn alone would move a
+displaced tool with more than the speed or acceleration of offsets: in corners where the arm stops,
+and in arcs that are too tight. The offset fades out before these places, and before the end of the
+path.
 
-All corners of the band are checked along the whole path, as the path itself was.
+The corners of the band are checked along the whole path, like the path itself before.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.request.path_offset import offset_motion
 
-#: Time between two frames [s].
+#: Time between two frames of the path [s].
 STEP = 0.01
 #: Each frame is a mean over twice this time [s], so that no frame turns abruptly.
 SMOOTHING = 0.08
@@ -55,13 +55,14 @@ _MIN_EDGE = 1e-7
 #: If the sine of the angle between path and tool axis is less than this, an edge has no frame of
 #: its own: frames are interpolated between the edges around it.
 _MIN_ANGLE_SINE = 0.05
-#: The time for fading out is longer by this factor than the law of the offset needs.
+#: The time for fading out is this many times as long as the motion of the offset needs.
 _FADE_MARGIN = 1.1
-#: Additional time until an offset is gone that the robot program moves and the controller filters
-#: [s]: five time constants of the filter, a packet to the robot and back, and the lag of the
+#: Additional time until an offset is gone if the robot program moves it and the controller filters
+#: it [s]: five time constants of the filter, a packet to the robot and back, and the lag of the
 #: program after a change of the speed scaling.
 FILTER_SETTLING = 0.2
-#: Time between two samples for the checks [s]; the paths of the robot's own motions have fewer.
+#: Time between two samples for the checks [s]; samples are added to the paths of the robot's own
+#: motions.
 _CHECK_STEP = 0.02
 #: The joints at a corner of the band are found from those on the path in steps of at most _STRIDE
 #: [m]. A joint that turns farther than _MAX_CHANGE [rad] in one step would change the branch.
@@ -78,7 +79,7 @@ def offset_band(
     Return the band of a path.
 
     :param T_tcp_controlled: the controlled frame, whose path is offset.
-    :param settling_time: additional time after the law of an offset until the offset is gone [s].
+    :param settling_time: time from the end of an offset's motion until the offset is gone [s].
     :raises InvalidGoal: no offset is possible anywhere on the path.
     """
     speed, acceleration, timeout = offset_motion(wanted)
@@ -111,7 +112,7 @@ def offset_band(
 
 
 def dense_path(path: ReferencePath) -> ReferencePath:
-    """Return a path with more samples in between, for the checks."""
+    """Return the path with samples added in between, for the checks."""
     first, last = path.time[0], path.time[-1]
     times = np.union1d(path.time, np.arange(first, last, _CHECK_STEP))
     row = np.clip(np.searchsorted(path.time, times, side='right') - 1, 0, len(path.time) - 2)
@@ -150,7 +151,8 @@ def path_joints(
 
 def fade_time(limit: float, speed: float, acceleration: float) -> float:
     """Return the longest time in which an offset at its limit fades out [s]."""
-    # The offset brakes, comes back from where it stopped, and brakes again, by less than allowed.
+    # The offset brakes, comes back from where it stopped, and brakes again; braking uses less than
+    # the allowed acceleration.
     return _FADE_MARGIN * (2.2 * speed / acceleration + limit / speed) + 2.0 * STEP
 
 
@@ -201,7 +203,7 @@ def _smoothed(vectors: Floats) -> Floats:
 
 
 def _turns_too_fast(frames: Floats, reach: float, speed: float, acceleration: float) -> Flags:
-    """Return whether the turning of each frame moves a tool at a distance too fast (n,)."""
+    """Return whether each frame (n,) turns too fast for a tool at the distance ``reach`` [m]."""
     change = np.diff(frames, axis=0)
     rates = _sizes(change) / STEP
     bends = _sizes(np.diff(change, axis=0)) / STEP**2
@@ -227,7 +229,7 @@ class OffsetBandCheck:
     The checks of a band along a path.
 
     :param reference: the path; the band is checked at each of its samples.
-    :param q: (n, 6) the joint positions at the samples [rad]; ``qd``: the speeds [rad/s].
+    :param q: (n, 6) the joint positions at the samples [rad]; ``qd``: the joint speeds [rad/s].
     """
 
     kinematics: TcpKinematics
@@ -242,7 +244,7 @@ class OffsetBandCheck:
         """
         Check all corners of the band, and return the warnings about them.
 
-        :raises GoalRefused: the arm cannot be at a corner; the text names corner, point and bound.
+        :raises GoalRefused: a corner fails a check; the text names corner, point and bound.
         """
         path, band = self.reference, self.band
         self._check_tool_speeds()
@@ -337,7 +339,7 @@ class OffsetBandCheck:
         on_path, displaced = (singularity_distance_rows(arm, rows) for rows in (q, there))
         for k, measure in enumerate(SINGULARITY_MEASURES):
             bound = float(getattr(self.options, measure.option))
-            # If the path itself is within the bound, it was accepted, as it may be at its start.
+            # A path that is itself within the bound, as at its start, has been accepted.
             near = (displaced[:, k] < bound) & (on_path[:, k] >= bound)
             if near.any():
                 row = int(np.argmax(near))
@@ -351,7 +353,7 @@ class OffsetBandCheck:
     def _check_joint_speeds(self, q: Floats, there: Floats, joint_speeds: Floats) -> None:
         times = self.reference.time
         steps = np.maximum(np.diff(times), 1e-6)[:, None]
-        # Off its path the arm may have to turn faster. Without an offset, it is on its path.
+        # A displaced arm may have to turn faster. While the band is closed, it is not displaced.
         is_open = np.array([self.band.opens(time) for time in times[1:].tolist()])
         extra = np.abs(np.diff(there - q, axis=0) / steps) * is_open[:, None]
         speeds = joint_speeds.copy()
@@ -374,7 +376,7 @@ class OffsetBandCheck:
 
 
 def offset_remarks(band: OffsetBand, duration: float) -> list[str]:
-    """Return the line of the report about the band of a motion with a duration [s]."""
+    """Return the report line about a band; ``duration`` is that of the motion [s]."""
     limits = ', '.join(
         f'{1e3 * limit:g} mm {name}'
         for name, limit in zip(OFFSET_AXES, band.limits, strict=True)

@@ -12,8 +12,8 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Largest difference of the reported TCP from the one by the kinematics [m], [rad]. Calibration
-#: shifts the TCP by some millimetres; another model or another TCP shifts it much more.
+#: Largest difference between the reported TCP and the TCP that the kinematics predicts [m], [rad].
+#: Calibration shifts the TCP by some millimetres; a wrong model or TCP shifts it much more.
 MAX_MISMATCH_POSITION = 0.015
 MAX_MISMATCH_ANGLE = 0.05
 
@@ -33,7 +33,7 @@ def check_reported_tcp(state: RobotState, kinematics: TcpKinematics) -> None:
 
 
 def check_approach(state: RobotState, target: Pose, options: PlanningOptions) -> None:
-    """Refuse a first point that is too far away."""
+    """Refuse a first point that is too far away from the tool."""
     distance = state.actual_tcp_pose.distance_to(target)
     bound = options.max_approach_distance
     if 0.0 < bound < distance:
@@ -71,7 +71,7 @@ def check_start(
         )
     if posture:
         where = point_field(0, 'pose')
-        # The robot is within the tolerance of the start, not exactly there.
+        # The robot is within the tolerance of the first point, not exactly at it.
         near = kinematics.nearest(target, state.actual_q, where)
         _, clause = kinematics.compare_posture(target, posture, near, where, options.tf_prefix)
         if clause:

@@ -3,10 +3,10 @@
 """
 Kinematics of an arm with a tool, with refusals that say why a pose cannot be reached.
 
-The robot receives poses; which of up to eight configurations it takes depends on its previous one.
-So the configuration is predicted segment by segment: along a line or an arc by following the
-inverse kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the solution that is
-sent as ``q_near``.
+The robot receives poses; in which of up to eight configurations it arrives depends on its previous
+configuration. So configurations are predicted segment by segment: along a line or an arc by
+following the inverse kinematics (:mod:`~.joint_path_solver`), for a joint move by choosing the
+solution that is sent as ``q_near``.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
 from ur_cartesian_driver.motion.goal.goal import Posture
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Largest distance from the chosen solution at which a named joint may arrive, with turns [rad].
+#: Largest distance of a named joint from the chosen solution at arrival, with full turns [rad].
 ARRIVAL_TOLERANCE = 0.01
 #: A solution continues a configuration if no joint turns farther than this [rad].
 _MAX_CONTINUED_STEP = 0.5
-#: Rounding of a configuration [rad].
+#: Configurations that are nearer to each other than this [rad] are the same.
 _ROUNDING = 1e-6
 # Scale of the shoulder measure [m], to compare it with the other measures, which are sines.
 _ARM_LENGTH = 0.3
@@ -52,7 +52,7 @@ class TcpKinematics:
     """
     The inverse kinematics of the TCP of one arm, with refusals that name the point.
 
-    :param arm: the kinematics.
+    :param arm: nominal or calibrated.
     :param T_flange_tcp: the active TCP.
     """
 
@@ -74,7 +74,7 @@ class TcpKinematics:
         """
         Return the solution nearest to a configuration.
 
-        :param where: the begin of a refusal, such as ``trajectory.points[2].pose``.
+        :param where: the beginning of a refusal, such as ``trajectory.points[2].pose``.
         :raises Unreachable: there is no solution.
         :raises JointLimitExceeded: each solution is outside the range of a joint.
         """
@@ -89,10 +89,10 @@ class TcpKinematics:
         """
         Return the solution that a posture selects.
 
-        It is the nearest in the named joints; of several that are equally near, it is the nearest
-        to the configuration before. Raises as :meth:`nearest`.
+        This is the solution nearest in the named joints; of several that are equally near, the one
+        nearest to ``q_before``. Errors as for :meth:`nearest`.
         """
-        # If the arm is already within the tolerance, it keeps its configuration.
+        # An arm that is already within the tolerance keeps its configuration.
         if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL_TOLERANCE:
             here = self.solution(T_base_tcp, q_before)
             if here is not None and dist(here, q_before) < _ROUNDING:
@@ -106,7 +106,7 @@ class TcpKinematics:
         """
         Return the refusal of a pose without a solution: out of reach, or beyond joint limits.
 
-        :param there: words for the place of the pose if it is not ``where``.
+        :param there: a phrase that names the place of the pose if this is not ``where``.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -164,7 +164,7 @@ class TcpKinematics:
         return min(distances, key=lambda name: distances[name])
 
     def describe_flips(self, q: Joints, q_other: Joints) -> str:
-        """Return the words for the flips between two configurations; '' if there are none."""
+        """Return a phrase for the flips between two configurations; '' if there are none."""
         first, second = branch_measures(self.arm, np.array([q, q_other])).branch
         flipped = [
             f'a flip of the {name}'
@@ -181,7 +181,7 @@ class TcpKinematics:
         """
         Return the solution that a posture selects, and a clause on how ``q`` misses it, or ''.
 
-        Raises as :meth:`nearest`.
+        Errors as for :meth:`nearest`.
         """
         named = named_joints(posture, tf_prefix)
         chosen = self.solve_posture(T_base_tcp, named, q, where)
@@ -193,7 +193,7 @@ class TcpKinematics:
         """
         Return a clause that says how a path misses the posture of a point; '' if it does not.
 
-        :param q: where the path arrives; raises as :meth:`nearest`.
+        :param q: the configuration in which the path arrives [rad]. Errors as for :meth:`nearest`.
         """
         where = point_field(index, 'pose')
         chosen, clause = self.compare_posture(T_base_tcp, posture, q, where, tf_prefix)
@@ -249,7 +249,7 @@ def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
     """
     Return a clause with the first named joint that misses its value; '' if all arrive.
 
-    :param q: where the motion arrives.
+    :param q: the configuration in which the motion arrives [rad].
     :param chosen: the solution that the posture selects.
     """
     for k in sorted(named):

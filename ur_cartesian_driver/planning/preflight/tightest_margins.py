@@ -3,10 +3,10 @@
 """
 Margins: distances of the arm from its singularities and joint limits.
 
-At the three singularities two solutions of the arm meet: the wrist is straight (axes 4 and 6
-parallel), the elbow is stretched or folded, the wrist centre is above or below the shoulder. The
-measured distances vanish there: the angle of wrist 2, the angle of the elbow, and the distance of
-the wrist centre from the plane of axes 1 and 2.
+At each of three singularities two solutions of the arm meet: the wrist is straight (axes 4 and 6
+parallel), the elbow is stretched or folded, or the wrist centre is above or below the shoulder.
+The distances are the angle of wrist 2, the angle of the elbow, and the distance of the wrist
+centre from the plane of axes 1 and 2.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from ur_cartesian_driver.planning.geometry.samples import first_least
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path_solver import describe_location, JointPath
 
-#: Within this distance of a start at rest [m], [rad] the arm may be singular.
+#: Within this length and turn from a start at rest [m], [rad] the arm is allowed to be singular.
 START_LENGTH = 0.001
 START_ANGLE = 0.01
-#: Beyond it, the arm may be singular while its distance only grows, but for this rounding.
+#: Beyond, the arm is allowed to be singular while its distance from the singularity only grows;
+#: it may shrink by this rounding.
 _ROUNDING = 1e-9
 
 
@@ -48,7 +49,7 @@ class SingularityMeasure:
 
     @property
     def option(self) -> str:
-        """The name of its parameter."""
+        """The name of the parameter that bounds the distance."""
         return f'singularity_margin_{self.name}'
 
 
@@ -58,7 +59,7 @@ SINGULARITY_MEASURES = (
     SingularityMeasure('shoulder', 'm', 'wrist centre above or below the shoulder', 0.3),
 )
 _SCALES = np.array([measure.scale for measure in SINGULARITY_MEASURES])
-#: The words for what a margin is measured to, and its unit: singularities, then joint limits.
+#: Name and unit of each margin: the distances from singularities, then from joint limits.
 _QUANTITIES = (
     *((f'the {measure.name} singularity', measure.unit) for measure in SINGULARITY_MEASURES),
     *((f'the limit of {name}', 'rad') for name in JOINT_NAMES),
@@ -88,7 +89,7 @@ class TightestMargins(Rows[str]):
 
     @property
     def remark(self) -> str:
-        """The remark on the tightest of all."""
+        """The remark on the tightest margin of all segments."""
         row = int(np.argmin(self.normalized))
         return f'tightest margin: {self[row]} of the segment to point {self.segments[row]}'
 
@@ -114,7 +115,7 @@ def joint_limit_distances(arm: Arm, q: Floats) -> Floats:
 
 
 def normalized_margins(arm: Arm, q: Floats) -> Floats:
-    """Return the smallest distances (n,) of configurations (n, 6), as fractions of the scales."""
+    """Return the smallest margin (n,) of each configuration (n, 6), as a fraction of its scale."""
     measures = singularity_distance_rows(arm, q) / _SCALES
     nearest: Floats = np.minimum(measures.min(axis=1), joint_limit_distances(arm, q).min(axis=1))
     return nearest
@@ -124,7 +125,7 @@ def first_refusal(
     joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[GoalRefused | None, int]:
     """
-    Return the first reason why the arm cannot follow, and the index of its segment.
+    Return the first refusal along a path (None = the arm can follow), and its segment.
 
     :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
@@ -144,7 +145,7 @@ def near_singularity_refusal(
     joint_path: JointPath, measures: Floats, options: PlanningOptions
 ) -> tuple[NearSingularity, int] | None:
     """
-    Return the refusal of the first segment too close to a singularity, and its index.
+    Return the refusal of the first segment that is too close to a singularity, and its index.
 
     :param measures: (n, 3) the distances from singularities at the samples of the path.
     """
@@ -177,16 +178,16 @@ def near_singularity_refusal(
 
 def _format_below(value: float, bound: float) -> str:
     """Return a value in few digits that still read as less than its bound."""
-    text = f'{round(value, 6):.3g}'  # smaller values are rounding
+    text = f'{round(value, 6):.3g}'  # smaller digits are rounding errors
     return text if float(text) < bound else format_distinct(value, bound)[0]
 
 
 def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags:
     """
-    Return which samples (n, 3) of a segment lead out of a singularity in which it starts.
+    Return for the samples of a segment whether it leaves each singularity (n, 3) at its start.
 
     The goal does not choose where the robot is. So no distance is too small close to a start at
-    rest, nor farther on while it only grows.
+    rest, nor farther on while the distance only grows.
     """
     number, pieces = int(joint_path.piece[rows[0]]), joint_path.pieces
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
@@ -200,10 +201,10 @@ def _is_leaving(joint_path: JointPath, rows: Indices, measures: Floats) -> Flags
 
 def is_leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool) -> Flags:
     """
-    Return which samples (n, 3) of a whole motion lead out of a singularity in which it starts.
+    Return for the samples of a motion whether it leaves each singularity (n, 3) at its start.
 
-    :param length: (n,) the path length since its start [m], and ``angle`` the turn [rad].
-    :param rests: whether it starts at rest.
+    :param length: (n,) the path length since the start [m]; ``angle``: the turn since then [rad].
+    :param rests: whether the motion starts at rest.
     """
     at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
     grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING
@@ -220,7 +221,7 @@ def tightest_margins(
     :param measures: (n, 3) the distances from singularities, inf where they do not matter.
     :param segments: (n,) not decreasing.
     """
-    # Singularities, and joint limits.
+    # Distances from singularities, then from joint limits, in the order of _QUANTITIES.
     values = np.concatenate([measures / _SCALES, joint_limit_distances(arm, q)], axis=1)
     least = reduce(np.minimum, values.T)  # many times faster than min(axis=1)
     first = first_least(least, segments)

@@ -31,7 +31,7 @@ def check_blends(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_blends_fit(index: int, length: float, before: float, after: float) -> None:
     """
-    Refuse blends that overlap within a segment: the controller would skip a waypoint (its C171).
+    Refuse blends that overlap within a segment: the controller would skip a point (its C171).
 
     :param length: distance between the two points of the segment [m].
     :param before: blend radius at the first point [m].
@@ -58,8 +58,8 @@ def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
     """
     Refuse blends that overlap on the curve of a segment.
 
-    :param u_join: parameter of the curve at which the blend before it ends, in [0, 1].
-    :param u_leave: parameter of the curve at which the blend after it begins, in [0, 1].
+    :param u_join: curve parameter in [0, 1] at which the blend before the segment ends.
+    :param u_leave: curve parameter in [0, 1] at which the blend after the segment begins.
     """
     if u_join > u_leave + 1e-9:
         raise InvalidGoal(

@@ -4,9 +4,9 @@
 Goals that control a frame other than the robot's active TCP.
 
 If the tool turns while one of its points moves on a straight line, other points move on curves. So
-the robot's TCP is set to the controlled frame for the goal (temporary TCP), and planning assumes
-that TCP from here on. If the TCP must not be changed, the goal is converted to the active TCP,
-which is exact if the tool does not turn.
+the robot's TCP is set to the controlled frame during the goal (temporary TCP), and from here on
+planning assumes that TCP. If the TCP must not be changed, the goal is converted to the active TCP;
+this conversion is exact if the tool does not turn.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_field,
 )
 
-#: Turns of the tool up to this angle on a straight or circular segment are neglected [rad]: a
-#: frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
+#: Turns of the tool up to this angle [rad] on a straight or circular segment are neglected: a
+#: frame at a distance r from the TCP leaves its line by r angle^2 / 8 (5 um for r = 0.4 m).
 MAX_FIXED_ANGLE = 0.01
 
-#: A controlled frame within this distance [m] and angle [rad] is taken as the TCP: a few steps of
-#: the wire, so that the reported TCP reveals which of the two is set.
+#: A controlled frame within this distance [m] and angle [rad] of the TCP counts as the TCP. The
+#: bound is a few steps of the wire, so that the reported TCP shows which of two TCPs is set.
 SAME_TCP = 5e-6
 
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
@@ -44,11 +44,11 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetargetedGoal:
-    """A goal and the state of its robot, both for the TCP of the motion."""
+    """A goal and the state of its robot, both expressed for the TCP of the motion."""
 
     goal: GoalTable
     state: RobotState
-    #: As in :class:`~ur_cartesian_driver.motion.plan.plan.Plan`.
+    #: This transform and the next are as in :class:`~ur_cartesian_driver.motion.plan.plan.Plan`.
     T_flange_tcp: Pose | None = None
     T_tcp_controlled: Pose = IDENTITY
     remarks: tuple[str, ...] = ()
@@ -157,7 +157,7 @@ def _check_no_angular_rates(goal: GoalTable, index: int, remedy: str) -> None:
 
 
 def _retarget_goal(goal: GoalTable, T_controlled_tcp: Pose) -> GoalTable:
-    """Return the same motion for the TCP; of a via, only the position matters."""
+    """Return the goal of the TCP for the same motion; of vias, only the positions matter."""
     points, segments = goal.waypoints, goal.segments
     poses = points.poses.copy()
     poses[:, 3:] = normalized_rows(poses[:, 3:])

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Replace tolerances of zero by the parameters for their quantities."""
+"""Replace zero tolerances of a goal by parameters of the driver."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 
 G = TypeVar('G', bound=Goal)
 
-#: The quantities in the names of the parameters ``path_tolerance_...``.
+#: The quantities in the names of the parameters ``path_tolerance_...``, ``goal_tolerance_...``.
 _QUANTITIES = (
     'position',
     'orientation',
@@ -25,12 +25,12 @@ _QUANTITIES = (
 
 
 def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
-    """Return both tolerances of a goal with their names."""
+    """Return the path and goal tolerances of a goal, each with its name."""
     return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)
 
 
 def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
-    """Return the goal with its zero tolerances replaced; a remaining zero means no limit."""
+    """Return the goal with parameters in place of zero tolerances; 0 then means no limit."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
     )
@@ -40,7 +40,7 @@ def apply_default_tolerances(goal: G, options: PlanningOptions) -> G:
 
 
 def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
-    """Return a tolerance with the parameters ``<name>_position`` ... in place of its zeros."""
+    """Return a tolerance whose zeros are replaced by the parameters ``<name>_position`` etc."""
     position, orientation, *rest = (
         float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES
     )

@@ -3,7 +3,7 @@
 """
 Rules about single fields: members of enumerations, ranges, finite numbers, unit quaternions.
 
-The table of a goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares what a field accepts.
+The dataclasses in :mod:`~ur_cartesian_driver.motion.goal.goal` declare what each field accepts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalRows, GoalTable, rows
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_spline, point_field, segment_field
 
-#: How far the length of a quaternion may differ from 1.
+#: Largest allowed difference between the length of a quaternion and 1.
 QUATERNION_TOLERANCE = 1e-3
 
 
@@ -50,12 +50,12 @@ def check_record(
     where: str, record: Any, kind: type | None = None, nan_in_rates: bool = False
 ) -> None:
     """
-    Refuse values that the fields of a record, a dataclass of the table, do not accept.
+    Refuse values that the fields of a record (an instance of a goal dataclass) do not accept.
 
     :param where: name of the record in the refusal.
     :param kind: the class that declares the fields; None = the class of the record.
     :param nan_in_rates: whether a rate can be NaN, so that the driver chooses it.
-    :raises InvalidGoal: names the field, the value and the bound.
+    :raises InvalidGoal: a value is not accepted; the text names field, value and bound.
     """
     for each in goal_fields(type(record) if kind is None else kind):
         field = f'{where}.{each.message_name}' if where else each.message_name
@@ -80,7 +80,7 @@ def check_record(
 
 
 def _numbers(each: GoalField, field: str, value: Any) -> Iterator[tuple[str, float]]:
-    """Yield the name in refusals and the value of each number of a field."""
+    """Yield each number in a field, preceded by its name for refusals."""
     assert each.range is not None
     if each.form is Form.VALUES:
         yield from ((f'{field}[{k}]', number) for k, number in enumerate(value))
@@ -95,7 +95,7 @@ def _numbers(each: GoalField, field: str, value: Any) -> Iterator[tuple[str, flo
 def _check_rows(
     rows: GoalRows[Any], name: Callable[[int], str], nan_in_rates: bool = False
 ) -> None:
-    """Make the checks of :func:`check_record` for all rows at once."""
+    """Check all rows at once; pass only the suspect ones to :func:`check_record`."""
     fine = np.ones(len(rows), dtype=np.bool_)
     for each in rows.columns():
         column, field = getattr(rows, each.name), each.field
@@ -134,7 +134,7 @@ def check_finite(field: str, values: Iterable[float]) -> None:
 
 
 def _are_units(quaternions: Floats) -> Flags:
-    """Return whether quaternions (n, 4) surely pass :func:`_check_unit`."""
+    """Return flags for quaternions (n, 4): True = certainly accepted by :func:`_check_unit`."""
     squares = np.einsum('ij,ij->i', quaternions, quaternions)
     are_units: Flags = np.abs(squares - 1.0) <= 0.999 * QUATERNION_TOLERANCE
     return are_units
@@ -143,7 +143,7 @@ def _are_units(quaternions: Floats) -> Flags:
 def _check_unit(field: str, q: Quaternion) -> None:
     x, y, z, w = q
     square = x * x + y * y + z * z + w * w
-    if abs(square - 1.0) <= QUATERNION_TOLERANCE:  # |q| is within half the tolerance then
+    if abs(square - 1.0) <= QUATERNION_TOLERANCE:  # then |q| differs from 1 by half as much
         return
     length = sqrt(square) if isfinite(square) else hypot(x, y, z, w)
     if length == 0.0:

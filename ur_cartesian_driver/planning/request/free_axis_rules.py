@@ -14,12 +14,12 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
 
-#: Tolerance of a full turn, which clients write with few digits [rad].
+#: Tolerance [rad] for a range of a full turn, because clients write it with few digits.
 _ROUNDING = 1e-3
 
 
 def check_free_axes(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse invalid ranges, and free axes on segments that leave no choice."""
+    """Refuse invalid ranges, different free axes, and free axes where nothing can be chosen."""
     segments = goal.segments
     free = segments.free_axes != FreeAxis.NONE
     low, high = segments.free_minima, segments.free_maxima
@@ -56,7 +56,7 @@ def check_free_axes(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def keep_open_error(index: int) -> NotAvailable:
-    """Return the refusal of a free axis on a path whose end is not known."""
+    """Return the refusal of a free axis in a goal with keep_open."""
     return NotAvailable(
         segment_field(index, 'free_axis'),
         'is set in a goal with keep_open, but the rotation is chosen along the whole path',

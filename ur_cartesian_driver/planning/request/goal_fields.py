@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Names of a goal's fields, and predicates of goals and segments."""
+"""The names of goal fields in refusals, and properties of goals and segment types."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 
-#: Motions that move the tool on a straight line.
+#: Types of segments that move the tool on a straight line.
 STRAIGHT_TYPES = (
     SegmentType.AUTO,
     SegmentType.LINEAR,
     SegmentType.PROCESS,
     SegmentType.OPTIMIZED_LINEAR,
 )
-#: Motions whose speeds are fractions of the robot's limits.
+#: Types of segments whose speeds are fractions of the robot's limits.
 OPTIMIZED_TYPES = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 
 
 def type_table(types: Collection[SegmentType]) -> Flags:
-    """Return for each number of a segment type whether it is among some; faster than np.isin."""
+    """Return an array by segment type, True for ``types``; indexing it is faster than np.isin."""
     return np.array([kind in types for kind in SegmentType])
 
 
@@ -40,7 +40,12 @@ def segment_field(index: int, field: str = '') -> str:
 
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
-    """Return the execution mode; AUTO is SPLINE if only that meets twists or accelerations."""
+    """
+    Return the execution mode of a goal, with AUTO resolved.
+
+    AUTO becomes SPLINE if the goal has times, and a twist or an acceleration at a point before its
+    last one (with keep_open: at any point); otherwise AUTO becomes PRIMITIVES.
+    """
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)
     points, inner = goal.waypoints, slice(len(goal.waypoints) - (not goal.keep_open))
@@ -60,5 +65,5 @@ def is_timed(goal: GoalTable) -> bool:
 
 
 def is_optimized(kind: SegmentType) -> bool:
-    """Return whether the speeds of a type are fractions of the robot's limits."""
+    """Return whether the speeds of a segment type are fractions of the robot's limits."""
     return kind in OPTIMIZED_TYPES

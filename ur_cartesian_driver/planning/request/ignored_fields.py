@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.plan.slow_stretch import name_points
 from ur_cartesian_driver.planning.request.goal_fields import is_timed, OPTIMIZED_TYPES
 
-#: Motions that are sent with a time, if the goal has times, and so ignore the acceleration.
+#: Types of segments that, if the goal has times, are sent with a time and ignore acceleration.
 _TIMED_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
 
 
@@ -53,7 +53,7 @@ def ignored_remarks(goal: GoalTable, first: int = 0) -> list[str]:
 
 
 def add_remark(remarks: list[str], first: int, rows: Flags | np.bool_, what: str) -> None:
-    """Add a remark about points, if there are any; row 0 is the point ``first``."""
+    """Add a remark about the points of the flagged rows, if any; row 0 is the point ``first``."""
     points = [first + row for row in rows_where(rows)]
     if points:
         remarks.append(f'{name_points(points)}: {what}')

@@ -41,11 +41,12 @@ from ur_cartesian_driver.planning.request.validate import check_list_lengths, ch
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CheckedJointGoal:
-    """A joint goal in rows, its joints in the order of the arm."""
+    """A checked joint goal as rows, with the joints in the order of the arm."""
 
-    #: (n,) times of the points [s], increasing
+    #: (n,) times of the points [s], increasing.
     times: Floats
-    #: (n, 6) [rad], [rad/s], [rad/s^2]; NaN where the goal gives none.
+    #: Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (n, 6); NaN where the
+    #: goal gives none.
     joints: MotionRows
     tolerances: JointTolerances
     goal_time_tolerance: float
@@ -53,9 +54,9 @@ class CheckedJointGoal:
 
 def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointGoal:
     """
-    Refuse a joint goal that is wrong for every robot; return it in rows.
+    Refuse a joint goal that is wrong for every robot; otherwise return it as rows.
 
-    :raises GoalRefused: a subclass; its text names point, field, value and bound.
+    :raises GoalRefused: the goal is wrong; the text names point, field, value and bound.
     """
     try:
         goal = with_declared_types(goal, JointGoal, 'JointGoal')
@@ -115,7 +116,7 @@ def check_joint_goal(goal: JointGoal, options: PlanningOptions) -> CheckedJointG
 
 
 def _order(names: Sequence[str], tf_prefix: str) -> list[int]:
-    """Return the index in the goal of each joint of the arm."""
+    """Return, for each joint of the arm, its index in the goal."""
     known = [tf_prefix + name for name in JOINT_NAMES]
     for k, name in enumerate(names):
         _check_name(f'trajectory.joint_names[{k}]', name, names[:k], known)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Limits of execution modes: a row for each field that needs a trait of the mode."""
+"""Limits of execution modes: a rule for each field that not every mode can honour."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ModeRule:
     is_able: Callable[[ModeTraits], bool]
     #: Why the other modes cannot: a clause with ``{mode}`` and ``{value}``.
     problem: str
-    #: Alternative to another mode; continues the sentence that names the able modes.
+    #: A remedy other than a change of mode; appended to the one that names the able modes.
     remedy: str = ''
 
 
@@ -75,7 +75,7 @@ def check_mode(goal: GoalTable, rule: ModeRule | None) -> None:
     Refuse a field that the execution mode of a goal cannot honour.
 
     :param rule: the rule for the field; None = all modes can honour it.
-    :raises NotAvailable: names the field, and the modes that can honour it.
+    :raises NotAvailable: the mode cannot honour the field; the text names the modes that can.
     """
     if rule is None or not (value := getattr(goal, rule.field)):
         return

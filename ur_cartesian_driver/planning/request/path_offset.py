@@ -21,10 +21,11 @@ from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RUL
 
 def check_path_offset(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse path offsets that are not possible.
+    Refuse path offsets with which the goal cannot be executed.
 
     :raises InvalidGoal: the limits of the offset are all 0.
-    :raises NotAvailable: the robot cannot offset the path of the goal.
+    :raises NotAvailable: the execution mode or the robot has no path offsets, or another field of
+        the goal, such as keep_open, rules them out.
     """
     wanted = goal.path_offset
     if wanted == PathOffset():
@@ -51,7 +52,8 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
     """
     Refuse offsets that the controller cannot add to its own motions.
 
-    :raises NotAvailable: names the reason.
+    :raises NotAvailable: the robot's software may have no offsets, the goal also presses, or a
+        segment is OPTIMIZED.
     """
     if not options.path_offset_known:
         raise NotAvailable(
@@ -78,7 +80,7 @@ def _check_controller_offsets(goal: GoalTable, options: PlanningOptions) -> None
 
 
 def offset_motion(wanted: PathOffset) -> tuple[float, float, float]:
-    """Return speed [m/s], acceleration [m/s^2] and timeout [s], with defaults filled in."""
+    """Return an offset's speed [m/s], acceleration [m/s^2], timeout [s]; defaults replace 0."""
     given = (wanted.speed, wanted.acceleration, wanted.timeout)
     speed, acceleration, timeout = (
         value or default for value, default in zip(given, DEFAULT_OFFSET_MOTION, strict=True)

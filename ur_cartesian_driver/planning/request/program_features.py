@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Features that older robot programs lack: demands that are refused, and motions that are adapted.
+Features that older robot programs lack: refuse goals that demand them, or adapt the motions.
 
 A robot program silently skips motions of a type that it does not know, and moves to the next point
-from its present position. So a plan has only motions that its program knows. No other planning
+from where the arm is. So a plan has only motions that the robot program knows. No other planning
 module looks at the wire dialect.
 """
 
@@ -133,9 +133,9 @@ FEATURES = (
 
 def check_program(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse demands that the robot program cannot meet.
+    Refuse a goal with a demand that the robot program cannot meet.
 
-    :raises NotAvailable: names the field and the wire dialect.
+    :raises NotAvailable: a demand cannot be met; the text names the field and the wire dialect.
     """
     mode = resolve_execution_mode(goal)
     for feature in FEATURES:
@@ -150,7 +150,7 @@ def check_joint_spline(options: PlanningOptions) -> None:
     """
     Refuse a joint goal if the time unit of the robot program is too coarse.
 
-    :raises NotAvailable: names the wire dialect.
+    :raises NotAvailable: the program counts in milliseconds; the text names the wire dialect.
     """
     if options.dialect.is_coarse:
         raise NotAvailable(
@@ -166,7 +166,7 @@ def check_joint_spline(options: PlanningOptions) -> None:
 
 def takes_times(options: PlanningOptions) -> bool:
     """
-    Return whether times of moves are sent.
+    Return whether the times of moves are sent to the robot.
 
     Times in milliseconds are not sent: a program that expects microseconds would run a segment a
     thousand times too fast, and programs do not report which unit they expect.
@@ -175,7 +175,7 @@ def takes_times(options: PlanningOptions) -> bool:
 
 
 def time_remarks(goal: GoalTable, options: PlanningOptions) -> list[str]:
-    """Return a remark on a goal whose times are met by sending speeds."""
+    """Return a remark if the times of a goal are met by sending speeds."""
     if takes_times(options) or not is_timed(goal) or is_spline(goal):
         return []
     return [
@@ -203,7 +203,7 @@ def round_radii(
     radii: Floats, begin: int, options: PlanningOptions
 ) -> tuple[Floats, list[tuple[int, str]]]:
     """
-    Return the blend radii (n,) [m] on the wire, and remarks by row on those rounded down.
+    Return the blend radii (n,) [m] on the wire, and a row and a remark for each one rounded down.
 
     :param begin: the number of the first point.
     """
@@ -220,7 +220,7 @@ def round_radii(
 
 
 def round_down(radius: _Lengths, options: PlanningOptions) -> _Lengths:
-    """Return the largest blend radius on the wire that is at most the given one [m]."""
+    """Return the largest blend radius [m] on the wire that does not exceed ``radius``."""
     return options.dialect.round_down_radius(radius)
 
 
@@ -228,7 +228,7 @@ def round_down(radius: _Lengths, options: PlanningOptions) -> _Lengths:
 
 
 def takes_q_near(options: PlanningOptions) -> bool:
-    """Return whether the robot program finds the joints of a pose near given ones (q_near)."""
+    """Return whether the robot program solves a pose near given joints (q_near)."""
     return options.dialect.supports_q_near
 
 
@@ -236,10 +236,11 @@ def adapt_primitive(
     primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
 ) -> tuple[Primitive, str]:
     """
-    Return a primitive in a form that the robot program accepts, and the reason for a change or ''.
+    Return a primitive as the robot program accepts it, and the reason for a change ('' = none).
 
     :param joints: the joint solution at the end of the primitive [rad].
-    :raises NotAvailable: the program has no such motion.
+    :raises NotAvailable: the program has no such motion, or only with joint positions, which an
+        unknown calibration rules out.
     """
     reason = ''
     if takes_q_near(options) or isinstance(primitive, MoveC | Spline | Stop):
@@ -255,7 +256,7 @@ def adapt_primitive(
         primitive = replace(primitive, target=joints, q_near=None)
         reason = f'{_name(options)} has no q_near and takes the joint solution'
     else:
-        primitive = replace(primitive, q_near=None)  # the robot ignores it
+        primitive = replace(primitive, q_near=None)  # the robot ignores q_near
     if motion_type(primitive) not in options.dialect.motion_types:
         raise NotAvailable(
             segment_field(point, 'type'),

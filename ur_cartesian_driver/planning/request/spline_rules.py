@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Rules about goals whose points a spline connects: SPLINE and SERVO."""
+"""Rules about goals whose points are connected by a spline: SPLINE and SERVO."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 
 #: Shortest time from point to point [s].
 MIN_SPLINE_TIME = 0.001
-#: Larger positions [m], twists [m/s], [rad/s] and accelerations [m/s^2], [rad/s^2] of points must
-#: be mistakes.
+#: Largest coordinate of a point [m]. Numbers beyond this and the next two must be mistakes.
 MAX_POINT_COORDINATE = 1000.0
+#: Largest component of a twist [m/s], [rad/s].
 MAX_TWIST = 100.0
+#: Largest component of an acceleration [m/s^2], [rad/s^2].
 MAX_ACCELERATION = 10_000.0
 
 _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'
 
 
 def check_spline_mode(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse a spline without times, or without the calibration that its joints depend on."""
+    """Refuse a spline if the goal has no times, or if the robot's calibration is unknown."""
     if not is_spline(goal):
         return
     name = resolve_execution_mode(goal).name

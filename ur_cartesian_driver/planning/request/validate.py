@@ -3,7 +3,7 @@
 """
 The checks of a goal that need no robot.
 
-:data:`RULES` lists them in the order in which they run; each is a small function that raises a
+:data:`RULES` lists the checks in the order in which they run; each is a function that raises a
 refusal or returns. Reach, postures and speeds need the robot:
 :mod:`~ur_cartesian_driver.planning.planner` checks them.
 
@@ -64,7 +64,7 @@ from ur_cartesian_driver.planning.request.point_events.registry import check_out
 from ur_cartesian_driver.planning.request.program_features import check_program
 from ur_cartesian_driver.planning.request.spline_rules import check_spline, check_spline_mode
 
-#: How far in the future a stamp may be [s].
+#: Longest time by which a stamp may lie in the future [s].
 MAX_STAMP_AHEAD = 60.0
 
 Rule: TypeAlias = Callable[[GoalTable, PlanningOptions], None]
@@ -72,9 +72,9 @@ Rule: TypeAlias = Callable[[GoalTable, PlanningOptions], None]
 
 def check(goal: Goal, options: PlanningOptions) -> GoalTable:
     """
-    Refuse a goal that is wrong for every robot; return it as a table.
+    Refuse a goal that is wrong for every robot; otherwise return it as a table.
 
-    :raises GoalRefused: a subclass; its text names point, field, value and bound.
+    :raises GoalRefused: the goal is wrong; the text names point, field, value and bound.
     """
     try:
         table = goal_table(goal)
@@ -106,9 +106,9 @@ def _measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_measurable_tolerances(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse tolerances of accelerations if the robot does not report accelerations.
+    Refuse acceleration tolerances if the robot does not report accelerations.
 
-    :param goal: with default tolerances filled in.
+    :param goal: the goal, with default tolerances filled in.
     """
     if options.acceleration_known:
         return
@@ -128,7 +128,7 @@ def _stamp(goal: GoalTable, options: PlanningOptions) -> None:
 
 
 def _keep_open(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse fields that need all points at once in open goals, or that need open goals."""
+    """Refuse fields that exclude keep_open if it is set, and fields that need it if not."""
     fraction, horizon = goal.min_speed_fraction, goal.replace_horizon
     if fraction and goal.keep_open:
         raise InvalidGoal(
@@ -171,7 +171,7 @@ def _times(goal: GoalTable, options: PlanningOptions) -> None:
         return
     times = goal.waypoints.times
     steps = np.diff(times, prepend=0.0)
-    # The first point may be at 0: the robot is there already.
+    # The first point may have the time 0: then the robot is already there.
     is_late = (steps > 0.0) | ((steps == 0.0) & (np.arange(len(times)) == 0))
     for i in rows_where(~is_late | (steps > options.max_segment_time))[:1]:
         time, before = float(times[i]), float(times[i - 1]) if i > 0 else 0.0
@@ -232,7 +232,7 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
     for i in rows_where(np.append(False, is_arc | is_near)):
         start, end = points.pose(i - 1), points.pose(i)
         if is_arc[i - 1]:
-            # The start's orientation does not matter for the shape.
+            # The start's orientation does not change the shape of the arc.
             via = segments.via(i)
             assert via is not None
             arc_through_via(i, start, via, end, ArcMode(segments.arc_modes[i]))
@@ -242,7 +242,7 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
                 raise duplicate_point_error(goal, i)
 
 
-#: All rules in order: later rules rely on what earlier ones have checked.
+#: All rules in order: later rules rely on the checks of earlier ones.
 RULES: tuple[Rule, ...] = (
     _number_of_points,
     check_fields,

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Plan a joint goal: joint polynomials through its points, checked along the way.
+Plan a joint goal: joint polynomials through its points, checked along the whole motion.
 
-The robot gets the client's points as pieces of a spline; for a SPLINE goal, the driver computes
-the pieces. The path of the tool is derived from the joints, so that progress, tool limits and
-clearance are checked as for all goals. The joints are allowed to pass singularities.
+The robot gets one spline piece for each of the client's points, whereas for a SPLINE goal the
+driver chooses the pieces. The path of the tool is derived from the joints, so that progress, tool
+limits and clearance are checked as for all goals. The joints are allowed to pass singularities.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ from ur_cartesian_driver.planning.spline.spline_path import coarse_samples, samp
 from ur_cartesian_driver.planning.spline.spline_planner import stretch_times
 from ur_cartesian_driver.planning.stop_prediction import at_set_point
 
-# A joint overshoots if it is faster at a point than this many times its mean on an adjacent piece.
+# A joint overshoots if its speed at a point exceeds its mean speed on an adjacent piece by this
+# factor.
 _MAX_MONOTONE = 3.0
 # Rounding of a joint position [rad].
 _ROUNDING = 1e-9
@@ -60,10 +61,11 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Trajectory:
-    """The joints at the ends of n pieces, from rest at the arm's position."""
+    """The joints at the ends of n pieces; the first piece begins where the arm rests."""
 
-    #: Times (n + 1,) [s], in whole microseconds; joint rows (n + 1, 6) each.
+    #: (n + 1,) times of the ends [s], in whole microseconds.
     times: Floats
+    #: Positions, velocities and accelerations at the ends, each (n + 1, 6).
     joints: MotionRows
     quintic: bool
     #: The number of the point at the end of the first piece.
@@ -72,7 +74,7 @@ class _Trajectory:
 
     @property
     def spline(self) -> JointSpline:
-        """The joints over time."""
+        """The joints over time, as a spline."""
         return JointSpline.through(self.times, self.joints, quintic=self.quintic)
 
     def stretched(self, factor: float) -> _Trajectory:
@@ -89,17 +91,21 @@ class _Trajectory:
 class _Samples:
     """Joints and tool along a trajectory; row 0 is the start."""
 
-    #: (m,) the piece, the fraction of its time, and the time [s]
+    #: (m,) the piece of each sample.
     piece: Indices
+    #: (m,) the fraction of the piece's time at the sample.
     u: Floats
+    #: (m,) the times of the samples [s].
     times: Floats
-    #: (m, 6) each
+    #: Joint positions, velocities and accelerations, each (m, 6).
     joints: MotionRows
-    #: (m, 7) and (m, 6) of the TCP in base
+    #: (m, 7) poses of the TCP in base.
     poses: Floats
+    #: (m, 6) twists of the TCP in base.
     twists: Floats
+    #: (m, 6) accelerations of the TCP in base.
     accelerations: Floats
-    #: (m,) the point to which each piece leads
+    #: (m,) the point to which the sample's piece leads.
     points: Int32s
 
 
@@ -107,9 +113,11 @@ def plan_joint_goal(
     goal: JointGoal, state: RobotState, arm: Arm, options: PlanningOptions
 ) -> Plan:
     """
-    Return the plan of a joint goal for a robot that rests in a state.
+    Return the plan of a joint goal for a robot at rest.
 
-    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
+    :param state: the state of that robot.
+    :raises GoalRefused: the goal cannot be carried out; the text names point, quantity, value and
+        bound.
     """
     checked = check_joint_goal(goal, options)
     state = at_set_point(state, arm)
@@ -156,7 +164,7 @@ def plan_joint_goal(
 def _cartesian_goal(
     checked: CheckedJointGoal, state: RobotState, arm: Arm, options: PlanningOptions
 ) -> GoalTable:
-    """Return the equivalent goal of the tool."""
+    """Return the equivalent goal of the tool, with default tolerances and safe outputs."""
     n = len(checked.times)
     table = GoalTable(
         waypoints=WaypointRows(
@@ -177,7 +185,7 @@ def _cartesian_goal(
 def _trajectory(
     checked: CheckedJointGoal, state: RobotState, options: PlanningOptions
 ) -> _Trajectory:
-    """Return the goal's trajectory from the arm's position, with NaN replaced."""
+    """Return the goal's trajectory from the arm's position, with NaN velocities replaced."""
     times, joints, remarks, first = checked.times, checked.joints, [], 0
     if times[0] == 0.0:
         _check_start(checked, state, options)
@@ -209,7 +217,7 @@ def _trajectory(
 
 
 def _check_start(checked: CheckedJointGoal, state: RobotState, options: PlanningOptions) -> None:
-    """Refuse a first point at time 0 at which the arm does not rest."""
+    """Refuse a first point with time 0 if the arm is elsewhere or the point has velocities."""
     off = np.abs(checked.joints.x[0] - state.actual_q)
     k = int(np.argmax(off))
     if off[k] > options.start_tolerance_angle:
@@ -231,9 +239,9 @@ def _chosen_velocities(times: Floats, q: Floats) -> Floats:
     """
     Return the velocities of parabolas through each point and its neighbours; 0 at both ends.
 
-    They are limited so that a joint moves in only one direction between two points, and rests for
-    a moment where it reverses (F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic
-    interpolation).
+    The velocities are limited so that each joint moves in one direction only between two points,
+    and rests for a moment where it reverses (F. N. Fritsch, R. E. Carlson: Monotone piecewise
+    cubic interpolation).
     """
     h = np.diff(times)[:, None]
     mean = np.diff(q, axis=0) / h
@@ -246,7 +254,7 @@ def _chosen_velocities(times: Floats, q: Floats) -> Floats:
 
 
 def _sampled(trajectory: _Trajectory, state: RobotState, arm: Arm) -> _Samples:
-    """Return samples that are dense enough for the tool and for the fastest joint."""
+    """Return samples of a trajectory, dense enough for the tool and for the fastest joint."""
     spline, times = trajectory.spline, trajectory.times
     piece, t = coarse_samples(times)
     q, qd, qdd = evaluate(spline.coefficients[piece], t)

@@ -3,9 +3,10 @@
 """
 Fit joint polynomials that keep the tool on a tool spline.
 
-A piece has the joint positions, velocities and accelerations of the tool spline at its ends; in
-between, the tool deviates from the spline. Forward kinematics gives the deviation, and pieces that
-deviate more than allowed are halved until none does.
+At both ends of a piece, the joints have the positions and velocities (in quintics, also the
+accelerations) that follow from the tool spline; between the ends, the tool deviates from that
+spline. Forward kinematics gives the deviation, and pieces that deviate more than allowed are
+halved until none does.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
-#: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
+#: Unit of the times of pieces [s]: a microsecond, as on the wire, so that their sums do not drift.
 TICK = 1e-6
 #: The angular tolerance of a tool spline is the linear one divided by this radius [m].
 ANGLE_TOLERANCE_RADIUS = 0.1
-#: Pieces are not halved below this time [s]: one cycle of the fastest controllers.
+#: Pieces are not halved to less than this time [s]: one cycle of the fastest controllers.
 _MIN_PIECE_TIME = 0.002
-# Digits of joint rates; further ones are rounding errors.
+# Decimal places of joint rates; further digits are rounding errors.
 _DIGITS = 12
-#: Minimum and maximum number of samples inside a piece at which the tool is compared.
+#: Minimum and maximum number of samples inside a piece at which the deviation is computed.
 _COMPARED_SAMPLES = 7, 23
 
 
@@ -47,15 +48,16 @@ _COMPARED_SAMPLES = 7, 23
 class JointPolynomials:
     """The joints over time, in n pieces."""
 
-    #: (n + 1,) times of the ends [s], in whole ticks.
+    #: (n + 1,) times of the pieces' ends [s], in whole ticks.
     times: Floats
-    #: (n + 1, 6) each
+    #: Joint positions, velocities and accelerations at the ends, each (n + 1, 6).
     joints: MotionRows
     #: (n,) the piece of the tool spline to which each joint piece belongs.
     piece: Indices
     quintic: bool
-    #: Maximum deviation of the tool from the tool spline [m], [rad].
+    #: Maximum distance of the tool from the tool spline [m].
     distance: float
+    #: Maximum angle between the tool and the tool spline [rad].
     angle: float
 
 
@@ -70,11 +72,11 @@ def fit_joint_polynomials(
     """
     Return the joint pieces for a spline path.
 
-    :param start: the joints at the start of the path (1, 6).
-    :param tolerance: maximum deviation of the tool [m]; for turns, the length of an arc with the
-        radius ANGLE_TOLERANCE_RADIUS.
+    :param start: the joints at the start of the path, in rows (1, 6).
+    :param tolerance: maximum deviation of the tool [m]; the maximum angle [rad] is this length
+        divided by ANGLE_TOLERANCE_RADIUS.
     :param max_time: longest time of a piece [s].
-    :raises TooFast: even pieces of one controller cycle deviate too much.
+    :raises TooFast: even the shortest pieces, of one controller cycle, deviate too much.
     """
     bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
     refinement = _PieceRefinement(kinematics, path, start, quintic)
@@ -83,7 +85,7 @@ def fit_joint_polynomials(
 
 
 class _PieceRefinement:
-    """The pieces so far, in order of time, with flags for those that are not compared yet."""
+    """The pieces so far, in order of time, with flags for those whose deviation is not known."""
 
     def __init__(
         self, kinematics: TcpKinematics, path: SplinePath, start: MotionRows, quintic: bool
@@ -92,8 +94,9 @@ class _PieceRefinement:
         self._sample_times = path.times
         spline = path.spline
         n = len(spline.positions)
-        #: The piece of the tool spline on which each joint piece lies, and the times of all ends.
+        #: The piece of the tool spline on which each joint piece lies.
         self.piece = np.arange(n)
+        #: The times of the joint pieces' ends [s].
         self.times = np.concatenate([spline.times[:1], to_ticks(spline.times[1:])])
         joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
         self.joints = MotionRows(
@@ -128,7 +131,7 @@ class _PieceRefinement:
         )
 
     def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:
-        """Return the joints at times ``t`` since the beginnings of pieces of the tool spline."""
+        """Return the joints at times ``t`` [s] from the beginnings of tool spline pieces."""
         tool = self.path.spline.rows(piece, t)
         near = self.path.q[
             np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
@@ -139,7 +142,7 @@ class _PieceRefinement:
         qd, qdd = joint_rates(
             self.kinematics.arm, self.kinematics.T_flange_tcp, q, tool.twists, tool.accelerations
         )
-        # Rounded, so that rates at rest are exactly 0.
+        # The rates are rounded, so that they are exactly 0 at rest.
         return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
     def _coefficients(self, rows: Indices) -> Floats:
@@ -148,7 +151,7 @@ class _PieceRefinement:
         return between(np.diff(self.times)[rows], start, end)
 
     def _deviations(self, rows: Indices) -> Floats:
-        """Return the maximum deviations of the tool on pieces (n, 2) [m], [rad]."""
+        """Return the maximum deviations (n, 2) of the tool on pieces [m], [rad]."""
         begin, end = self.times[rows], self.times[rows + 1]
         sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
             self._sample_times, begin

@@ -3,8 +3,9 @@
 """
 Find the stretches on which a spline is slower than requested.
 
-The requested speed is the mean speed that the times give a segment, or near a point the speed of
-its twist, if that is lower. Speeds are computed from the joint polynomials.
+The requested speed at a point is the mean speed that the times give the segment or, if lower, the
+speed of the point's twist; between points it is interpolated. The actual speeds are computed from
+the joint polynomials.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.spline.joint_polynomials import JointPolynomials
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
-#: A segment shorter than this does not move the tool [m]; a tool slower than this rests [m/s].
+#: A segment shorter than this [m] does not move the tool.
 _MIN_LENGTH = 1e-6
+#: A tool slower than this [m/s] rests.
 _REST = 1e-9
-#: Unit directions whose dot product is below this reverse.
+#: The path reverses if the dot product of its unit directions before and after is below this.
 _REVERSAL = -0.5
-#: Number of places that are compared for each sample of the path.
+#: Number of places per sample of the path at which speeds are compared.
 _PER_SAMPLE = 4
 
 
@@ -40,9 +42,9 @@ def slow_spline_stretches(
     """
     Return the slow stretches of a spline from rest to rest.
 
-    :param twists: (n, 6) the twists that the goal gives its points; NaN and 0 = none.
+    :param twists: (n, 6) the twists of the goal's points; NaN and 0 = none.
     :param stretch: the factor by which the times of the goal were stretched because of a limit.
-    :param slower_by: the fraction of the requested speed by which a slow stretch falls short.
+    :param slower_by: a speed is too low if it is more than this fraction below the requested one.
     """
     piece, u, times = _places(path)
     joints = JointSpline.through(
@@ -56,7 +58,7 @@ def slow_spline_stretches(
     edges = np.flatnonzero(np.diff(speeds < wanted, prepend=False, append=False))
     found = []
     for first, stop in edges.reshape(-1, 2).tolist():
-        # The tool may have been slower since the last sample before the first slow one.
+        # The stretch may begin anywhere between the first slow place and the place before it.
         begin, end = max(first - 1, 0), min(stop, len(speeds) - 1)
         slowest = first + int(np.argmin(speeds[first:stop] / asked[first:stop]))
         is_ramp = (first == 0 or stop == len(speeds)) and piece[first] == piece[stop - 1]
@@ -91,7 +93,7 @@ def slow_spline_stretches(
 
 
 def _places(path: SplinePath) -> tuple[Int64s, Floats, Floats]:
-    """Return pieces, fractions of their times and times (n,) [s], denser than the samples."""
+    """Return pieces, fractions of their times, and times [s] of places, each (n,)."""
     rows = np.arange(_PER_SAMPLE * (len(path.u) - 1) + 1) / _PER_SAMPLE
     times = np.interp(rows, np.arange(len(path.u)), path.times)
     piece = path.piece[np.ceil(rows).astype(np.intp)]
@@ -102,12 +104,12 @@ def _places(path: SplinePath) -> tuple[Int64s, Floats, Floats]:
 def _asked_speeds(
     path: SplinePath, piece: Int64s, u: Floats, twists: Floats, stretch: float
 ) -> Floats:
-    """Return the requested speeds at places [m/s]; 0 on segments that do not move the tool."""
+    """Return the requested speeds [m/s] at places; 0 on segments that do not move the tool."""
     n = len(twists)
     ends = np.searchsorted(path.piece, np.arange(n), side='right') - 1
     lengths = np.diff(path.length[ends], prepend=0.0)
     mean = np.where(lengths > _MIN_LENGTH, stretch * lengths / np.diff(path.spline.times), 0.0)
-    with np.errstate(over='ignore'):  # any twist may be asked for
+    with np.errstate(over='ignore'):  # a goal may have any twist
         given = np.linalg.norm(twists[:, :3], axis=1)
     given = np.where(np.isfinite(given) & (given > 0.0), given, np.inf)
     before, after = np.append(np.inf, given[:-1]), given

@@ -28,8 +28,8 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 _ROUNDING = 1e-6
 
 
-#: A quantity along a spline: what needs it (tool or joint), values (m,), limit, power (1 for
-#: speeds, 2 for accelerations), unit and name of the limit.
+#: A quantity along a spline: name of the tool or joint to which it belongs, values (m,), limit,
+#: power of time (1 for speeds, 2 for accelerations), unit, and name of the limit.
 _Quantity: TypeAlias = tuple[str, Floats, float, int, str, str]
 
 
@@ -43,21 +43,23 @@ class LimitExcess:
     name: str
     #: The factor by which all times must be multiplied to keep the limit.
     factor: float
-    #: The point at the end of the segment, the fraction of the segment's time, and the value.
+    #: The point at the end of the segment with the greatest value.
     point: int
+    #: Where this value is, as a fraction of the segment's time.
     fraction: float
+    #: The greatest value.
     needed: float
 
     @property
     def limit_text(self) -> str:
-        """The limit with its value."""
+        """The name and value of the limit."""
         return f'{self.name} = {self.limit:.3f} {self.unit}'
 
     def refusal(self, *, may_slow: bool = True, rates: str = 'twists') -> TooFast:
         """
         Return the refusal of the goal.
 
-        :param may_slow: whether the driver could stretch the times itself.
+        :param may_slow: whether the refusal advises to let the driver stretch the times.
         :param rates: the word for velocities in the goal's points.
         """
         return TooFast(
@@ -75,7 +77,7 @@ class LimitExcess:
 
     def check_slowed(self, times: Floats, first: int, options: PlanningOptions) -> None:
         """
-        Check times (n,) that are stretched by the factor.
+        Check times (n,) that have been stretched by the factor.
 
         :param first: the point to which the first piece leads.
         :raises InvalidGoal: a piece takes too long.
@@ -92,7 +94,7 @@ class LimitExcess:
 
 
 def stretch_remark(factor: float, reason: str, duration: float) -> str:
-    """Return the remark on times that are stretched, with the total duration [s]."""
+    """Return the remark on times that are stretched by ``factor``, with the total duration."""
     return (
         f'all times are stretched by {factor:.4g}, because of {reason}: {duration:.3f} s in total'
     )
@@ -102,20 +104,24 @@ def stretch_remark(factor: float, reason: str, duration: float) -> str:
 class RateSamples:
     """The rates of tool and joints at samples of a spline."""
 
-    #: (m,) the point to which the sample's piece leads, and the fraction of the piece's time.
+    #: (m,) the point to which the sample's piece leads.
     points: Int32s
+    #: (m,) the fraction of the piece's time at the sample.
     u: Floats
-    #: (m, 6) each: of the TCP in base and of the joints.
+    #: (m, 6) twists of the TCP in base.
     twists: Floats
+    #: (m, 6) accelerations of the TCP in base.
     accelerations: Floats
+    #: (m, 6) joint velocities [rad/s].
     qd: Floats
+    #: (m, 6) joint accelerations [rad/s^2].
     qdd: Floats
 
 
 def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return the quantity of a path that exceeds its limit most, None if none does."""
+    """Return the quantity along a path that exceeds its limit most; None if none does."""
     begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
     twists, accelerations = path.spline.rates(path.piece, path.u * (end - begin))
     qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
@@ -133,7 +139,7 @@ def worst_excess(
 def worst_excess_of(
     samples: RateSamples, model: RobotModel, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return the quantity in samples that exceeds its limit most, None if none does."""
+    """Return the quantity in samples that exceeds its limit most; None if none does."""
     worst: LimitExcess | None = None
     for what, values, limit, power, unit, name in _quantities(samples, model, options):
         row = int(np.argmax(values))

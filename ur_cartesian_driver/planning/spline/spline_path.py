@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The spline path: the arm along a tool spline, sampled in time, or the refusal.
+Solve the arm along a tool spline: the result is a spline path, sampled in time, or a refusal.
 
-Samples are evenly spaced in time on each piece, so densely that between two samples the tool moves
-at most 2 mm and turns at most a degree where it is fastest, and that chords stay within some
-micrometres of the curve.
+On each piece, the samples are evenly spaced in time. They are so dense that even where the tool is
+fastest, it moves at most 2 mm and turns at most one degree from sample to sample, and that chords
+between samples stay within some micrometres of the curve.
 """
 
 from __future__ import annotations
@@ -51,10 +51,11 @@ from ur_cartesian_driver.planning.preflight.tightest_margins import (
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Number of samples that estimate the peak speed of a piece, and factor for the peak between them.
+# Number of samples that estimate the peak speed of a piece.
 _COARSE_SAMPLES = 9
+# Factor on this estimate, because the peak may lie between the samples.
 _SPEED_MARGIN = 1.05
-#: Maximum turn within a piece [rad]: rotation vectors are ambiguous beyond.
+#: Maximum turn within a piece [rad]: rotation vectors of larger turns are ambiguous.
 _MAX_TURN = 2.0 * pi
 #: Maximum number of samples of a goal; each needs a quarter of a kilobyte while it is checked.
 MAX_SAMPLES = 2_000_000
@@ -67,14 +68,17 @@ class SplinePath:
     spline: ToolSpline
     #: The number of the point at the end of the first piece.
     first: int
-    #: (m,) the piece of each sample and the fraction of the piece's time; row 0 is the start.
+    #: (m,) the piece of each sample; row 0 is the start.
     piece: Indices
+    #: (m,) the fraction of the piece's time at each sample.
     u: Floats
-    #: (m, 7) poses of the TCP in base; (m, 6) joint positions [rad].
+    #: (m, 7) poses of the TCP in base.
     poses: Floats
+    #: (m, 6) joint positions [rad].
     q: Floats
-    #: (m,) path length and turn of the tool since the start [m], [rad].
+    #: (m,) path length of the tool since the start [m].
     length: Floats
+    #: (m,) turn of the tool since the start [rad].
     angle: Floats
     #: The tightest margin of each segment.
     tightest_margins: TightestMargins
@@ -88,7 +92,7 @@ class SplinePath:
 
     @property
     def points(self) -> Int32s:
-        """(m,) the segment of each sample."""
+        """(m,) the point to which the piece of each sample leads."""
         return (self.first + self.piece).astype(np.int32)
 
     def stretch_times(self, factor: float) -> SplinePath:
@@ -109,7 +113,7 @@ def solve_spline_path(
     """
     Return the path of the arm along a spline.
 
-    :param postures: the postures at the ends of pieces, by the number of the piece.
+    :param postures: by number of a piece, the posture at its end.
     :param first: the number of the point at the end of the first piece.
     :param rests: whether the arm is at rest at the start of the spline.
     :param q_start: the configuration at the start of the spline [rad].
@@ -164,7 +168,7 @@ def _check_path(
     postures: Mapping[int, Posture],
     options: PlanningOptions,
 ) -> None:
-    """Raise the first refusal along the path, if there is one."""
+    """Raise the first refusal along the path, if any."""
     refusal, index = first_refusal(joint_path, measures, options)
     for k, posture in postures.items():
         point = int(joint_path.pieces.index[k])
@@ -193,7 +197,7 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
 
 
 def coarse_samples(times: Floats) -> tuple[Indices, Floats]:
-    """Return samples on all pieces between times (n + 1,): piece and time since its start."""
+    """Return samples on all pieces between times (n + 1,): piece, and time on the piece."""
     h = np.diff(times)
     piece = np.repeat(np.arange(len(h)), _COARSE_SAMPLES)
     return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), len(h)) * h[piece]
@@ -205,7 +209,7 @@ def _check_sizes(
     coarse: tuple[Indices, Floats],
     first: int,
 ) -> None:
-    """Refuse pieces with an ambiguous turn, and rates that carry the tool far away."""
+    """Refuse pieces with an ambiguous turn, or whose rates make a long detour or turn."""
     n = len(spline.positions)
     x, turn = spline.vectors(*coarse)
     x = x.reshape(n, _COARSE_SAMPLES, 3)
@@ -241,8 +245,9 @@ def sample_count(
     """
     Return the number of samples of each piece.
 
-    :param speed: speed of the tool at the coarse samples [m/s]; likewise ``turn_rate`` [rad/s]
-        and ``acceleration`` [m/s^2].
+    :param speed: speed of the tool at the coarse samples [m/s].
+    :param turn_rate: turn rate of the tool at these samples [rad/s].
+    :param acceleration: acceleration of the tool at these samples [m/s^2].
     :param first: the number of the point at the end of the first piece.
     """
     h = np.diff(times)

@@ -6,8 +6,8 @@ Plan the joint spline pieces of SPLINE and SERVO goals.
 The steps: points with times, twists and accelerations -> the tool over time
 (:mod:`~ur_cartesian_driver.planning.geometry.tool_spline`) -> the arm along that motion
 (:mod:`~.spline_path`) -> limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion can be
-planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, even a moving one, and
-:func:`plan_stop` brings such a motion to rest.
+planned in parts: :func:`plan_spline` starts from any :class:`SplineState`, even of a moving arm,
+and :func:`plan_stop` brings a moving arm to rest.
 """
 
 from __future__ import annotations
@@ -57,21 +57,25 @@ from ur_cartesian_driver.planning.spline.spline_limits import stretch_remark, wo
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
-# Samples of a stopping piece, factor on its time for the next try, and number of tries.
+# Number of samples at which a stopping piece is checked.
 _SAMPLES = 17
+# Factor on the time of a stopping piece for the next try.
 _SHORTENING = 0.8
+# Greatest number of tries.
 _TRIES = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplineState:
-    """State of the joints at the end of a spline piece, as the robot program continues from it."""
+    """State of the joints at the end of a spline piece, where the robot program continues."""
 
     #: Time since the start of the motion [s].
     time: float = 0.0
-    #: Joints [rad], [rad/s], [rad/s^2]; after a cubic piece, the acceleration is taken as 0.
+    #: Joint positions [rad].
     q: Joints
+    #: Joint velocities [rad/s].
     qd: Vector6 = ZERO6
+    #: Joint accelerations [rad/s^2]; after a cubic piece, these are taken as 0.
     qdd: Vector6 = ZERO6
 
     @classmethod
@@ -89,11 +93,11 @@ class SplineState:
         return any(self.qd) or any(self.qdd)
 
     def rows(self) -> MotionRows:
-        """Return the joints in rows (1, 6)."""
+        """Return the joints as rows (1, 6)."""
         return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
 
     def tool(self, arm: Arm, T_flange_tcp: Pose) -> ToolPoints:
-        """Return the motion of the TCP in base, as one row."""
+        """Return the pose and the rates of the TCP in base, as one row."""
         q, qd, qdd = self.rows()
         twist, acceleration = tool_rates(arm, T_flange_tcp, q, qd, qdd)
         return ToolPoints(
@@ -107,11 +111,11 @@ class SplineState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SplinePieces:
-    """A part of a motion that passed all checks."""
+    """The pieces of one part of a motion, after all checks."""
 
     #: One row for each piece; the last piece to a point carries the point's report line.
     segments: PlannedRows
-    #: Row 0 is the start; times are from the start of the motion.
+    #: The path; row 0 is the start, and times are since the start of the motion.
     reference: ReferencePath
     remarks: tuple[str, ...]
     find_slow_stretches: Callable[[], tuple[SlowStretch, ...]]
@@ -132,15 +136,16 @@ def plan_spline(
     tool_tips: Sequence[Pose] = (),
 ) -> SplinePieces:
     """
-    Return the pieces from a state to points.
+    Return the pieces that lead from a state through the points of a goal.
 
-    :param goal: the goal, whose waypoints come after the state, with times since the start of the
-        motion. With ``keep_open``, the pieces can end in motion; then the stop by
+    :param goal: the goal, whose waypoints come after the state and have times since the start of
+        the motion. With ``keep_open``, the arm can still move at the last point; then the stop by
         :func:`plan_stop` is checked as well.
     :param T_flange_tcp: the TCP of the motion.
-    :param first: the index of the first of these waypoints in the whole goal.
-    :param tool_tips: the TCPs to check for collisions; empty = the TCP.
-    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
+    :param first: the index that the first of these waypoints has in the whole goal.
+    :param tool_tips: the tool tips to check for collisions; empty = only ``T_flange_tcp``.
+    :raises GoalRefused: the spline cannot be executed; the text names point, quantity, value and
+        bound.
     """
     kinematics = TcpKinematics(arm, T_flange_tcp)
     points = tool_points(goal, start.tool(arm, T_flange_tcp))
@@ -206,7 +211,7 @@ def _max_piece_time(goal: GoalTable) -> float:
     Return the longest duration of a piece [s].
 
     The robot gets whole pieces only, so the pieces of a goal with a replaceable tail take at most
-    a third of its horizon; set-points have no such limit.
+    a third of ``replace_horizon``. Goals that are sent as set-points have no such limit.
     """
     if not goal.replace_horizon or resolve_execution_mode(goal).traits.streams_setpoints:
         return inf
@@ -222,12 +227,12 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
-    Velocities are cubics of time that end at 0 without acceleration, so the peak deceleration of
-    the fastest joint is 1.5 times its mean. The arm brakes harder if a joint would otherwise leave
-    its range or, while still accelerating, exceed its speed limit.
+    The joint velocities are cubics of time that end at 0 with acceleration 0, so the peak
+    deceleration of the fastest joint is 1.5 times its mean deceleration. The arm brakes harder if
+    a joint would otherwise leave its range or, while still accelerating, exceed its speed limit.
 
     :param deceleration: peak deceleration of the fastest joint [rad/s^2].
-    :raises JointLimitExceeded: the end of a range is too close.
+    :raises JointLimitExceeded: a joint is too close to the end of its range.
     """
     v, a = np.array(state.qd), np.array(state.qdd)
     speed = np.maximum(arm.model.max_joint_speed, np.abs(v))
@@ -255,7 +260,7 @@ def _rows_of(state: SplineState, piece: Spline) -> tuple[Floats, Floats, Floats]
 
 
 def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
-    """Return the joint that leaves its range, None if none does."""
+    """Return a joint that leaves its range; None if none does."""
     low, high = np.array(arm.model.position_limits).T
     outside = ((q < low - 1e-9) | (q > high + 1e-9)).any(axis=0)
     return int(np.argmax(outside)) if outside.any() else None
@@ -268,7 +273,7 @@ def _fit_to_limits(
     goal: GoalTable,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, str]:
-    """Return the path, slowed if the limits require it, the factor, and the limit ('' = none)."""
+    """Return the path, slowed if limits require it, the factor on times, and the limit or ''."""
     found = worst_excess(kinematics, path, options)
     if found is None:
         return path, 1.0, ''
@@ -320,7 +325,7 @@ def _segments(path: SplinePath, polynomials: JointPolynomials, goal: GoalTable) 
 
 
 def _segment_line(goal: GoalTable, first: int, k: int, count: int, done: Sequence[float]) -> str:
-    """Return the report line of a segment; ``done`` are its length, turn and time."""
+    """Return the report line of a segment; ``done`` has its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
     speed = (
@@ -347,7 +352,7 @@ def _clearance_remarks(
     start: SplineState,
     options: PlanningOptions,
 ) -> list[str]:
-    """Return the remarks on clearance, including the stop after a moving end."""
+    """Return the remarks on clearance, also of the stop if the arm moves at the last point."""
     q, points, u = path.q[1:], path.points[1:], path.u[1:]
     if end.is_moving:
         on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]
@@ -358,6 +363,6 @@ def _clearance_remarks(
 
 
 def stretch_times(goal: GoalTable, factor: float) -> GoalTable:
-    """Return a goal with all its times stretched."""
+    """Return a goal with all its times multiplied by a factor."""
     points = goal.waypoints
     return replace(goal, waypoints=replace(points, times=factor * points.times))

@@ -3,9 +3,9 @@
 """
 The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-The tool stops at a point whose twist is 0. For NaN the driver chooses a velocity from the parabola
-through the point and its neighbours, and an acceleration as the mean of those that the cubics
-before and after the point have there.
+The tool stops at a point whose twist is 0. In place of NaN, the driver chooses a velocity from the
+parabola through the point and its neighbours, and as acceleration the mean of the accelerations
+that the cubics before and after the point have at that point.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
-# If the step between two points is shorter than this [m], [rad], the tool rests at both.
+# If the step between two points is shorter than this [m], [rad], a chosen twist is 0 at both.
 _MIN_DISTANCE = 1e-9
 
 
 def tool_points(goal: GoalTable, start: ToolPoints) -> ToolPoints:
     """
-    Return the start and the points of a checked goal after it, in base.
+    Return the start, followed by the points of a checked goal, in base.
 
     :param goal: the goal, whose waypoints come after the start.
-    :param start: the tool at the start in base, one row.
+    :param start: the tool in base at the start, one row.
     """
     given, start = goal.waypoints, _in_frame(start, goal.T_base_frame.inverse())
     if goal.replace_horizon and not given.accelerations.any():
-        # A new tail can begin anywhere on the path, so the acceleration must not jump at points.
+        # A new tail can begin anywhere on the path, so the accelerations must not jump at points.
         given = replace(given, accelerations=np.full_like(given.accelerations, np.nan))
     poses = np.concatenate([start.poses, given.poses])
     poses[:, 3:] = normalized_rows(poses[:, 3:])
@@ -106,8 +106,9 @@ def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
 
 def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
     """
-    Return the velocities of parabolas through each point and its neighbours; 0 at the start.
+    Return the velocities of parabolas through each point and its neighbours.
 
+    They are 0 at the start; at the end, 0 or (``ends_moving``) the mean velocity of the last step.
     Angular velocities come from the rotation vectors from the point to its neighbours, as the
     derivative of these vectors at the point is the angular velocity.
     """
@@ -136,7 +137,7 @@ def _chosen_accelerations(points: ToolPoints, twists: Floats) -> Floats:
     h = np.diff(points.times)[:, None]
     inner = slice(1, -1)
     poses, zero = points.poses, np.zeros((len(points.times) - 2, 3))
-    # Relative to the inner point: positions, and rotation vectors from its orientation.
+    # Relative to the inner point: positions, and rotation vectors from the point's orientation.
     there = []
     for around in (slice(None, -2), slice(2, None)):
         turn = rotation_rates(

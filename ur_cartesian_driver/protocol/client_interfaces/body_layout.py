@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Bodies of the primary interface: big-endian values, one after the other.
+Bodies of messages on the primary interface: big-endian values, one after the other.
 
-A layout names one item for each value: the ``struct`` code of a number (``d``), the counted code
-of a vector (``6d``), ``text`` for a text that extends to the end of the body, or ``B:text`` for a
-text that follows its length, here of the code ``B``.
+A layout is a list of items, one for each value: the ``struct`` code of a number (``d``), the
+counted code of a vector (``6d``), ``text`` for a text that extends to the end of the body, or
+``B:text`` for a text after its length, which has the code ``B`` here.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def pack(layout: struct.Struct, *values: Any) -> bytes:
     """
     Return packed values.
 
-    :raises LocalProtocolError: a value does not fit.
+    :raises LocalProtocolError: a value does not fit its code.
     """
     try:
         return layout.pack(*values)
@@ -54,7 +54,7 @@ class BodyLayout:
         Compile the layout.
 
         :param what: the name of the body, for error texts.
-        :param padding: zero bytes after the values [bytes]; a body that is read may lack them.
+        :param padding: number of zero bytes after the values; a received body may lack them.
         """
         self._what = what
         self._padding = bytes(padding)
@@ -71,7 +71,7 @@ class BodyLayout:
         Return the body.
 
         :param values: one for each item; vectors are tuples, possibly nested.
-        :raises LocalProtocolError: a value does not fit.
+        :raises LocalProtocolError: a value does not fit its code.
         """
         parts = []
         for (layout, is_text), value in zip(self._items, values, strict=True):
@@ -111,7 +111,7 @@ class BodyLayout:
 
 
 class Body:
-    """A message whose own slots are the values of its body, in this order."""
+    """A message; the slots of its own class are the values of its body, in order."""
 
     __slots__: tuple[str, ...] = ()
     layout: ClassVar[BodyLayout]
@@ -125,7 +125,7 @@ class Body:
         """
         Return the content of a body.
 
-        :param head: fields that are not in the body.
+        :param head: fields of the message that are not in the body.
         :raises RemoteProtocolError: the body is too short.
         """
         construct: Callable[..., Self] = cls

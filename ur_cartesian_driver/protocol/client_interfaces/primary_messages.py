@@ -3,10 +3,10 @@
 """
 The primary interface: state and messages from the controller, programs and commands to it.
 
-From the controller: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, body.
+The controller sends big-endian frames: ``int32`` size of the whole frame, ``uint8`` type, body.
 
-* type 16, robot state: sub-packages, see `primary_state`; ten times a second.
-* type 20, robot message: ``u64`` timestamp, ``i8`` source, ``u8`` message type, then
+* type 16, robot state: sub-packages (see `primary_state`), sent ten times a second.
+* type 20, robot message: ``u64`` timestamp, ``i8`` source, ``u8`` message type, and a body:
 
   ====  ==================  ====================================================================
   type  class               body (texts extend to the end of the frame, without terminator)
@@ -23,13 +23,13 @@ From the controller: frames, big-endian. ``int32`` size of the whole frame, ``ui
 
 * every other type becomes a :class:`RawFrame`.
 
-To the controller: text. A line is a command, unless ``def`` or ``sec`` begins a program. When its
-``end`` has arrived, a ``def`` program replaces the running one, and a ``sec`` program runs
-concurrently. The simulator's `script_upload` decodes this text.
+The client sends text. A line is a command, unless it begins a program (``def`` or ``sec``). Once
+the ``end`` of a ``def`` program has arrived, this program replaces the running one; a ``sec``
+program runs concurrently with it. The simulator's `script_upload` decodes this text.
 
-Obligations of a controller towards the manufacturer's library: send the version message first on
-each connection; send a frame in one piece of at most 4091 bytes (checked here); never send a
-sub-package that is too short; send a safety mode message only when the mode changes.
+The manufacturer's client library relies on the controller to send the version message first on
+each connection, to send a frame in one piece of at most 4091 bytes (checked here), never to send a
+sub-package that is too short, and to send a safety mode message only when the mode changes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class FrameType(IntEnum):
 
 
 class ReportLevel(IntEnum):
-    """Severity of an error; the levels from 128 are for developers."""
+    """Severity of an error; the levels from 128 up are for developers."""
 
     DEBUG = 0
     INFO = 1
@@ -81,9 +81,9 @@ class ReportLevel(IntEnum):
 
 #: Longest frame that the manufacturer's library can read [bytes].
 MAX_SENT_FRAME_SIZE = 4091
-#: Longest frame that is accepted; frames with all variables of a program can be long [bytes].
+#: Longest frame that is accepted [bytes]; a frame with all variables of a program can be long.
 MAX_FRAME_SIZE = 1 << 20
-#: Sources of messages: the controller and its motion control.
+#: Sources of messages: the controller; its motion control.
 SOURCE_CONTROLLER = -2
 SOURCE_MOTION = -3
 
@@ -126,7 +126,7 @@ class VersionMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyModeMessage(_Message):
-    """The safety mode changed to a :class:`SafetyMode` or a newer number."""
+    """A change of the safety mode, perhaps to a number that :class:`SafetyMode` lacks."""
 
     message_type: ClassVar = 5
     layout: ClassVar = BodyLayout('i i B I 4s', 'safety mode message')
@@ -143,7 +143,7 @@ class SafetyModeMessage(_Message):
 
     @classmethod
     def decode(cls, body: bytes, **head: int) -> SafetyModeMessage:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
+        """Decode a body; RemoteProtocolError if it is too short."""
         *values, data_type, data = cls.layout.unpack(body)
         (datum,) = cls._datum_layout(data_type).unpack(data)
         values += [data_type, datum]
@@ -156,7 +156,7 @@ class SafetyModeMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorCodeMessage(_Message):
-    """An error of the controller; ``level`` is a :class:`ReportLevel` or a newer number."""
+    """An error; its ``level`` may be a number that :class:`ReportLevel` lacks."""
 
     message_type: ClassVar = 6
     layout: ClassVar = BodyLayout('i i i I I text', 'error code message')
@@ -188,7 +188,7 @@ class KeyMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimeExceptionMessage(_Message):
-    """A program failed, or did not compile, at a line and column (from 1)."""
+    """A program failed, or did not compile, at a line and a column (both count from 1)."""
 
     message_type: ClassVar = 10
     layout: ClassVar = BodyLayout('I I text', 'runtime exception message')
@@ -263,7 +263,7 @@ def decode_frame(data: bytes) -> PrimaryFrame:
     """
     Return the content of one whole frame; its size field is not checked.
 
-    :raises RemoteProtocolError: something is shorter than it must be.
+    :raises RemoteProtocolError: a part is too short, or the size of a sub-package is impossible.
     """
     _, frame_type = unpack(_HEADER, data, 'primary frame')
     body = data[_HEADER.size :]
@@ -287,8 +287,8 @@ class PrimaryDecoder:
         """
         Take bytes from the controller (``b''`` = end of stream) and return the frames in them.
 
-        :raises RemoteProtocolError: a size is impossible, something is too short, or the stream
-            ended inside a frame.
+        :raises RemoteProtocolError: a size is impossible, a frame or a part of it is too short, or
+            the stream ended inside a frame.
         """
         return [decode_frame(frame) for frame in self._frames.feed(data)]
 
@@ -318,7 +318,7 @@ _MESSAGES: Mapping[int, type[_TypedMessage]] = {
 
 
 class PrimaryCommand(Enum):
-    """One-line commands, outside programs."""
+    """One-line commands, which are not part of a program."""
 
     POWER_ON = 'power on'
     POWER_OFF = 'power off'

@@ -3,9 +3,10 @@
 """
 The sub-packages of a robot state frame on the primary interface.
 
-Each is ``uint32`` size (including these five bytes), ``uint8`` type, body; big-endian. A UR5e
-sends them in the order and with the sizes of this table, 1386 bytes with the frame's header. We
-decode the known front part of a body: newer software appends fields, but never sends fewer.
+Each is big-endian: ``uint32`` size, ``uint8`` type, body; the size is that of all three together.
+A UR5e sends the sub-packages in the order and with the sizes of this table, together 1386 bytes
+with the frame's header. Only the known beginning of a body is decoded, because newer software
+appends fields, but never omits any.
 
 ====  ====================  ====  ===============================================================
 type  class                 size  body
@@ -80,7 +81,7 @@ class RawSubPackage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotModeData(Body):
-    """Power, stops and program; ``robot_mode`` is a :class:`RobotMode` or a newer number."""
+    """Power, stops, program; ``robot_mode`` may be a number that :class:`RobotMode` lacks."""
 
     sub_type: ClassVar = 0
     layout: ClassVar = BodyLayout('Q ? ? ? ? ? ? ? b B d d d', 'robot mode data', padding=1)
@@ -121,7 +122,7 @@ class JointData:
 
     @classmethod
     def decode(cls, body: bytes) -> JointData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
+        """Decode a body; RemoteProtocolError if it is too short."""
         joints = [unpack(_JOINT, body, 'joint data', i * _JOINT.size) for i in range(6)]
         *columns, _, mode = zip(*joints, strict=True)
         construct: Callable[..., JointData] = cls
@@ -163,8 +164,8 @@ class MasterboardData:
     domains, 2 f64 outputs, f32 temperature [deg C], voltage 48 V [V], current of the robot [A], of
     the IO [A], u8 safety mode, flag reduced, flag IMMI; with IMMI: u32 inputs, u32 outputs, f32
     voltage, f32 current; u32 reserved, u8 operational mode selector, flag three-position switch,
-    1 reserved. Older software ends before the selector. ``safety_mode`` is a :class:`SafetyMode`
-    or a newer number.
+    1 reserved. The body of older software ends before the selector. ``safety_mode`` may be
+    a number that :class:`SafetyMode` lacks.
     """
 
     sub_type: ClassVar = 3
@@ -198,14 +199,14 @@ class MasterboardData:
 
     @classmethod
     def decode(cls, body: bytes) -> MasterboardData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
+        """Decode a body; RemoteProtocolError if it is too short."""
         *head, has_immi = _BOARD_HEAD.unpack(body)
         offset = _BOARD_HEAD.size
         immi = None
         if has_immi:
             immi = ImmiData.decode(body[offset:])
             offset += ImmiData.layout.size
-        if len(body) >= offset + 4:  # older software ends after the reserved word
+        if len(body) >= offset + 4:  # a body of older software ends after the reserved word
             body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
         values = [*head, immi, *_BOARD_TAIL.unpack(body, offset)]
         return cls(**dict(zip(cls.__slots__, values, strict=True)))
@@ -263,12 +264,12 @@ class ConfigurationData:
     alpha: Vector6
     theta: Vector6
     masterboard_version: int = 6
-    #: Controller box for: 4 = UR5, 5 = UR10, 6 = UR3, 10 = UR20, 11 = UR30, 16 = UR16.
+    #: Arm that the box is for: 4 = UR5, 5 = UR10, 6 = UR3, 10 = UR20, 11 = UR30, 16 = UR16.
     controller_box_type: int = 4
-    #: 1 = UR5 (also UR7e), 2 = UR10 (also UR12e), 3 = UR3, 4 = UR16, 5 = UR18, 6 = UR8 Long,
-    #: 7 = UR20, 8 = UR30, 9 = UR15.
+    #: Model: 1 = UR5 (also UR7e), 2 = UR10 (also UR12e), 3 = UR3, 4 = UR16, 5 = UR18,
+    #: 6 = UR8 Long, 7 = UR20, 8 = UR30, 9 = UR15.
     robot_type: int
-    #: 2 = CB3, 3 = e-Series.
+    #: Series: 2 = CB3, 3 = e-Series.
     robot_sub_type: int = 3
     reserved: tuple[int, ...] = ()
 
@@ -280,7 +281,7 @@ class ConfigurationData:
 
     @classmethod
     def decode(cls, body: bytes) -> ConfigurationData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
+        """Decode a body; RemoteProtocolError if it is too short."""
         position_limits, motion_limits, *numbers = _CONFIGURATION.unpack(body)
         surplus = min(len(body) - _CONFIGURATION.size, 4) // 2
         reserved = struct.unpack_from(f'>{surplus}h', body, _CONFIGURATION.size)
@@ -345,7 +346,7 @@ class ToolModeInfo(Body):
     digital_output_mode_1: int = 1
 
 
-#: The safety data, whose content is for the manufacturer only; its size is known.
+#: The safety data; only their size is known, because they are for the manufacturer only.
 SAFETY_DATA = RawSubPackage(sub_type=10, body=bytes(38))
 
 SubPackage: TypeAlias = (
@@ -375,8 +376,8 @@ def decode_sub_packages(body: bytes) -> tuple[SubPackage, ...]:
     """
     Return the sub-packages of a state frame without the frame's header.
 
-    Types 0, 3, 5 and 6 are decoded, because the driver needs them. The others stay raw: their size
-    depends on the software; ``decode`` of their class decodes them on request.
+    Types 0, 3, 5 and 6 are decoded, because the driver needs them. The others stay raw, because
+    their sizes depend on the software; a caller can decode them with ``decode`` of their class.
 
     :raises RemoteProtocolError: a size is impossible, or a decoded body is too short.
     """

@@ -3,9 +3,10 @@
 """
 The packet of the real-time interface (port 30003), which the controller sends in every cycle.
 
-``int32`` size (including these four bytes), then only big-endian doubles, even for integers: for
-modes, and for the bits of all inputs or all outputs. Newer software appended fields and never
-changed earlier ones, so one table describes all versions; the size determines the last field::
+It begins with its ``int32`` size, these four bytes included. Then come only doubles, even for
+integers such as modes and the bits of the inputs; all numbers are big-endian. Newer software
+appended fields and never changed earlier ones, so one table describes all versions; the size
+determines the last field::
 
     size [bytes]   from PolyScope    the last field
     1060           3.2               program_state
@@ -28,7 +29,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.protocol.framing import FrameBuffer, hex_text
 
-#: First version (major, minor) with a size of the packet, and this size [bytes]; oldest first.
+#: Versions (major, minor) that changed the size of the packet, and the new size [bytes].
 _PACKET_SIZES: Final = (
     ((3, 2), 1060),
     ((3, 5), 1108),
@@ -48,8 +49,8 @@ class RealtimeData:
     """
     One packet, with its fields in wire order; fields that an older packet lacks are 0.
 
-    Joints in rad, rad/s, rad/s^2, A, Nm, V; poses and twists of the TCP, in the base frame, in m
-    and rad (rotation vector), m/s and rad/s. ``reserved_*`` are for the manufacturer only.
+    Units of the joints are rad, rad/s, rad/s^2, A, Nm and V. Poses [m, rad (rotation vector)] and
+    twists [m/s, rad/s] of the TCP are in the base frame. ``reserved_*`` are for the manufacturer.
     """
 
     #: Time since the start of the controller [s].
@@ -65,12 +66,12 @@ class RealtimeData:
     current_control: Vector6 = ZERO6
     tcp_pose_actual: Vector6 = ZERO6
     tcp_speed_actual: Vector6 = ZERO6
-    #: [N, Nm]
+    #: Force and torque [N, Nm].
     tcp_force: Vector6 = ZERO6
     tcp_pose_target: Vector6 = ZERO6
     tcp_speed_target: Vector6 = ZERO6
     digital_input_bits: float = 0.0
-    #: [degrees Celsius]
+    #: Temperatures [degrees Celsius].
     joint_temperatures: Vector6 = ZERO6
     #: Computing time of the cycle [s].
     controller_timer: float = 0.0
@@ -79,11 +80,11 @@ class RealtimeData:
     joint_modes: Vector6 = ZERO6
     safety_mode: float = 0.0
     reserved_1: Vector6 = ZERO6
-    #: [m/s^2]
+    #: Acceleration of the tool [m/s^2].
     tool_accelerometer: Vector3 = ZERO3
     reserved_2: Vector6 = ZERO6
     speed_scaling: float = 0.0
-    #: [kg m/s]
+    #: Momentum of the arm [kg m/s].
     momentum: float = 0.0
     reserved_3: float = 0.0
     reserved_4: float = 0.0
@@ -97,7 +98,7 @@ class RealtimeData:
     elbow_velocity: Vector3 = ZERO3
     safety_status: float = 0.0
     reserved_5: Vector3 = ZERO3
-    #: Mass [kg], centre of gravity [m], inertia [kg m^2] as Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+    #: Mass [kg]; centre of gravity [m]; inertia [kg m^2] as Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
     payload_mass: float = 0.0
     payload_cog: Vector3 = ZERO3
     payload_inertia: Vector6 = ZERO6
@@ -106,7 +107,7 @@ class RealtimeData:
         """
         Return the packet.
 
-        :param size: see :func:`packet_size`; fields beyond it are omitted.
+        :param size: size of the packet [bytes]; fields that do not fit into it are omitted.
         :raises LocalProtocolError: no packet has this size.
         """
         if size not in PACKET_SIZES:
@@ -133,9 +134,9 @@ def packet_size(version: tuple[int, ...]) -> int:
 
 def decode_packet(data: bytes) -> RealtimeData:
     """
-    Decode one packet, including its size; fields after the last one that we know are ignored.
+    Return the content of one packet with its size field; unknown fields at its end are ignored.
 
-    :raises RemoteProtocolError: the size is wrong.
+    :raises RemoteProtocolError: the size is impossible, or not that of the bytes.
     """
     stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
     if stated != len(data) or stated < min(PACKET_SIZES) or (stated - _SIZE.size) % 8:
@@ -181,7 +182,7 @@ def _count(size: int) -> int:
     return (size - _SIZE.size) // 8
 
 
-#: Count of numbers in each field, and in all fields up to and including this one.
+#: Number of doubles in each field; running total of these numbers.
 _LENGTHS: Final = [
     len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
     for field in fields(RealtimeData)

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The 21 numbers of a trajectory point: motion primitives and outputs to SI numbers and back.
+Trajectory points as 21 numbers: converts motion primitives and outputs to these and back.
 
-This is the table of URCL since 2.12. Velocity comes before acceleration on the wire, unlike in
-URScript. The factors on the wire are S = 1,000,000 and T, which equals S except for very old
-programs. :mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and
-arranges them for older programs.
+This table is that of URCL since 2.12. Velocity comes before acceleration on the wire, unlike in
+URScript. The factors on the wire are S = 1,000,000 and T, which equals S except in dialect 2.0.
+:mod:`~ur_cartesian_driver.protocol.program.trajectory_points` scales the numbers, and arranges
+them for older programs.
 
 =======  =====================================================================  =====
 index    meaning                                                                scale
@@ -24,7 +24,7 @@ index    meaning                                                                
 =======  =====================================================================  =====
 
 SWITCH_OUTPUT is not a motion and not part of URCL: only our own robot program knows it. The
-program reads it when the previous motion returns: at rest, or at the beginning of the blend.
+program reads it when the call of the previous motion returns: at rest, or where the blend begins.
 SWITCH_OUTPUT takes no time:
 
 =======  =====================================================================  =====
@@ -37,9 +37,9 @@ SWITCH_OUTPUT takes no time:
 =======  =====================================================================  =====
 
 The output kind 5 makes an analog output follow the speed of the tool until the output is switched
-again. The output kind 4 gives the law for the next record of kind 5: it has no trigger pose
-although word 16 is 1, and words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum and the time
-constant of the filter [s].
+again. A record of the output kind 4 gives the law for the next record of kind 5: it has no trigger
+pose although its word 16 is 1, and its words 0 - 4 are gain [1/(m/s)], offset, minimum, maximum
+and the time constant of the filter [s].
 
 The stops, which only our own program knows, are motions during which the arm stands still.
 WAIT waits: word 18 is the time from the end of the previous motion until the next one may begin.
@@ -165,7 +165,7 @@ class SplineKind(IntEnum):
 
 
 class FollowKind(IntEnum):
-    """Word 12 of a SWITCH_OUTPUT for an output that follows the speed; others: OutputKind."""
+    """Word 12 of a SWITCH_OUTPUT whose output follows the speed; others have an OutputKind."""
 
     LAW = 4
     BEGIN = 5
@@ -241,7 +241,7 @@ _OUTPUT_NAMES = (
     'motion type',
 )
 
-#: Class -> motion types for a target in joint positions, and for a pose.
+#: Class -> its motion type for a target in joint positions, and its type for a target pose.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
     MoveJ: (MotionType.MOVEJ, MotionType.MOVEJ_POSE),
     MoveL: (MotionType.MOVEL_JOINT, MotionType.MOVEL),
@@ -249,7 +249,7 @@ _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
     OptimoveJ: (MotionType.OPTIMOVEJ, MotionType.OPTIMOVEJ_POSE),
     OptimoveL: (MotionType.OPTIMOVEL_JOINT, MotionType.OPTIMOVEL),
 }
-#: Target is a pose, via is a pose -> motion type.
+#: (The target is a pose, the via point is a pose) -> motion type.
 _ARC_TYPES = {
     (False, False): MotionType.MOVEC_JOINT,
     (False, True): MotionType.MOVEC_JOINT_POSE,
@@ -272,7 +272,7 @@ _STOPS: dict[type[Stop], MotionType] = {
 #: Types whose word 18 is not the duration of a move.
 _WITH_DELAY = frozenset((MotionType.SWITCH_OUTPUT, *_STOPS.values()))
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
-#: The types of arcs, and of the other moves with a velocity and an acceleration.
+#: The motion types of arcs; those of all other moves with a velocity and an acceleration.
 ARC_TYPES, MOVE_TYPES = frozenset(_ARCS), frozenset(_MOVES)
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
@@ -303,7 +303,7 @@ def to_fields(primitive: Instruction) -> PointFields:
     """
     Return the 21 numbers of a primitive, in SI units.
 
-    :raises LocalProtocolError: the target is in joint positions although there is a q_near.
+    :raises LocalProtocolError: the class is unknown, or a joint target has a q_near.
     """
     kind = motion_type(primitive)
     if isinstance(primitive, SwitchOutput):
@@ -333,7 +333,7 @@ def move_fields(moves: MoveRows) -> Floats:
     """
     Return the 21 numbers of each row of moves (n, 21), in SI units.
 
-    The rows that ``moves.others`` names have no meaning.
+    The rows whose moves are in ``moves.others`` are meaningless.
     """
     fields = np.zeros((len(moves), 21))
     fields[:, 0:3] = moves.targets[:, :3]
@@ -365,7 +365,7 @@ def spline_fields(pieces: SplineRows) -> Floats:
 
 
 def are_plain_moves(moves: MoveRows) -> Flags:
-    """Return a mask (n,) of the rows that :func:`check_fields` is known to accept."""
+    """Return a mask (n,) of the rows that :func:`check_fields` certainly accepts."""
     are_plain: Flags = (moves.velocities >= 0.0) & (moves.accelerations >= 0.0)
     are_plain &= (moves.blend_radii >= 0.0) & ~np.isin(_POSE_TYPES[moves.kinds], list(_OPTIMOVES))
     are_plain[list(moves.others)] = False
@@ -391,7 +391,7 @@ def _output_fields(output: SwitchOutput) -> PointFields:
 
 def _law_fields(law: SpeedLaw) -> PointFields:
     numbers = (law.gain, law.offset, law.minimum, law.maximum, law.filter_time, 0)
-    # The value is 1: in a stop, the robot program still switches waiting outputs whose value is 0.
+    # The value is 1, because in a stop the robot program switches waiting outputs of value 0.
     switch = (FollowKind.LAW, 0, 1, 0, 1, 0)
     return (*numbers, *ZERO6, *switch, 0, 0, MotionType.SWITCH_OUTPUT)
 

@@ -20,11 +20,11 @@ to the program     double      46         time of these joint positions [s]
 to the program     double      24 - 41    path offset of a trajectory (:class:`OffsetInput`)
 from the program   int         24         actual mode
 from the program   int         25         last sequence number that the program read
-from the program   int         26         points begun of the running trajectory
+from the program   int         26         points of the running trajectory that have begun
 from the program   double      24         lag: motion time in the buffer [s]
 from the program   double      25 - 30    present path offset (:class:`OffsetOutput`)
 from the program   int         27         set-points carried out
-from the program   int         28         repetitions of set-points that the arm was not near
+from the program   int         28         set-points repeated because the arm was not near them
 from the program   int         29         sequence numbers skipped
 from the program   int         30         set-points in the buffer
 from the program   int         31         set-points lost to a full buffer
@@ -34,9 +34,9 @@ from the program   int         34         count of connections, changes with eac
 from the program   int         35         token of the last SET_SAFE_OUTPUTS that was carried out
 =================  ==========  =========  ====================================================
 
-The program's ints from 26 are ours; a program that follows the guide lacks them. The counts
+The program's ints from 26 up are ours; a program that follows the guide lacks them. The counts in
 27 to 31 start at 0 when the program enters the control mode ``BUFFERED_SERVO``. The doubles of
-path offsets are ours, too. They share numbers with the servo, which never runs in a trajectory.
+path offsets are ours, too. They share numbers with the servo's, which are unused in a trajectory.
 
 The ints 32 to 34 prove to the driver that the program is its own. The program writes them, the
 count last, when it has read the first message on the reverse socket. Register values outlive
@@ -71,7 +71,7 @@ class OutputInteger(IntEnum):
 
     ACTUAL_MODE = 24
     LAST_SEQUENCE_ID = 25
-    #: Number of points begun of the running trajectory; 0 = none.
+    #: Number of points of the running trajectory that have begun; 0 = none.
     POINTS_BEGUN = 26
     SETPOINTS_DONE = 27
     REPEATS = 28
@@ -97,21 +97,24 @@ class OffsetInput(IntEnum):
     TARGET = 24
     #: Rate at which the time of the motion runs, 0 to 1.
     RATE = 27
-    #: The axes of the path's frame, in base axes.
+    #: Axes of the path's frame: along; across; normal; each a vector in base axes.
     ALONG = 28
     ACROSS = 31
     NORMAL = 34
-    #: Bounds of the goal: offset along, across, normal [m]; speed, acceleration [m/s, m/s^2].
+    #: Largest offset along, across, normal that the goal allows [m].
     LIMITS = 37
+    #: Largest speed of the offset that the goal allows [m/s].
     SPEED = 40
+    #: Largest acceleration of the offset that the goal allows [m/s^2].
     ACCELERATION = 41
 
 
 class OffsetOutput(IntEnum):
     """Double registers that the robot program writes during a trajectory with path offsets."""
 
-    #: Present offset along, across, normal [m]; offset that the controller applies, in base [m].
+    #: Present offset along, across, normal [m].
     VALUE = 25
+    #: Offset that the controller applies, in base axes [m].
     SHIFT = 28
 
 
@@ -133,7 +136,7 @@ class SyncState(IntEnum):
 
 
 class ExternalError(IntEnum):
-    """Error that the driver reports."""
+    """Error that the driver reports to the robot program."""
 
     NONE = 0
     HALT = 1

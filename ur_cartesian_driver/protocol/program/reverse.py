@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The reverse interface: what the robot program shall do, and how long it waits for the next message.
+The reverse interface: tells the robot program what to do, and how long to wait for a message.
 
 One message is 8 big-endian int32, 32 bytes; S = 1,000,000. The robot sends nothing back.
 
@@ -27,9 +27,10 @@ The sender must
 * send the next message before the timeout in word 0, even if nothing changes (:func:`keepalive`,
   or ``TrajectoryAction.NOOP`` while a trajectory runs): a read that times out ends the robot
   program;
-* know that every FORWARD message, even NOOP, *enters* that mode, and so ends any other mode;
-* give START the number of points, and CANCEL of a stream the number of all points written since
-  STREAM_START;
+* send a FORWARD message, even NOOP, only if FORWARD is the wanted mode: the message *enters* this
+  mode, and so ends any other;
+* send the number of points with START, and the number of all points written since STREAM_START
+  with STREAM_END, or with the CANCEL of a stream;
 * end or cancel a stream before the next START; otherwise the new points extend the stream.
 
 ``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
@@ -59,7 +60,7 @@ from ur_cartesian_driver.protocol.framing import (
 class ControlMode(IntEnum):
     """Word 7: how the robot is controlled."""
 
-    #: Ends the control loop of the robot program; the program around it continues.
+    #: Ends the control loop of the robot program; the program that contains the loop continues.
     STOPPED = -2
     #: Initial value inside the robot program; never sent.
     UNINITIALIZED = -1
@@ -75,7 +76,7 @@ class ControlMode(IntEnum):
     TOOL_IN_CONTACT = 7
     TORQUE = 8
     #: Our own program only: set-points come through RTDE registers (:mod:`~.registers`), are
-    #: buffered and fed to ``servoj``; the messages here keep it alive, as in the other modes.
+    #: buffered and fed to ``servoj``; reverse messages only keep the program alive.
     BUFFERED_SERVO = 100
 
 
@@ -83,7 +84,7 @@ class TrajectoryAction(IntEnum):
     """Word 1 in FORWARD mode."""
 
     CANCEL = -1
-    #: Keep alive.
+    #: Only keeps the program alive.
     NOOP = 0
     START = 1
     STREAM_START = 2
@@ -102,7 +103,7 @@ MESSAGE_FIELDS = 8
 MESSAGE_SIZE = 4 * MESSAGE_FIELDS
 #: Word 3 of a START whose path accepts offsets.
 TAKES_OFFSETS = 1
-#: Longest time that the robot may wait for the next set-point [ms].
+#: Longest read timeout in a real-time mode, in which messages are set-points [ms].
 MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].
 STOPPED_TIMEOUT = 100
@@ -127,11 +128,11 @@ _MESSAGE = struct.Struct('>8i')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReverseMessage:
     """
-    One message as on the wire; the functions below apply the rules.
+    One message as on the wire; the functions below make messages that follow the rules.
 
     :param read_timeout: timeout of the robot's next read [ms], 0 = none.
     :param payload: words 1 to 6, unscaled.
-    :raises LocalProtocolError: a word does not fit, or the mode is never sent.
+    :raises LocalProtocolError: a word does not fit into an int32, or the mode is never sent.
     """
 
     read_timeout: int
@@ -139,7 +140,7 @@ class ReverseMessage:
     payload: MessageWords = (0, 0, 0, 0, 0, 0)
 
     def __post_init__(self) -> None:
-        """Check everything, so that no invalid message exists."""
+        """Check all words, so that no invalid message exists."""
         _refuse_internal_mode(self.mode)
         if not 0 <= self.read_timeout <= INT32_MAX:
             raise LocalProtocolError(
@@ -174,7 +175,7 @@ class ReverseMessage:
 
 
 class ReverseDecoder(RecordDecoder[ReverseMessage]):
-    """Decodes reverse messages: the robot's side."""
+    """Decodes reverse messages, as the robot does."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -183,10 +184,10 @@ class ReverseDecoder(RecordDecoder[ReverseMessage]):
 
 def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT_STEP_TIME) -> int:
     """
-    Return word 0 for a requested timeout [ms].
+    Return word 0, the timeout of the robot's next read [ms], for a requested timeout [ms].
 
-    * Real-time modes: at least one step, at most 200 ms. They cannot wait forever, because the
-      arm would continue to move.
+    * Real-time modes: at least one step, at most 200 ms. A timeout is needed, because the arm
+      would continue to move without messages.
     * IDLE, FORWARD, FREEDRIVE, BUFFERED_SERVO: 0 = none, otherwise at least one step.
     * STOPPED: always 100 ms.
 
@@ -216,7 +217,7 @@ def trajectory(
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
     :param count: number of points, for START, STREAM_END, and CANCEL of a stream.
-    :param takes_offsets: for START: path offsets come through registers.
+    :param takes_offsets: for START: whether the path accepts offsets, through registers.
     """
     mode = ControlMode.FORWARD
     return ReverseMessage(
@@ -227,7 +228,7 @@ def trajectory(
 
 
 def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
-    """Return the message that asks the robot to stand still and wait for the next one."""
+    """Return the message that asks the robot to stand still and wait for the next message."""
     mode = ControlMode.IDLE
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
 

@@ -3,8 +3,8 @@
 """
 The script command interface: single commands to the robot program, independent of its motion.
 
-A command is 28 big-endian int32, 112 bytes: word 0 is the number; the arguments and then zeros
-follow. All argument words are scaled by 1,000,000 except those marked raw.
+A command is 28 big-endian int32, 112 bytes: word 0 is its number, then come its arguments, then
+zeros. All argument words are scaled by 1,000,000 except those marked raw.
 
 ==  =========================  =================================================================
 0   command                    words 1 ..
@@ -32,7 +32,7 @@ follow. All argument words are scaled by 1,000,000 except those marked raw.
                                domains (raw)
 ==  =========================  =================================================================
 
-Only tool contact has an answer: one int32, 0 = contact, 1 = ended before a contact.
+Only START_TOOL_CONTACT is answered: one int32, 0 = contact, 1 = ended before a contact.
 
 Poses are ``x y z rx ry rz`` [m, rad], as in URScript.
 """
@@ -80,18 +80,19 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """The lifetime of a TCP; only our own robot program supports it."""
+    """How long a TCP lasts; other robot programs than ours ignore this."""
 
     #: Until another TCP is set.
     PERMANENT = 0
     #: Until RESTORE: the program remembers the previous TCP, and restores it before it ends.
     TEMPORARY = 1
-    #: End of TEMPORARY: the program restores the remembered TCP, or else sets the given one.
+    #: Ends TEMPORARY: the program restores the remembered TCP; if there is none, it sets the
+    #: given one.
     RESTORE = 2
 
 
 class SafeOutputsAction(IntEnum):
-    """What the robot program does with safe outputs; it then reports the token."""
+    """What the robot program does with safe outputs; then it reports the command's token."""
 
     #: Forget the outputs.
     DISARM = 0
@@ -124,14 +125,14 @@ SoftwareVersion: TypeAlias = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroFtSensorCommand:
-    """Take the current force as zero."""
+    """Define the present force as zero."""
 
     command: ClassVar = ScriptCommand.ZERO_FTSENSOR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPayloadCommand:
-    """Set mass [kg] and centre of gravity in the flange [m] of the payload."""
+    """Set the mass [kg] of the payload, and its centre of gravity in the flange frame [m]."""
 
     command: ClassVar = ScriptCommand.SET_PAYLOAD
     mass: float
@@ -156,10 +157,10 @@ class StartForceModeCommand:
     """
     Make the arm compliant in some axes of the task frame.
 
-    :param task_frame: pose in the base.
+    :param task_frame: its pose in the base.
     :param selection: the compliant axes.
     :param wrench: target force [N] and torque [Nm] in the compliant axes.
-    :param type: 1 to 3, transformation of the task frame.
+    :param type: how the controller transforms the task frame, 1 to 3 as in URScript.
     :param limits: speed [m/s, rad/s] in compliant axes, deviation [m, rad] in the others.
     :param damping: 0 to 1.
     :param gain_scaling: 0 to 2; has no effect on CB3.
@@ -212,7 +213,7 @@ class SetFrictionCompensationCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FtRtdeInputEnableCommand:
-    """Use forces from RTDE's ``external_force_torque``, and describe that sensor."""
+    """Set whether forces come from RTDE's ``external_force_torque``, and describe their sensor."""
 
     command: ClassVar = ScriptCommand.FT_RTDE_INPUT_ENABLE
     enabled: bool
@@ -223,7 +224,7 @@ class FtRtdeInputEnableCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetGravityCommand:
-    """Set the acceleration that opposes gravity [m/s^2]: it points away from the earth."""
+    """Set the acceleration that opposes gravity [m/s^2], which points away from the earth."""
 
     command: ClassVar = ScriptCommand.SET_GRAVITY
     gravity: Vector3
@@ -249,7 +250,7 @@ class SetFrictionScalesCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetTargetPayloadCommand:
-    """Set mass [kg], centre of gravity [m] and inertia [kg m^2] within a time [s]."""
+    """Change the payload within a time [s]: mass [kg], centre of gravity [m], inertia [kg m^2]."""
 
     command: ClassVar = ScriptCommand.SET_TARGET_PAYLOAD
     mass: float
@@ -286,7 +287,7 @@ AnyScriptCommand: TypeAlias = (
     | SetSafeOutputsCommand
 )
 
-#: First software versions with a command: PolyScope 3 to 5 (CB3 and e-Series), PolyScope X.
+#: First software versions that have a command: of PolyScope 3 to 5; of PolyScope X.
 MIN_VERSIONS: Mapping[ScriptCommand, tuple[SoftwareVersion, SoftwareVersion]] = {
     ScriptCommand.SET_FRICTION_COMPENSATION: ((5, 23, 0), (10, 10, 0)),
     ScriptCommand.SET_FRICTION_SCALES: ((5, 25, 1), (10, 12, 1)),
@@ -297,8 +298,8 @@ def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = No
     """
     Return the 112 bytes of a command.
 
-    :param robot_version: the robot's software, to refuse commands that it lacks; None = unknown.
-    :raises LocalProtocolError: a value cannot be sent, or the software is too old.
+    :param robot_version: software of the robot, which may lack the command; None = not checked.
+    :raises LocalProtocolError: a value cannot be sent, or the software lacks the command.
     """
     if robot_version is not None:
         _check_version(command.command, robot_version)
@@ -308,9 +309,9 @@ def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = No
 
 def decode(data: bytes) -> AnyScriptCommand:
     """
-    Return the command that 112 bytes encode; words after its arguments are ignored.
+    Return the command that 112 bytes encode; words after the arguments are ignored.
 
-    :raises RemoteProtocolError: size, number or an argument is impossible.
+    :raises RemoteProtocolError: the size, the number of the command or an argument is invalid.
     """
     number, *words = _COMMAND.unpack(checked_size(data, COMMAND_SIZE, 'script command'))
     try:
@@ -320,7 +321,7 @@ def decode(data: bytes) -> AnyScriptCommand:
 
 
 class ScriptCommandDecoder(RecordDecoder[AnyScriptCommand]):
-    """Decodes script commands: the robot's side."""
+    """Decodes script commands, as the robot does."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -362,8 +363,8 @@ class _Words:
     An argument on the wire.
 
     :param count: number of words.
-    :param encode: turns value and name into words.
-    :param decode: turns words and name into the value.
+    :param encode: turns the value, and the field's name for errors, into words.
+    :param decode: turns words, and the field's name for errors, into the value.
     """
 
     count: int
@@ -390,7 +391,7 @@ def _as_int(value: float, field: str) -> int:
     return int(value)
 
 
-#: Index of the first digital output of each kind on the wire; the analog outputs come after all.
+#: Index of the first digital output of each kind on the wire; analog outputs follow digital ones.
 FIRST_DIGITAL_OUTPUT = {
     OutputKind.STANDARD_DIGITAL: 0,
     OutputKind.CONFIGURABLE_DIGITAL: 8,
@@ -412,7 +413,7 @@ def _safe_output_words(outputs: SafeOutputs) -> list[int]:
 
 
 def _safe_outputs(words: Sequence[int]) -> SafeOutputs:
-    """Return the outputs that are named; the wire does not carry whether they are restored."""
+    """Return the outputs that words name; whether these are restored is not on the wire."""
     digital = (
         SafeOutput(output=kind, pin=i - first, value=float(words[i]))
         for kind, first in FIRST_DIGITAL_OUTPUT.items()
@@ -451,7 +452,8 @@ _ARGUMENTS: Mapping[str, _Words] = {
     ),
     'Vector3': _vector(3),
     'Vector6': _VECTOR6,
-    # URCL clamps these values, although it refuses others; our bytes have to equal URCL's.
+    # URCL clamps these values, but refuses invalid values of other fields; our bytes have to
+    # equal URCL's.
     'Fractions6': _Words(
         6,
         lambda values, name: _VECTOR6.encode([min(max(v, 0.0), 1.0) for v in values], name),

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 r"""
-The script sender: how the External Control URCap fetches the robot program.
+The script sender, from which the External Control URCap fetches the robot program.
 
 ::
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The trajectory point interface: motion primitives go to the robot program, one result comes back.
+The trajectory point interface: points go to the robot program, which answers with a result.
 
 A point is 21 big-endian int32, 84 bytes: the numbers of
 :mod:`~ur_cartesian_driver.protocol.program.point_fields`, scaled. :func:`encode_point` and
@@ -16,9 +16,11 @@ The sender must
 * send the next point in time: the robot waits 0.5 s for it, but only one controller step while a
   spline moves. A late point means ``TrajectoryResult.FAILURE``;
 * keep sending reverse messages meanwhile, or the program halts;
-* end at rest. The robot sets the blend radius of the last point of a counted trajectory to 0.
+* end the trajectory at rest. After a START with their number, the robot sets the blend radius of
+  the last point to 0.
 
-The result is one int32: 0 success, 1 canceled, 2 failure. It comes in a TCP segment of its own.
+The result of a trajectory is one int32: 0 success, 1 canceled, 2 failure. It comes in a TCP
+segment of its own.
 """
 
 from __future__ import annotations
@@ -63,7 +65,7 @@ POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 
 _POINT = struct.Struct(f'>{POINT_FIELDS}i')
-#: Points encoded at once: large enough for numpy, small enough for the cache.
+#: Number of points encoded at once: large enough for numpy, small enough for the cache.
 _CHUNK = 4096
 #: Factors of words 0 to 17.
 _MOVE_SCALES = (FIXED_POINT,) * 18
@@ -95,7 +97,8 @@ def encode_points(instructions: Iterable[Instruction], dialect: Dialect = NEWEST
     """
     Return the bytes of many primitives and outputs, like :func:`encode_point` but faster.
 
-    :raises LocalProtocolError: a value cannot be sent; the text names point (from 0) and bound.
+    :raises LocalProtocolError: a value cannot be sent; the text gives the point's index
+        (from 0) and the bound.
     """
     fields = [_checked_fields(each, i, dialect) for i, each in enumerate(instructions)]
     return _encode_rows(np.array(fields, dtype=np.float64).reshape(-1, POINT_FIELDS), dialect)
@@ -105,7 +108,8 @@ def encode_plan(plan: Plan) -> bytes:
     """
     Return the bytes of a plan, for the robot program for which the plan was made.
 
-    :raises LocalProtocolError: a value cannot be sent; the text names record (from 0) and bound.
+    :raises LocalProtocolError: a value cannot be sent; the text gives the record's index
+        (from 0) and the bound.
     """
     return encode_rows(plan.rows, DIALECTS.get(plan.older_program, NEWEST_DIALECT))
 
@@ -114,7 +118,8 @@ def encode_rows(rows: PlannedRows, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
     Return the bytes of a plan's segments, like :func:`encode_points` but from columns.
 
-    :raises LocalProtocolError: a value cannot be sent; the text names record (from 0) and bound.
+    :raises LocalProtocolError: a value cannot be sent; the text gives the record's index
+        (from 0) and the bound.
     """
     moves, records = rows.primitives, rows.records
     first = np.cumsum(records) - records

@@ -19,12 +19,12 @@ dialect  library        time scale  motion types         words 6 - 17 of moves  
 Types from 200 on switch outputs, or act while the arm stands still. Only our own robot program
 knows them; the library's programs skip them silently.
 
-"Moves" are all types except MOVEC* and SPLINE, whose words never changed. However, programs before
-2.12 swap velocity and acceleration of an arc when they read them, although the library of their
-time wrote them in today's order; the driver sends them in the order in which these programs read.
-Blend radii have the time scale, too. With a scale of 1000, times are whole milliseconds and radii
-whole millimetres. (The library of that time truncated times; we round them, which no program can
-notice.)
+"Moves" are the types 0 to 13 except MOVEC* (arcs); the words of arcs and SPLINE never changed.
+However, programs before 2.12 swap velocity and acceleration of an arc when they read them, while
+the library of their time wrote them in today's order; the driver sends the order in which these
+programs read. Blend radii have the time scale, too. With a scale of 1000, times are whole
+milliseconds and radii whole millimetres. (The library of that time truncated times; we round them,
+which no program can notice.)
 
 Types 4 and 5 came with 2.2, so dialect 2.0 omits them: a program silently skips a type that it
 does not know. On the reverse socket only the stream actions differ. It is not recorded which
@@ -65,7 +65,7 @@ _Lengths = TypeVar('_Lengths', float, Floats)
 _FIRST_TYPES = frozenset((*map(MotionType, range(4)), MotionType.SPLINE))
 _OPTIMOVES = frozenset((MotionType.OPTIMOVEJ, MotionType.OPTIMOVEL))
 _LIBRARY_TYPES = ARC_TYPES | MOVE_TYPES | {MotionType.SPLINE}
-#: For programs before 2.12: the index in today's order of each word of a move, and of an arc.
+#: The words of a move, and of an arc, for programs before 2.12, as indices in today's order.
 _OLD_MOVE = (*range(6), *(PointField.VELOCITY,) * 6, *(PointField.ACCELERATION,) * 6, 18, 19, 20)
 _OLD_ARC = (*range(12), PointField.ACCELERATION, PointField.VELOCITY, *range(14, 21))
 
@@ -75,11 +75,11 @@ class Dialect:
     """One row of the table."""
 
     name: str
-    #: Factor of times [s] and blend radii [m].
+    #: Factor by which times [s] and blend radii [m] are multiplied.
     time_scale: int = FIXED_POINT
     #: Motion types that a program of this dialect runs; it silently skips all others.
     motion_types: frozenset[MotionType]
-    #: Words 6 - 14 of a move are q_near, velocity, acceleration and flag.
+    #: Words 6 - 14 of a move are q_near, velocity, acceleration and the flag of q_near.
     supports_q_near: bool = False
     #: A trajectory may have an open end (STREAM_START, STREAM_END).
     supports_append: bool = False
@@ -89,12 +89,12 @@ class Dialect:
 
     @property
     def older_program(self) -> str:
-        """The dialect of a program that is not the driver's own; '' = the driver's own."""
+        """Name of the dialect if the program is not the driver's own; '' = it is."""
         return '' if self.is_own else self.name
 
     @property
     def max_duration(self) -> float:
-        """The longest duration that fits [s]."""
+        """The longest duration that fits into a word [s]."""
         return INT32_MAX / self.time_scale
 
     @property
@@ -108,7 +108,7 @@ class Dialect:
         return self.time_scale < FIXED_POINT
 
     def round_down_radius(self, radius: _Lengths) -> _Lengths:
-        """Return the largest radius on the wire that does not exceed the given one [m]."""
+        """Return the largest radius [m] on the wire that does not exceed the given one [m]."""
         if not self.is_coarse:
             return radius
         # Without 1e-6, 29 mm would become 28 mm: 0.029 * 1000 is a little less than 29.
@@ -152,7 +152,7 @@ class Dialect:
         check_fields(fields)
 
     def accepts(self, fields: Floats) -> Flags:
-        """Return a mask (n,) of the rows (n, 21) whose type and duration are surely accepted."""
+        """Return a mask (n,) of the rows (n, 21) whose type and duration are certainly valid."""
         kinds, durations = fields[:, PointField.TYPE].astype(int), fields[:, PointField.DURATION]
         accepted = np.isin(kinds, list(self.motion_types))
         accepted &= (durations == 0.0) | (durations >= self.min_duration)
@@ -192,7 +192,7 @@ class Dialect:
         return LocalProtocolError(f'{what} does not exist in wire dialect {self.name}.')
 
 
-#: By name, oldest first.
+#: All dialects by name, oldest first.
 DIALECTS: Mapping[str, Dialect] = MappingProxyType(
     {
         dialect.name: dialect

@@ -24,8 +24,8 @@ after each ``feed()``, and gives up when ``state`` does not change for too long 
 answers within a second).
 
 Real controllers send text messages at any time, and may send data before the reply to S; a data
-package is therefore taken as that reply. In each state, up to five other unexpected packages are
-reported and tolerated.
+package is therefore taken as that reply. In each state of the handshake, up to five other
+unexpected packages are reported and tolerated.
 
 The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
 of the connection is in `rtde_server`.
@@ -63,7 +63,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: Unexpected packages that are tolerated in each state of the handshake.
+#: Number of unexpected packages that are tolerated in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5
 
 
@@ -71,7 +71,7 @@ class FieldsNotFound(RemoteProtocolError):
     """The controller lacks a required field."""
 
     def __init__(self, kind: str, names: Sequence[str], version: ControllerVersion) -> None:
-        """Build the sentence from the names and the controller's version."""
+        """Build the error text from the names and the controller's version."""
         super().__init__(
             f'The robot does not know the RTDE {kind} {", ".join(names)}; its software is '
             f'{version}, which may be too old.'
@@ -83,7 +83,7 @@ class InputsInUse(RemoteProtocolError):
     """Another client or fieldbus writes a required input."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Build the sentence from the names."""
+        """Build the error text from the names."""
         super().__init__(
             f'The RTDE inputs {", ".join(names)} are in use by another client; end it, or disable '
             'EtherNet/IP, PROFINET or MODBUS in the installation of the robot.'
@@ -109,10 +109,10 @@ class HandshakeDone:
     """
     The handshake is done; data follow.
 
-    :param frequency: requested, or the highest [Hz]; protocol version 1 cannot choose it.
-    :param outputs: content of the data packages.
+    :param frequency: requested or highest frequency [Hz]; protocol version 1 cannot request one.
+    :param outputs: the fields of the data packages.
     :param missing: optional outputs that this controller lacks.
-    :param inputs: one recipe for each group, to ``pack`` values.
+    :param inputs: one recipe for each group of inputs; its ``pack`` encodes their values.
     """
 
     protocol_version: int
@@ -161,7 +161,7 @@ class RtdeClientCodec:
 
         :param outputs: names of the outputs to stream, in order.
         :param inputs: names of the inputs to write, in one package.
-        :param frequency: [Hz]; 0 = the highest of the controller.
+        :param frequency: rate of the packages [Hz]; 0 = the controller's highest.
         :param optional_outputs: outputs that the controller may lack.
         :param input_groups: further groups of inputs, each written in its own package.
         :raises LocalProtocolError: no outputs, a duplicate name, or an impossible frequency.
@@ -193,7 +193,7 @@ class RtdeClientCodec:
         """
         Start the handshake and return the first bytes to send.
 
-        :raises LocalProtocolError: it has already started.
+        :raises LocalProtocolError: the handshake has already started.
         """
         if self.state is not RtdeState.NEW:
             raise LocalProtocolError('An RtdeClientCodec serves one connection; make a new one.')
@@ -260,7 +260,7 @@ class RtdeClientCodec:
     def _handlers(
         self,
     ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
-        """Return the expected package and its handler for each state."""
+        """Return the expected type of package, and its handler, for each state."""
         return {
             RtdeState.PROTOCOL_VERSION: (
                 PackageType.REQUEST_PROTOCOL_VERSION,
@@ -347,7 +347,7 @@ class RtdeClientCodec:
         return self._request_inputs()
 
     def _request_inputs(self) -> list[RtdeEvent]:
-        """Request the next group of inputs, or start when all are agreed."""
+        """Request the next group of inputs, or start the data when all groups are agreed."""
         if len(self._inputs) < len(self._groups):
             return self._send_request(
                 RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)])
@@ -401,7 +401,7 @@ def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
 
 def _type(name: str, text: str, expected_type: DataType | None) -> DataType:
     """
-    Return the type that the controller gave.
+    Return the type that the controller gave for a field.
 
     If the text is not a type (the manufacturer's test server repeats the names), the expected type
     is assumed.

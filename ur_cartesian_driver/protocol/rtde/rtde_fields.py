@@ -3,7 +3,7 @@
 """
 Names and types of all RTDE fields, and the first software versions of newer fields.
 
-Software answers ``NOT_FOUND`` for a field that it does not have.
+A controller answers ``NOT_FOUND`` for a field that its software does not have.
 """
 
 from __future__ import annotations
@@ -117,8 +117,9 @@ OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     }
 )
 
-#: First software versions with some fields, for CB3 (None = never) and e-Series, as far as the
-#: manufacturer's guide dates them. The registers here are for clients other than field buses.
+#: First software version of CB3 (None = never) and of e-Series with some fields, and the pattern
+#: of their names, as far as the manufacturer's guide dates them. The registers in this table are
+#: those for clients other than fieldbuses.
 _INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
     ((3, 5), (5, 0), r'elbow_(position|velocity)'),
     ((3, 9), (5, 3), r'\w+_bit_register_\d+|\w+_(int|double)_register_(2[4-9]|[34]\d)'),
@@ -131,7 +132,7 @@ _INTRODUCED: tuple[tuple[tuple[int, ...] | None, tuple[int, ...], str], ...] = (
 
 
 def fields_of(types: Mapping[str, DataType], version: tuple[int, ...]) -> dict[str, DataType]:
-    """Return the outputs, or inputs, that a software version has."""
+    """Return the fields of ``types`` that a software version has."""
     missing = [
         re.compile(pattern)
         for cb3, e_series, pattern in _INTRODUCED

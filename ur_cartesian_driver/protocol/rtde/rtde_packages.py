@@ -25,9 +25,9 @@ Names and types are texts separated by commas. Instead of a type the controller 
 ``NOT_FOUND`` for a field that it lacks, or ``IN_USE`` for an input that another client already
 writes; then the recipe id is 0.
 
-Obligations of a controller towards the manufacturer's library: send a frame in one piece of less
-than 4092 bytes; answer V and v within a second; send no text message between the reply to the
-first S and P.
+The manufacturer's client library relies on the controller to send a frame in one piece of less
+than 4092 bytes, to answer V and v within a second, and to send no text message between the reply
+to the first S and P.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _VERSION = struct.Struct('>4I')
 
 
 class RtdeFrameBuffer(FrameBuffer):
-    """Cuts an RTDE stream into frames; the size field bounds them to 65535 bytes."""
+    """Cuts an RTDE stream into frames; the size field limits a frame to 65535 bytes."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -72,7 +72,7 @@ class RtdeFrameBuffer(FrameBuffer):
 
 
 class _Package:
-    """A package of one type."""
+    """Base class of packages with a fixed type."""
 
     __slots__ = ()
     type: ClassVar[PackageType]
@@ -305,7 +305,7 @@ def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeR
     Return the request in one frame of a client.
 
     :param version: the agreed protocol version.
-    :raises RemoteProtocolError: type or length is impossible.
+    :raises RemoteProtocolError: the type or the length is impossible.
     """
     kind, payload = _split_frame(data)
     match kind:
@@ -336,7 +336,7 @@ def decode_reply(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeRep
     Return the reply in one frame of a controller.
 
     :param version: the agreed protocol version.
-    :raises RemoteProtocolError: type or length is impossible.
+    :raises RemoteProtocolError: the type or the length is impossible.
     """
     kind, payload = _split_frame(data)
     match kind:

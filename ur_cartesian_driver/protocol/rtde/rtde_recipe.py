@@ -72,10 +72,9 @@ class Recipe:
 
     def unpack(self, payload: bytes) -> RtdeValues:
         """
-        Return the values of a data package without its first three bytes; vectors are tuples.
+        Return the values in a data package; vectors are tuples.
 
-        The recipe id is not checked: some controllers send a different one than agreed.
-
+        :param payload: the package without its first three bytes (size and type).
         :raises RemoteProtocolError: the size of the package is not that of the recipe.
         """
         if len(payload) != self._size:
@@ -83,13 +82,14 @@ class Recipe:
                 f'An RTDE data package of this recipe has {self._size} bytes, but {len(payload)} '
                 f'arrived: {hex_text(payload)}.'
             )
+        # The recipe id is not checked: some controllers send a different one than agreed.
         flat = self._struct.unpack(payload)
         if self._pick is None:
             return flat if len(flat) == 1 else (flat,)
         return cast(RtdeValues, self._pick(flat))
 
     def unpack_frame(self, data: bytes) -> RtdeValues | None:
-        """Return the values of exactly one frame; None for other bytes, or a one-field recipe."""
+        """Return the values in one whole frame; None for other bytes, or a one-field recipe."""
         if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
             return None
         return cast(RtdeValues, self._pick(self._struct.unpack_from(data, HEADER.size)))
@@ -99,7 +99,7 @@ class Recipe:
         Return the whole frame of a data package.
 
         :param values: in the order of the recipe; vectors as tuples.
-        :raises LocalProtocolError: count, length or range of the values is wrong.
+        :raises LocalProtocolError: the number, a length or the range of the values is wrong.
         """
         flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
         value: Any  # a number has no length: caught below

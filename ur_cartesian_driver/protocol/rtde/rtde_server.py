@@ -4,17 +4,18 @@
 The RTDE server: the controller's end of one connection.
 
 The codec answers requests as a controller does and keeps the agreed recipes. Its owner has the
-clock, and decides when to send data packages, and their values::
+clock, and decides when to send data packages, and with which values::
 
     for data in socket: events = server.feed(data); socket.send(server.data_to_send())
     if server.streaming and server.output: socket.send(server.output.recipe.pack(values))
 
-* A client has one output recipe; the manufacturer's guide mentions no more, in either version. A
-  new recipe replaces it.
-* An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
-* An input belongs to one client; the others receive ``IN_USE``. That client may use the input in
-  several recipes, one for each kind of command that it sends. All connections share the set of
-  taken names; ``close()`` releases those of this connection.
+* A client has one output recipe; the manufacturer's guide mentions no more, in either protocol
+  version. A new recipe replaces it.
+* An unknown field makes the whole recipe invalid: the reply has ``NOT_FOUND`` as its type, and id
+  0, and nothing is agreed.
+* An input belongs to one client, which may use it in several recipes, one for each kind of command
+  that it sends; other clients receive ``IN_USE``. All connections share the set of taken names;
+  ``close()`` releases the names of this connection.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ MAX_RECIPES = 255
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputStream:
-    """A recipe that a client receives, and its frequency [Hz]."""
+    """The recipe of the outputs that a client receives, and their frequency [Hz]."""
 
     recipe: Recipe
     frequency: float
@@ -101,7 +102,7 @@ class RtdeServerCodec:
 
     @property
     def protocol_version(self) -> int:
-        """Return the agreed version."""
+        """Return the agreed protocol version."""
         return self._protocol
 
     def data_to_send(self) -> bytes:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Carries out one experiment: records, runs the program, and returns the tool to its start."""
+"""Carries out one experiment: records, runs the program, and moves the tool back."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ RECORDED = (
     'timestamp', 'target_q', 'actual_q', 'target_TCP_pose', 'actual_TCP_pose', 'target_TCP_speed',
     'speed_scaling', 'target_speed_fraction', 'runtime_state', 'safety_mode',
 )  # fmt: skip
-#: Longest time until a program moves the arm, and until it ends [s].
+#: Longest time until a program moves the arm [s]; until the program ends [s].
 START_TIMEOUT, END_TIMEOUT = 3.0, 30.0
 #: Time recorded before and after the motion [s].
 MARGIN = 0.3
-#: Largest distance from the start at which the tool need not be brought back [m].
+#: The tool is moved back if it ends farther than this from its start [m].
 NEAR = 1e-4
 _SAFE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
 
 async def motion_refusal(address: RobotAddress) -> str:
     """
-    Return the reason why the arm must not be moved now, as a clause; empty = it may be moved.
+    Return a clause that says why the arm must not be moved now; empty = it may be moved.
 
     :raises OSError: the robot does not answer.
     """
@@ -66,9 +66,10 @@ async def run_experiment(address: RobotAddress, experiment: Experiment) -> Motio
     """
     Run the motion of an experiment, and return the recorded samples.
 
-    In any case, the program is stopped at the end, and the slider is restored.
+    At the end, even after an error, the program is stopped and the slider is restored.
 
-    :raises OSError: the robot is lost, stops, or does not carry out the motion.
+    :raises OSError: a connection fails, the safety system stops the robot, the slider or the arm
+        does not move, or the program does not end.
     """
     recorder = RtdeRecorder(RECORDED, address.host, address.rtde_port)
     probe = PrimaryProbe()
@@ -102,7 +103,7 @@ async def _run(
 
 
 async def _move(experiment: Experiment, recorder: RtdeRecorder, probe: PrimaryProbe) -> float:
-    """Run the program; return the controller's time [s] of the stop command, or NaN."""
+    """Run the program; return the stop command's time by the controller's clock [s], or NaN."""
     await asyncio.sleep(MARGIN)
     stop_sent = float('nan')
     await _start(recorder, probe, program(experiment.check, experiment.script))
@@ -169,7 +170,7 @@ def _samples(recorder: RtdeRecorder, stop_sent: float) -> MotionSamples:
 
 
 def _distance(recorder: RtdeRecorder, name: str) -> Floats:
-    """Return the distances of a pose from the first one (n,) [m]."""
+    """Return the distances (n,) [m] of the recorded positions of a pose from the first one."""
     positions = recorder.column(name)[:, :3]
     distances: Floats = np.linalg.norm(positions - positions[0], axis=1)
     return distances

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Small motions that reveal the controller's laws of motion, and the analyses of their recordings.
+Small motions that reveal how the controller moves the arm, and the analyses of their recordings.
 
 Each motion is slow and short and begins at the present pose, to which the tool then returns. The
 analyses are pure: samples in, a sentence and numbers out.
@@ -19,20 +19,21 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats
 from ur_cartesian_driver.robot.check.finding import Finding, note, ok
 
-#: Speed and acceleration of joint motions [rad/s, rad/s^2], and of tool motions [m/s, m/s^2].
+#: Speed and acceleration: of joint motions [rad/s, rad/s^2]; of tool motions [m/s, m/s^2].
 JOINT_SPEED, JOINT_ACCELERATION = 0.2, 0.5
 TOOL_SPEED, TOOL_ACCELERATION = 0.05, 0.5
 WRIST_TURN, TOOL_TURN = radians(5.0), radians(10.0)
 TIMED_DISTANCE, TIMED_TIME = 0.02, 2.0
 STOP_DISTANCE = 0.06
-#: Largest extra time of a motion with which a program begins: one start ramp [s].
+#: Largest time by which the start of a program may prolong its first motion [s].
 MAX_START_COST = 0.1
-#: The slider in its experiment.
+#: Fraction at which the speed slider is during the experiment ``slider``.
 SLIDER = 0.5
-#: Length of the path offset, and of the line after it [m]; speed of both [m/s]; time of the rest
-#: after each [s].
+#: Experiment ``path_offset``: length of the offset, and of the line that follows [m]; speed of
+#: both motions [m/s]; pause after each motion [s].
 OFFSET, OFFSET_SPEED, OFFSET_REST = 0.004, 0.01, 0.4
-#: Largest difference of equal heights [m]; speed below which a filtered offset is at rest [m/s].
+#: Difference below which two heights are equal [m]; speed below which the tool is at rest [m/s],
+#: although the filter of the path offset may still move it a little.
 SAME_HEIGHT, RESTING_SPEED = 3e-4, 1e-4
 
 
@@ -41,13 +42,13 @@ class MotionSamples:
     """
     Samples of a recorded motion, one row per cycle.
 
-    :param time: clock of the controller (n,) [s].
-    :param target_q: (n, 6) [rad].
-    :param actual_q: (n, 6) [rad].
-    :param tool_speed: of the target TCP (n,) [m/s].
+    :param time: time by the controller's clock (n,) [s].
+    :param target_q: target joint positions (n, 6) [rad].
+    :param actual_q: measured joint positions (n, 6) [rad].
+    :param tool_speed: speed of the target TCP (n,) [m/s].
     :param scaling: speed_scaling (n,).
     :param fraction: target_speed_fraction (n,).
-    :param stop_sent: time of the stop command, by the same clock [s]; NaN = none was sent.
+    :param stop_sent: time of the stop command by the controller's clock [s]; NaN = none was sent.
     """
 
     time: Floats
@@ -57,8 +58,9 @@ class MotionSamples:
     scaling: Floats
     fraction: Floats
     stop_sent: float = float('nan')
-    #: Distances of the target TCP and the measured TCP from their first positions (n,) [m].
+    #: Distances of the target TCP from its first position (n,) [m].
     target_distance: Floats = field(default_factory=lambda: np.empty(0))
+    #: Distances of the measured TCP from its first position (n,) [m].
     actual_distance: Floats = field(default_factory=lambda: np.empty(0))
 
     def as_lists(self) -> dict[str, Any]:
@@ -74,7 +76,7 @@ class MotionSamples:
 
     @property
     def duration(self) -> float:
-        """The time from the first to the last step of the target [s]; 0 = no motion."""
+        """The time from the first to the last motion of the target [s]; 0 = no motion."""
         rows = np.flatnonzero(self.moving)
         return float(self.time[rows[-1]] - self.time[rows[0] - 1]) if len(rows) else 0.0
 
@@ -82,16 +84,17 @@ class MotionSamples:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
     """
-    A motion, and the question that it settles.
+    A motion that settles a question about the controller.
 
     :param check: name in the report and in doc/robot_program.md.
-    :param motion: what moves, how far and how fast; a sentence for the person who has to agree.
-    :param script: body of the program that moves the arm.
-    :param analyse: derives the finding from the samples.
-    :param slider: the speed slider during the motion; None = unchanged.
+    :param motion: sentence about what moves, how far and how fast, for a person who has to agree.
+    :param script: URScript body of the program that moves the arm.
+    :param analyse: derives the finding from the samples of the motion.
+    :param slider: fraction of the speed slider during the motion; None = unchanged.
     :param stop_after: time from the start of the motion to the stop command, by the controller's
         clock [s]; None = no stop command.
-    :param feature: entry of ``program.render.FEATURES`` that the software needs; empty = none.
+    :param feature: key in ``program.render.FEATURES`` of a feature that the controller's software
+        must have; empty = none.
     """
 
     check: str
@@ -104,7 +107,7 @@ class Experiment:
 
 
 def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:
-    """Return the time of a motion that accelerates, cruises and brakes [s]."""
+    """Return the duration [s] of a motion that accelerates, cruises if it can, and brakes."""
     if distance * acceleration < speed**2:
         return float(2.0 * np.sqrt(distance / acceleration))
     return distance / speed + speed / acceleration
@@ -139,7 +142,12 @@ def _turn(samples: MotionSamples) -> Finding:
 
 
 def _timed_line(samples: MotionSamples) -> Finding:
-    """Distinguish a stretched trapezoid (peak 2 d/T, without cruising) from thirds (1.5 d/T)."""
+    """
+    Find the law by which the controller meets the time T for a line of length d.
+
+    A stretched trapezoid, here one without cruising, has the peak speed 2 d/T. Thirds, which
+    accelerate, cruise and brake for equally long, have the peak speed 1.5 d/T.
+    """
     peak = float(samples.tool_speed.max()) * TIMED_TIME / TIMED_DISTANCE
     law = _nearest(peak, {'t stretches the trapezoid': 2.0, 't makes thirds': 1.5})
     text = (
@@ -193,7 +201,7 @@ def _program_stop(samples: MotionSamples) -> Finding:
 
 
 def _path_offset(samples: MotionSamples) -> Finding:
-    """Check the heights at which the tool rests: with an offset, then a line, and after both."""
+    """Check where the tool rests: after the offset, the line, and the end of the offset."""
     heights = _resting_heights(samples)
     both = 2.0 * OFFSET
     off = np.abs(samples.target_distance - samples.actual_distance)
@@ -214,7 +222,7 @@ def _path_offset(samples: MotionSamples) -> Finding:
 
 
 def _resting_heights(samples: MotionSamples) -> list[float]:
-    """Return the distances of the target from its start at its successive rests [m]."""
+    """Return the distances [m] of the target TCP from its start wherever it rests, in order."""
     speeds = np.abs(np.gradient(samples.target_distance, samples.time))
     moving = np.flatnonzero(speeds > RESTING_SPEED)
     ends = np.append(moving, len(samples.time))

@@ -49,7 +49,7 @@ class RobotAddress:
 
 
 def ok(check: str, text: str, **data: Any) -> Finding:
-    """Return a finding that is as expected."""
+    """Return a finding that matches the expectation."""
     return Finding(check=check, verdict=Verdict.OK, text=text, data=data)
 
 

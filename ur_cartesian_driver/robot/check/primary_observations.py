@@ -78,7 +78,7 @@ class PrimaryProbe:
 
     def send(self, program: bytes) -> bool:
         """
-        Send a program or a command; False if the connection is gone.
+        Send a program or a command; return False if the connection is gone.
 
         If the connection is read-only, the client reconnects and sends the request once more
         before it reports a refusal.
@@ -164,7 +164,7 @@ def _limits(configuration: ConfigurationData) -> Finding:
 
 
 def _calibration(model: str, geometry: DhTable | None, state: Mapping[str, Any]) -> Finding:
-    """Compare the reported pose with the kinematics, as the driver does before it moves."""
+    """Compare the reported pose with that of the kinematics, as the driver does before goals."""
     if geometry is None or 'actual_q' not in state:
         return skipped('calibration', 'The robot did not report its calibration')
     try:

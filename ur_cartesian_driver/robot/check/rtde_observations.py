@@ -27,7 +27,7 @@ from ur_cartesian_driver.robot.check.rtde_recorder import RtdeRecorder
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.robot.rtde.state_decoding import REQUIRED_FIELDS
 
-#: Oldest software for the robot program, by major version: the first that can add lists.
+#: Oldest software that runs the robot program, by major version: the first that can add two lists.
 MIN_VERSIONS = {3: (3, 14, 3), 5: (5, 9, 4)}
 #: Outputs to record in addition to the driver's own recipe.
 EXTRA_OUTPUTS = ('target_speed_fraction', 'payload', 'payload_cog', 'payload_inertia')
@@ -38,7 +38,7 @@ INPUT_GROUPS: Mapping[str, tuple[str, ...]] = {
     'SERVO registers': tuple(SERVO_INPUTS),
     'path offset registers': tuple(OFFSET_INPUTS),
 }
-#: How long to try to get the inputs of a closed connection [s]; the driver tries for 0.2 s.
+#: How long this check tries to get the inputs of a closed connection [s]; a goal tries for 0.2 s.
 RELEASE_TIMEOUT = 2.0
 #: Longest pause between two packets that leaves margin to the timeout of the robot program [s].
 MAX_GAP = 0.1
@@ -49,7 +49,7 @@ REST_SPEED = 5e-3
 async def observe_rtde(
     recorder: RtdeRecorder, version: ControllerVersion, seconds: float
 ) -> list[Finding]:
-    """Return the findings from a recording of the stream for some seconds."""
+    """Return the findings after recording the stream for a number of seconds."""
     await asyncio.sleep(seconds)
     findings = [_software(version), _outputs(recorder), _stream(recorder, version)]
     if recorder.rows:
@@ -172,7 +172,7 @@ def _is_idle(recorder: RtdeRecorder) -> bool:
 
 
 async def observe_inputs(address: RobotAddress) -> AsyncIterator[Finding]:
-    """Request the inputs, write nothing, and measure how soon they are free again."""
+    """Request the inputs without writing them; measure how soon the robot frees them again."""
     taken = {}
     for purpose, names in INPUT_GROUPS.items():
         try:

@@ -22,9 +22,9 @@ class RtdeRecorder:
 
     def __init__(self, names: Sequence[str], host: str, port: int) -> None:
         """
-        Prepare.
+        Prepare; :meth:`open` connects.
 
-        :param names: RTDE outputs, of which the robot may lack all but ``timestamp``.
+        :param names: RTDE outputs to record; the robot may lack any of them except ``timestamp``.
         """
         self.names: tuple[str, ...] = ()
         self.rows: list[RtdeValues] = []
@@ -44,7 +44,7 @@ class RtdeRecorder:
         """
         Begin recording, and return the software version of the controller.
 
-        :raises OSError: nothing answers, or something that is not a robot.
+        :raises OSError: nothing answers, or what answers is not a robot.
         """
         return await self._connection.open(*self._address)
 
@@ -63,7 +63,7 @@ class RtdeRecorder:
         return dict(zip(self.names, self.rows[-1], strict=True)) if self.rows else {}
 
     def column(self, name: str) -> Floats:
-        """Return the values of an output, (n,) or (n, 6); NaN if the robot lacks it."""
+        """Return the values of an output: (n,), or (n, m) of vectors; NaN (n,) if missing."""
         if name not in self.names:
             return np.full(len(self.rows), np.nan)
         i = self.names.index(name)
@@ -73,7 +73,7 @@ class RtdeRecorder:
         """
         Wait until the newest row meets a condition; return whether it did within a time [s].
 
-        :raises OSError: the connection ended.
+        :raises OSError: the connection ended before that.
         """
         ended = asyncio.create_task(self._connection.ended())
         end = asyncio.get_running_loop().time() + time

@@ -3,8 +3,8 @@
 """
 The first start of the robot program: when the arm is ready, and no other program runs.
 
-Later the driver starts nothing by itself: a person has switched the robot on, or has stopped it,
-and decides when the program may run.
+Later the driver starts nothing by itself: a person who has switched the robot on, or has stopped
+it, decides when the program may run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class ProgramAutoStart:
         Prepare; nothing happens before :meth:`review`.
 
         :param pending: whether the program may be started on the first connection.
-        :param power_up: switches the arm on and releases its brakes; False = no connection.
+        :param power_up: switches the arm on and releases its brakes; returns False if
+            there is no connection.
         :param upload: sends the robot program.
         :param warn: takes a line for the log.
         """

@@ -85,9 +85,10 @@ class ProgramControl:
 
     def send_primary(self, command: primary.PrimaryCommand, is_wanted: Callable[[], bool]) -> bool:
         """
-        Send a command to the primary interface; False = there is no connection.
+        Send a command to the primary interface; return False if there is no connection.
 
-        :param is_wanted: returns whether to send it again, if the connection was read-only.
+        :param is_wanted: returns whether to send the command again if the connection was
+            read-only.
         """
         return self._primary.send(primary.encode_command(command), is_wanted)
 

@@ -59,14 +59,14 @@ class ProgramSockets:
         self._listener = listener
         #: The robot program, for the script sender; empty = the robot runs a saved program.
         self.text = ''
-        #: Random number by which we recognise our program, not 0.
+        #: Random number, not 0, by which we recognise our program.
         self.program_number = 1 + secrets.randbelow(INT32_MAX)
         #: A goal runs: keepalives are then NOOP actions of its trajectory.
         self.is_executing = False
         #: The goal uses the buffered servo: keepalives then repeat the message that enters it.
         self.servo = False
-        #: The program is paused and reads nothing. Keepalives pause too: a START must not queue
-        #: after an hour's keepalives.
+        #: The program is paused and reads nothing. Keepalives pause, too, because otherwise a
+        #: START might wait behind an hour of them.
         self.is_paused = False
         #: The robot reports that no program runs: the client that holds the sockets is dead, for
         #: instance because a cable was cut, and another client may replace it.
@@ -173,7 +173,7 @@ class ProgramSockets:
             self._trajectory.connection.send(data)
 
     def send_command(self, data: bytes) -> bool:
-        """Send a single command; False if no robot program is connected."""
+        """Send a single command; return False if no robot program is connected."""
         return (
             self.connected
             and self._commands.connection is not None
@@ -193,14 +193,14 @@ class ProgramSockets:
         self._send(reverse.stop())
 
     async def keep_alive(self) -> NoReturn:
-        """Send keepalives at a steady rate."""
+        """Send keepalives at a steady rate until cancelled."""
         loop = asyncio.get_running_loop()
         due = last = loop.time()
         was_paused = False
         while True:
             last, before = loop.time(), last
             self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
-            if not (self.is_paused and was_paused):  # one more, for the read that waits
+            if not (self.is_paused and was_paused):  # one more: a read waits
                 self._send_keepalive()
             was_paused = self.is_paused
             due = max(due + self._settings.keepalive_period, loop.time())

@@ -12,7 +12,7 @@ from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
 
-#: How long a program may hold its sockets after the robot has reported its end [s].
+#: How long a program may hold its sockets after the robot has reported that none runs [s].
 DEAD_PROGRAM_TIMEOUT = 0.5
 #: How long our own program may take after connecting to prove that it is ours [s].
 IDENTITY_TIMEOUT = 0.5
@@ -28,10 +28,11 @@ class ProgramTracker:
         self.is_ending = False
         #: The running program has connected to us, even if it has hung up since.
         self._has_called = False
-        #: Time since which the robot reports that no program runs although one is connected [s].
+        #: Time, by the robot's clock, since when it has reported that no program runs although one
+        #: is connected [s].
         self._dead_since = inf
         self._has_shown_itself = False
-        #: The program's count of connections: in the newest report, and before this connection.
+        #: The program's count of connections: in the newest report; before the present connection.
         self._run = self._run_at_connection = 0
         self._identity = asyncio.Event()
         self._connected_at = -inf
@@ -58,7 +59,7 @@ class ProgramTracker:
         return self.is_own
 
     def observe(self, robot: RobotState) -> None:
-        """Take a report; disconnect a program that has ended without closing its sockets."""
+        """Read a report; disconnect a program that has ended without closing its sockets."""
         sockets = self._sockets
         sockets.ended = ended = has_ended(robot)
         if not (sockets.connected and ended):

@@ -3,7 +3,7 @@
 """
 Sets the temporary TCP of a goal, and restores the previous TCP.
 
-The goal decides when to do so (:mod:`~ur_cartesian_driver.execution`).
+The goal decides when each of these happens (:mod:`~ur_cartesian_driver.execution`).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class TemporaryTcpSetter:
 
         The robot program does so if it is connected, not paused, and remembers that TCP exactly.
         Otherwise a secondary program does, if we may send programs and no foreign program runs. If
-        we may not, the robot program sets the TCP, rounded as on the wire.
+        we may not send programs, the robot program sets the TCP, rounded as on the wire.
 
         :param is_wanted: returns whether the secondary program may be sent again, if the
             connection was read-only.

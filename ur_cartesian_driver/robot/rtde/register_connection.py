@@ -41,7 +41,7 @@ SERVO_FIELDS = (
     'runtime_state',
     *SERVO_OUTPUTS,
 )
-#: How long to try to get the inputs, and the pause between two attempts [s].
+#: How long to try to get the inputs [s]; the pause between two attempts [s].
 OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 
@@ -55,7 +55,7 @@ class RegisterExchange:
 
 
 class RegisterConnection:
-    """Used once, from one event loop: run it, write to it, close it."""
+    """A connection for one goal, used from one event loop: run it, write to it, close it."""
 
     def __init__(self, exchange: RegisterExchange) -> None:
         """Prepare a connection."""
@@ -166,7 +166,7 @@ def feedback_from_rtde(values: Sequence[Any], effective_speed: EffectiveSpeed) -
     """
     Return the feedback in a packet with the values of :data:`SERVO_FIELDS`.
 
-    :param effective_speed: has seen all earlier packets; this call updates it.
+    :param effective_speed: updated with all earlier packets, and by this call.
     """
     (timestamp, scaling, slider, state, *feedback) = values
     mode, sequence, lag, done, repeats, skipped, size, over = feedback

@@ -19,14 +19,14 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
-#: Longest time for the handshake about the streamed fields [s].
+#: Longest duration of the handshake [s].
 ANSWER_TIMEOUT = 2.0
 #: Silence of the stream after which the robot is lost [s].
 SILENCE_TIMEOUT = 1.0
 
 
 class RtdeConnection:
-    """Used once, from one event loop: open it, wait for its end, close it."""
+    """A connection that is used once, from one event loop: open it, wait for its end, close it."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class RtdeConnection:
         :param client: chooses the fields that are streamed and written.
         :param on_values: called for each packet with the names and values of its fields, possibly
             before :meth:`open` returns.
-        :param silence: the longest pause between two packets [s].
+        :param silence: the longest pause between two packets [s]; after that the robot is lost.
         """
         self._client = client
         self._on_values = on_values
@@ -70,8 +70,8 @@ class RtdeConnection:
         """
         Connect, agree on the recipes, and return the version of the controller's software.
 
-        :raises OSError: nothing answers, or something that is not a robot; the text names host
-            and port.
+        :raises OSError: nothing answers, or what answers is not a robot; the text names host and
+            port.
         """
         await dial(self._connection, host, port)
         self._send_request(self._client.start())
@@ -88,7 +88,7 @@ class RtdeConnection:
         return self._version
 
     def write(self, values: Mapping[str, RtdeValue]) -> None:
-        """Write all inputs of the first group, by name."""
+        """Write all inputs of the first group, given by name."""
         self._connection.send(self._inputs[0].pack_named(values))
 
     async def ended(self) -> str:

@@ -5,7 +5,7 @@ Decodes the RTDE packets of the robot state.
 
 :class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` declares the outputs and the
 fields that they become; nothing of this is repeated here. Work that is the same for every packet
-is done once: 500 packets arrive in a second, and a CANCEL may have to wait for each.
+is done once: 500 packets arrive in a second, and a CANCEL may have to wait while one is decoded.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.state.robot_state import (
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 
-#: The rows that come from RTDE, with their outputs.
+#: The rows of the table whose values come from RTDE, with their RTDE outputs.
 _ROWS = tuple((row, row.rtde) for row in STATE_TABLE if row.rtde is not None)
 REQUIRED_FIELDS = tuple(rtde.name for _, rtde in _ROWS if not rtde.optional)
 OPTIONAL_FIELDS = tuple(rtde.name for _, rtde in _ROWS if rtde.optional)
@@ -45,7 +45,7 @@ _UNKNOWN_MODES: Mapping[Any, IntEnum] = {
 
 
 def _converter(kind: Any) -> Callable[[Any], Any] | None:
-    """Return the function that turns an RTDE value into this type; None = none is needed."""
+    """Return the function that turns an RTDE value into this type; None = no conversion."""
     if kind is Pose:
         return Pose.from_rotation_vector
     if kind in _UNKNOWN_MODES:
@@ -66,7 +66,7 @@ def _monitored(*types: DataType) -> tuple[int, ...]:
     )
 
 
-#: The value that replaces an output which the robot does not have.
+#: For each output, the value that replaces it if the robot does not have the output.
 _ABSENT = {
     rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
     for row, rtde in _ROWS

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's state in every step of the controller, through a separate RTDE connection."""
+"""The stream of the robot's state, through a separate RTDE connection."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ur_cartesian_driver.robot.rtde.state_decoding import (
 
 
 class StateStream(RtdeConnection):
-    """Used once, from one event loop: open it, wait for its end, close it."""
+    """A connection that is used once, from one event loop: open it, wait for its end, close it."""
 
     def __init__(
         self, frequency: float, max_age: float, on_state: Callable[[RobotState], None]
@@ -31,7 +31,7 @@ class StateStream(RtdeConnection):
         """
         Prepare a stream.
 
-        :param frequency: packets per second; 0 = as many as the robot can.
+        :param frequency: rate of the packets [Hz]; 0 = one in every step of the controller.
         :param max_age: the connection ends when its states stay older than this [s]; 0 = never.
         :param on_state: called for each packet, possibly before :meth:`open` returns.
         """

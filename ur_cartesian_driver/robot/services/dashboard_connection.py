@@ -37,7 +37,7 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
-#: What to do if the Robot API lacks a command; for all others, use the pendant.
+#: What to do if the Robot API lacks a command; commands without an entry: use the pendant.
 REPLACEMENTS: Mapping[str, str] = {
     **dict.fromkeys(
         ('power on', 'brake release', 'unlock protective stop'),
@@ -55,7 +55,7 @@ TOO_EARLY = 'Cannot unlock protective stop'
 
 
 class DashboardConnection:
-    """Sends requests to the dashboard, from one event loop; several may run at a time."""
+    """Sends requests to the dashboard, from one event loop; several requests may run at a time."""
 
     def __init__(self, host: str, port: int) -> None:
         """Prepare; every request opens its own connection."""
@@ -162,7 +162,7 @@ def _missing_in_robot_api(command: str, version: ControllerVersion) -> str:
 
 
 def is_too_early(command: str, answer: str) -> bool:
-    """Return whether an unlock may succeed later; the Robot API gives no reason for a refusal."""
+    """Return whether a refused unlock may succeed later: any conflict of the Robot API may."""
     return TOO_EARLY in answer or (command == UNLOCK and CONFLICT in answer)
 
 

@@ -38,14 +38,15 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: Longest time for a command to take effect [s]: powering up takes a while.
+#: Longest time until the arm is on, its brakes are released, or its safety system restarted [s].
 POWER_TIMEOUT = 30.0
+#: Longest time until another command takes effect [s].
 EFFECT_TIMEOUT = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardPorts:
-    """The robot's ports of the dashboard, and of the Robot API that PolyScope X has instead."""
+    """The robot's ports: of the dashboard; of the Robot API that PolyScope X has instead."""
 
     dashboard: int
     robot_api: int

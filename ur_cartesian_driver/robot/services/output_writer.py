@@ -24,8 +24,8 @@ from ur_cartesian_driver.robot.services.rtde_input_writer import (
 )
 from ur_cartesian_driver.robot.services.service_calls import SetOutputCall
 
-#: How long a write may take, because the end of a goal waits for it, and the pause before another
-#: attempt [s]: the inputs of a connection that was just closed are not free at once.
+#: How long a write with its attempts may take, while the end of a goal waits for it [s]; pause
+#: before another attempt [s], because the inputs of a closed connection are not free at once.
 WRITE_TIMEOUT, RETRY_PERIOD = 0.25, 0.02
 
 
@@ -42,7 +42,7 @@ async def write_outputs(host: str, port: int, outputs: Iterable[SafeOutput]) -> 
 
 
 async def _write(host: str, port: int, outputs: list[SafeOutput]) -> tuple[list[SafeOutput], str]:
-    """Write outputs of one kind; return the changed ones with their old values, and a failure."""
+    """Write outputs of one kind; return the changed ones with their old values, or a failure."""
     calls = [
         SetOutputCall(kind=o.output, pin=o.pin, value=o.value, domain=o.domain) for o in outputs
     ]

@@ -17,7 +17,7 @@ POLL_PERIOD = 0.02
 async def wait_for_state(
     link: RobotLink, predicate: Callable[[RobotState], bool], within: float
 ) -> bool:
-    """Return whether a condition holds within a time [s]; a lost robot may connect again."""
+    """Return whether a condition is met within a time [s]; the robot may reconnect meanwhile."""
     loop = asyncio.get_running_loop()
     end = loop.time() + within
     while loop.time() < end:

@@ -39,13 +39,13 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: How long a robot may take until the next step is due [s].
+#: How long the recovery waits for the robot until a next step is possible [s].
 STEP_TIMEOUT = 35.0
 #: The same for a robot that is not connected when the recovery begins [s].
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: Pause before an unlock that came too early is repeated, and longest time of repetitions [s].
+#: Pause before an unlock that came too early is repeated [s]; longest time of repetitions [s].
 UNLOCK_RETRY_PERIOD, UNLOCK_TIMEOUT = 0.5, 6.0
 
 #: Dashboard commands of the steps of a recovery; the last command is the step itself.
@@ -117,7 +117,7 @@ class RecoveryRunner:
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # Waiting is in vain if the robot was not connected from the start.
+                # A robot that was not connected at the start is not waited for as long.
                 lost = self._link.robot is None and not done
                 if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))
@@ -140,7 +140,7 @@ class RecoveryRunner:
 
     async def _settled_step(self, situation: Callable[[], RecoverySituation]) -> NextStep:
         """
-        Return the next step; a step for a person only if it persists.
+        Return the next step, but one that needs a person only if it stays the next step.
 
         Sockets and robot state reflect a change at different times, and a program that has just
         been started has not connected yet.

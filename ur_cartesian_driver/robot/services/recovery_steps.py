@@ -3,9 +3,9 @@
 """
 The recovery of a stopped robot as tables: from the modes of the robot to the next step.
 
-First the safety system, then power and brakes, then the program. Each step follows from the newest
-state of the robot, so a step that a person takes meanwhile is not repeated. If a person has to
-act, the recovery ends with a sentence that says what to do.
+The safety system comes first, then power and brakes, then the program. Each step follows from the
+newest state of the robot, so a step that a person takes meanwhile is not repeated. If a person has
+to act, the recovery ends with a sentence that says what to do.
 
 Pure: no socket, no clock.
 """
@@ -26,7 +26,7 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 
 class RecoveryStep(Enum):
-    """The next step."""
+    """A step of the recovery."""
 
     DONE = auto()
     #: The robot changes its state by itself.
@@ -53,7 +53,7 @@ STEP_NAMES: Mapping[RecoveryStep, str] = {
     RecoveryStep.PLAY: 'play the loaded program',
 }
 
-#: The manufacturer's service note: a protective stop is never to be reset automatically.
+#: The manufacturer's service note forbids resetting a protective stop automatically.
 _LOCKED = (
     'The robot is in a protective stop: look for the cause and remove it, then recover again with '
     'unlock_protective_stop, or unlock it on the pendant.'
@@ -111,7 +111,7 @@ class RecoverySituation:
     """
     Input of :func:`next_step`.
 
-    :param message: message of the status, which says the next step.
+    :param message: message of the status: the next step, or the reason why the robot is refused.
     :param robot: newest state of the robot; None = not connected.
     :param program_connected: our program holds its sockets.
     :param headless: the driver uploads the program; else a program on the robot requests it.
@@ -130,7 +130,7 @@ class RecoverySituation:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """A step, with a sentence in case the recovery ends with it."""
+    """A step, with a sentence in case the recovery ends with this step."""
 
     step: RecoveryStep
     text: str = ''

@@ -26,24 +26,25 @@ from ur_cartesian_driver.protocol.robot_api import (
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.transport import CONNECT_TIMEOUT, error_reason
 
-#: How long the robot may take to answer [s]; slow commands are answered after their effect.
+#: How long the robot may take to answer [s].
 ANSWER_TIMEOUT = 10.0
+#: The same for SLOW_COMMANDS, which the robot answers after their effect [s].
 SLOW_ANSWER_TIMEOUT = 30.0
 SLOW_COMMANDS = frozenset({'power on', 'brake release', 'restart safety'})
 #: Longest answer that is read [bytes].
 MAX_ANSWER_SIZE = 65536
 #: Largest number of redirects: paths have moved between versions, and old paths redirect to new.
 MAX_REDIRECTS = 3
-#: How long the robot may take to report a program as loaded, and the period of the queries [s].
+#: How long the robot may take to report a program as loaded [s]; the period of the queries [s].
 LOAD_TIMEOUT, LOAD_POLL_PERIOD = 5.0, 0.2
 #: The first software that reports the loaded program.
 NAMES_LOADED_PROGRAM = (10, 12)
-#: Suffix of program files, which names of programs in the API do not have.
+#: Suffix of program files; program names in the API do not have it.
 PROGRAM_SUFFIX = '.urpx'
 
 
 class RobotApiConnection:
-    """Sends dashboard commands to the Robot API, from one event loop; several may run at once."""
+    """Sends dashboard commands to the Robot API, from one event loop; several requests at once."""
 
     def __init__(self, host: str, port: int, version: ControllerVersion) -> None:
         """
@@ -58,7 +59,8 @@ class RobotApiConnection:
         """
         Send a command and return the answer.
 
-        :raises OSError: the Robot API does not answer, or ignores a request that it accepted.
+        :raises OSError: the Robot API does not answer, or the robot accepts a request to load a
+            program but does not load it.
         :raises ProtocolError: the answer is invalid, or the API does not have the command.
         """
         api_command = find_command(command, self._version)
@@ -80,7 +82,7 @@ class RobotApiConnection:
 
     async def _wait_until_loaded(self, program: str) -> None:
         """
-        Wait until the robot reports a program as loaded: it accepts the request before it loads.
+        Wait until the robot reports a program as loaded, as the request is accepted earlier.
 
         :raises OSError: the robot does not load the program in time.
         """
@@ -98,7 +100,7 @@ class RobotApiConnection:
     def _exchange(self, command: ApiCommand, body: bytes, timeout: float) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; called in a thread."""
         try:
-            # To the robot only: not through a proxy of the environment, nor redirected elsewhere.
+            # Only to the robot: not through a proxy of the environment, nor redirected elsewhere.
             with urllib3.HTTPConnectionPool(
                 self._host,
                 self._port,

@@ -30,7 +30,7 @@ _DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
     OutputKind.CONFIGURABLE_DIGITAL: ('configurable_digital_output', 8),
     OutputKind.TOOL_DIGITAL: ('tool_digital_output', 16),
 }
-#: Smallest and largest value of an analog output [A], [V].
+#: (smallest, largest) value of an analog output: current [A], voltage [V].
 RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
     AnalogDomain.CURRENT: (0.004, 0.020),
     AnalogDomain.VOLTAGE: (0.0, 10.0),
@@ -129,7 +129,7 @@ def _analog(call: SetOutputCall) -> InputWrite:
 
 async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
     """
-    Write, and return whether the robot reported the effect.
+    Write inputs, and return whether the robot reported the effect.
 
     :raises OSError: there is no connection, or another client holds the inputs.
     """
@@ -140,7 +140,7 @@ async def write_and_compare(
     host: str, port: int, input_write: InputWrite
 ) -> tuple[bool, Mapping[str, Any]]:
     """
-    Write; return whether the robot reported the effect, and the outputs before the write.
+    Write inputs; return whether the robot reported the effect, and the outputs before the write.
 
     :raises OSError: there is no connection, or another client holds the inputs.
     """

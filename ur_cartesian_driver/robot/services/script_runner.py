@@ -33,9 +33,9 @@ from ur_cartesian_driver.urscript import CompileError, parse
 REPORT_TIME = 0.3
 #: How long the robot may take to begin a primary program, or to end it when it is stopped [s].
 BEGIN_TIMEOUT, STOP_TIMEOUT = 2.0, 3.0
-#: Length from which a script is parsed in a thread, because keepalives cannot wait [characters].
+#: Length [characters] from which a script is parsed in a thread, so that keepalives do not wait.
 MIN_THREAD_LENGTH = 1000
-#: How long the robot may report that no program runs between ours and the script [s].
+#: How long the robot may report no program between the end of ours and the start of a script [s].
 CHANGE_TIME = 0.3
 
 
@@ -96,7 +96,7 @@ class ScriptRunner:
             return failed('The script was not sent: the primary interface is not connected.')
         was_connected = link.program.connected
         has_begun = await wait_for_state(link, self._runs_script, BEGIN_TIMEOUT)
-        # A short script may have ended unseen, but it has ended our program.
+        # A short script may have run unseen; the end of our program then shows that it has run.
         has_run = has_begun or (was_connected and not link.program.connected)
         in_time = not has_begun or await self._ends_within(call.timeout)
         if not in_time:
@@ -124,9 +124,9 @@ class ScriptRunner:
 
     async def _ends_within(self, longest: float) -> bool:
         """
-        Return whether the script ends within a time [s], or is replaced by our program.
+        Return whether, within a time [s], the script ends or our program replaces it.
 
-        Between our program and the script, no program runs for a moment.
+        Before the script starts, no program runs for a moment, which is not the script's end.
         """
         end = asyncio.get_running_loop().time() + longest
         while (left := end - asyncio.get_running_loop().time()) > 0.0:

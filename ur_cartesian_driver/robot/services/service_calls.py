@@ -28,15 +28,15 @@ PINS = {
     OutputKind.STANDARD_ANALOG: 2,
 }
 
-#: How long a script may take, by default and at most [s].
+#: How long a script may take: by default [s]; at most [s].
 SCRIPT_TIMEOUT, MAX_SCRIPT_TIMEOUT = 30.0, 600.0
-#: Length above which a script must be a mistake [characters].
+#: Length [characters] above which a script must be a mistake.
 MAX_SCRIPT_LENGTH = 200_000
-#: Longest text for the dashboard [characters]: in any alphabet, it fits into a line of the server.
+#: Longest text for the dashboard [characters]; its UTF-8 bytes fit into a line of the server.
 MAX_TEXT_LENGTH = 1000
-#: Longer than any tool [m], and heavier than any payload [kg].
+#: A length that no tool has [m]; a mass that no payload has [kg].
 MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
-#: How far the length of a quaternion may be off 1.
+#: How far the length of a quaternion may differ from 1.
 UNIT_TOLERANCE = 1e-3
 
 
@@ -45,7 +45,7 @@ class ServiceAnswer:
     """
     The outcome of a call.
 
-    :param ok: the call was carried out; if its effect can be reported, the robot reports it.
+    :param ok: the call was carried out; an effect that the robot can report has been reported.
     :param text: a sentence, or the requested value.
     """
 
@@ -107,7 +107,7 @@ class SetTcpCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPayloadCall:
-    """Set mass [kg] and centre of gravity [m] (in the flange frame) of the load on the flange."""
+    """Set the mass [kg] of the payload, and its centre of gravity in the flange frame [m]."""
 
     mass: float
     cog: Vector3 = (0.0, 0.0, 0.0)

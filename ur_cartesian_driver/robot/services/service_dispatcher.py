@@ -3,9 +3,10 @@
 """
 Carries out the service calls of a driver's owner.
 
-A call uses the dashboard, a single command to the robot program, or RTDE inputs. It succeeds when
-the robot reports the effect. In any case it ends within :data:`CALL_TIMEOUT`; a recovery within
-:data:`RECOVERY_TIMEOUT`, and a script within :data:`CALL_TIMEOUT` plus its own time.
+A call uses the dashboard, a single command to the robot program, the primary interface, or RTDE
+inputs. It succeeds once the robot reports the effect, if the robot can report it. A call ends
+within :data:`CALL_TIMEOUT`, a recovery within :data:`RECOVERY_TIMEOUT`, a script within
+:data:`CALL_TIMEOUT` plus its timeout.
 """
 
 from __future__ import annotations
@@ -46,17 +47,18 @@ from ur_cartesian_driver.robot.services.service_calls import (
     ZeroFtSensorCall,
 )
 
-#: Longest duration of a call, and of a recovery with its several steps [s].
+#: Longest duration of a call [s].
 CALL_TIMEOUT = 40.0
+#: Longest duration of a recovery, which has several steps [s].
 RECOVERY_TIMEOUT = 120.0
 #: How long the robot may take to report a setting [s].
 SETTING_TIMEOUT = 1.0
-#: Largest error of the reported TCP [m], [rad]: on the way it is rounded to 32-bit integers.
+#: Largest error of the reported TCP [m, rad], which is rounded to 32-bit integers on the wire.
 TCP_TOLERANCE = 1e-5
-#: Largest error of the reported mass and centre of gravity [kg, m].
+#: Largest error of the reported payload: its mass [kg] and centre of gravity [m].
 PAYLOAD_TOLERANCE = 1e-4
 
-#: The first software of robots with a force sensor.
+#: The first major software version of robots that may have a force sensor.
 E_SERIES = 5
 
 #: Dashboard commands that only query: they are allowed even if the robot must not be moved.
@@ -188,7 +190,7 @@ class ServiceDispatcher:
         return None
 
     def _paused(self) -> ServiceAnswer | None:
-        """Return a refusal if the program is not playing: it would read a message only later."""
+        """Return a refusal if the program is not playing, as it would carry out commands later."""
         robot = self._link.robot
         if robot is None or robot.runtime_state is RuntimeState.PLAYING:
             return None

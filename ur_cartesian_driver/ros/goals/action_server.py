@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The action servers: they accept every goal at once and give it a :class:`GoalRun` with a thread.
+The action servers: they accept each goal at once and give it a :class:`GoalRun` with a thread.
 
-The node's executor handles a goal when it is accepted and when its outcome is known. In between
-it serves cancel requests, parameters and the heartbeat, even with a single thread.
+The node's executor handles a goal when it is accepted and when its outcome is known. In between,
+the executor serves cancel requests, parameters and the heartbeat, even with a single thread.
 
-A coroutine that awaits a future would be the usual form. But executors of Jazzy poll a waiting
+A coroutine that awaits a future would be the usual design. But executors of Jazzy poll a waiting
 coroutine whenever they wake, and the multi-threaded one keeps an entry for each poll until the
 coroutine ends. With a busy topic, a motion of ten minutes would slow down the whole process.
 """
@@ -36,18 +36,18 @@ from ur_cartesian_driver.ros.message_fields import Message
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.tf.tf_lookup import listen_to_tf
 
-#: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.
+#: How long a goal and its result are kept, for clients that ask for the result late [s].
 RESULT_TIMEOUT = 60
 #: A burst of requests is queued; requests beyond the depth would be lost.
 REQUEST_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 #: Largest number of goals under way, each with a thread and its points in memory.
 MAX_GOALS = 100
-#: How long the node waits for the end of a goal when it is destroyed [s].
+#: How long the node waits for the end of each goal when the node is destroyed [s].
 JOIN_TIMEOUT = 10.0
 
 
 class GoalServer:
-    """Serves the actions of the node, which opens and closes the driver."""
+    """Serves the actions of a node; the driver is opened and closed by the node."""
 
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Start to serve."""
@@ -60,7 +60,7 @@ class GoalServer:
             settings=settings,
             show=PlanMarkerPublisher(node, settings.frames.base).publish,
         )
-        # Guards ``_runs``, which holds the goals that have not ended, and ``_closing``.
+        # Guards ``_closing``, and ``_runs``: the runs of the goals that have not ended.
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
@@ -90,7 +90,7 @@ class GoalServer:
 
     @property
     def frames(self) -> Frames:
-        """The frames of goals, also from tf2."""
+        """The frames that goals can name, including those of tf2."""
         return self._context.frames
 
     @property
@@ -113,7 +113,7 @@ class GoalServer:
             return self._runs.get(key)
 
     def stop(self) -> None:
-        """Stop the arm and abort all goals, new ones too; return at once."""
+        """Stop the arm, and abort all goals, also those that arrive later; return at once."""
         with self._lock:
             self._closing = True
             runs = list(self._runs.values())
@@ -133,10 +133,10 @@ class GoalServer:
             self._transforms.close()
 
     def _begin(self, action: GoalAction, handle: GoalHandle) -> None:
-        """Give an accepted goal its run; called by the executor."""
+        """Start the run of an accepted goal; called by the executor."""
         run = GoalRun(handle, action, self._context, self._finish)
         if not (run.is_scheduled or action.is_validation(handle.request)):
-            self.arbiter.enqueue(run.arm_request)  # here, as goals arrive in order
+            self.arbiter.enqueue(run.arm_request)  # here, where goals are in order
         with self._lock:
             is_over_limit = len(self._runs) >= MAX_GOALS
             if not is_over_limit:

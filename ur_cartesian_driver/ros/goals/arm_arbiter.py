@@ -3,11 +3,11 @@
 """
 Decides which goal or session may move the arm: one at a time, and the newest preempts the others.
 
-A goal enters the queue when it arrives, or at its start time, and gets a number. When it has
-passed its checks, it preempts all older goals in the queue (the running one, and those still
-being planned or waiting) and acquires the arm as soon as it is free. An older goal that passes its
-checks after that is too late. So the newest goal that passes always wins, however long each
-goal's planning takes, and a refused goal never disturbs another one.
+A goal enters the queue when it arrives (if it has a start time, at that time), and gets a number.
+When it has passed its checks, it preempts all older goals in the queue (the running one, and those
+still being planned or waiting) and acquires the arm as soon as the arm is free. An older goal that
+passes its checks after that is too late. So the newest goal that passes always wins, however long
+each goal's planning takes, and a refused goal never disturbs another one.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ArmArbiter:
 
     @property
     def release_count(self) -> int:
-        """How often the arm was released; before each release it may have moved."""
+        """How many times the arm was released; each time, it may have moved before."""
         return self._release_count
 
     @property
@@ -67,9 +67,10 @@ class ArmArbiter:
 
     def acquire(self, arm_request: ArmRequest, *, preemptible: bool = False) -> bool:
         """
-        Acquire the arm if it is free; return whether it was.
+        Acquire the arm if it is free; return whether it was free.
 
-        :param preemptible: whether to queue it as the oldest request, which any other preempts.
+        :param preemptible: whether any other request can preempt this one, which is therefore
+            queued as the oldest.
         """
         with self._condition:
             if self._holder is not None:

@@ -39,11 +39,11 @@ class DeferredActionServer(ActionServer):
             return super().take_data()  # type: ignore[no-untyped-call]  # rclpy's
 
     def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
-        """Start a goal; it is in the state EXECUTING."""
+        """Start a goal, whose state is EXECUTING already."""
         (execute_callback or self._execute_callback)(goal_handle)
 
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
-        """Have the executor get the result from a callback and send it; for any thread."""
+        """Make the executor call ``callback`` and send the result that it returns; thread-safe."""
         executor = self._node.executor
         if executor is None:  # the node is being destroyed
             return
@@ -59,6 +59,6 @@ class DeferredActionServer(ActionServer):
             )
 
     def destroy(self) -> None:
-        """Send no more results."""
+        """Destroy the server; it sends no more results."""
         self._destroyed = True
         super().destroy()  # type: ignore[no-untyped-call]  # rclpy's

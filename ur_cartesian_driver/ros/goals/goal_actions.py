@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The actions of the node: each converts the messages of one action for the runs of its goals.
+The actions of the node: each class converts the messages of one action for the runs of goals.
 
-:class:`JointAction` is served if control_msgs is installed, which is not on PyPI.
+:class:`JointAction` is served only if control_msgs, which is not on PyPI, is installed.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ MakeFeedback: TypeAlias = Callable[[Progress], Message]
 class GoalAction(Protocol):
     """One action: its type, its name, and its messages."""
 
-    #: The class of the action, and its name below the node.
+    #: The class of the action.
     action_type: Any
+    #: The name of the action, relative to the node.
     name: str
 
     def is_validation(self, request: Message) -> bool:
@@ -50,7 +51,7 @@ class GoalAction(Protocol):
         Return the goal of a message.
 
         :param received: time of receipt on the node's clock [ns].
-        :raises GoalRefused: the message makes no sense.
+        :raises GoalRefused: the message is malformed, or the pose of a frame is not known.
         """
 
     def resolved(self, goal: Any, request: Message, context: GoalContext) -> AnyGoal:
@@ -110,7 +111,7 @@ class CartesianAction:
 
 
 class JointAction:
-    """Follow a joint trajectory, for MoveIt and others: ``~/follow_joint_trajectory``."""
+    """Follow a joint trajectory, as MoveIt sends it: ``~/follow_joint_trajectory``."""
 
     name = '~/follow_joint_trajectory'
 
@@ -143,7 +144,7 @@ class JointAction:
 
 
 def installed_actions() -> list[GoalAction]:
-    """Return the actions of the node."""
+    """Return the actions that the node can serve with the installed packages."""
     actions: list[GoalAction] = [CartesianAction()]
     try:
         control_msgs = importlib.import_module('control_msgs.action')

@@ -33,6 +33,6 @@ class GoalContext:
         return int(self.clock.now().nanoseconds)
 
     def snapshot(self) -> ArmSnapshot | None:
-        """Return the pose and TCP with which the arm rests or will rest; None if unknown."""
+        """Return the pose and TCP of the arm after a stop that begins now; None if unknown."""
         state = self.driver.rest_state
         return None if state is None else ArmSnapshot.of(state)

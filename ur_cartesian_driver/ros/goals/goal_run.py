@@ -4,7 +4,7 @@
 One accepted goal, from its acceptance to its outcome, in a thread of its own.
 
 A run converts the goal, plans it, waits for its start time and for the arm, and follows the
-motion. The executor handles it twice: when the goal is accepted, and when the outcome is known.
+motion. The executor handles a goal only twice: when it is accepted, and when its outcome is known.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class GoalRun:
         """
         Make a run, whose thread the caller has to start.
 
-        :param on_end: takes the outcome, in the thread of the run.
+        :param on_end: called with this run and the outcome, in the thread of the run.
         """
         self.handle, self.action = handle, action
         self.key = goal_key(handle)
@@ -77,7 +77,7 @@ class GoalRun:
         self.last_append: tuple[object, Any] | None = None
         self._lock = threading.Lock()
         self._motion: MotionHandle | None = None
-        #: Set when the motion has begun, or never will.
+        #: Set when the motion has begun, or will never begin.
         self._begun = threading.Event()
         self._abort_requested = threading.Event()
         self._cancel_requested = False
@@ -89,12 +89,12 @@ class GoalRun:
 
     @property
     def points(self) -> int:
-        """The number of points of a goal with keep_open; 0 for all others."""
+        """The number of points of a goal with keep_open; 0 = another goal, or no motion yet."""
         motion = self._motion
         return motion.appender.points if motion is not None and motion.appender else 0
 
     def motion(self, timeout: float) -> MotionHandle | None:
-        """Wait up to ``timeout`` [s] for the motion to begin; return it, None if it has not."""
+        """Wait up to ``timeout`` [s] for the motion to begin; return the motion, or None."""
         self._begun.wait(timeout)
         return self._motion
 
@@ -104,7 +104,7 @@ class GoalRun:
         self.abort()
 
     def abort(self) -> None:
-        """End the goal, before its motion or with a stop of the arm."""
+        """End the goal; if its motion has begun, stop the arm."""
         with self._lock:
             self._abort_requested.set()
             motion = self._motion
@@ -165,7 +165,8 @@ class GoalRun:
         """
         Acquire the arm and plan the goal.
 
-        :raises GoalRefused: the arm is not free, or the goal is malformed (refused first).
+        :raises GoalRefused: the goal is malformed, the arm is not free, or planning refuses the
+            goal; the first of these is the reason.
         """
         arbiter = self._context.arbiter
         if not arbiter.acquire(self.arm_request):
@@ -207,7 +208,7 @@ class GoalRun:
         return self._plan_from_here(goal)
 
     def _plan_from_here(self, goal: AnyGoal) -> Plan:
-        """Plan a goal with the present poses of its frames: the arm may have moved since."""
+        """Plan a goal with the present poses of its frames, which may have moved meanwhile."""
         return self._plan(self.action.resolved(goal, self.handle.request, self._context))
 
     def _plan(self, goal: AnyGoal) -> Plan:
@@ -219,7 +220,7 @@ class GoalRun:
         """
         Check that the goal was neither aborted nor preempted meanwhile.
 
-        :raises ExecutionEnded: it was.
+        :raises ExecutionEnded: the goal was aborted or preempted.
         """
         if self._abort_requested.is_set():
             raise self._cancellation('before anything moved')
@@ -234,7 +235,7 @@ class GoalRun:
             self._motion = motion
             abort_requested = self._abort_requested.is_set()
         self._begun.set()
-        self._context.show(plan)  # while the arm moves, because a long plan takes a while
+        self._context.show(plan)  # while the arm moves, as showing a long plan takes time
         del plan  # a long plan takes much memory
         if abort_requested:
             motion.cancel()
@@ -255,7 +256,7 @@ class GoalRun:
 
         def publish(progress: Progress) -> None:
             # A client that reacts to the first feedback must find the motion. The driver holds no
-            # lock here, and has sent the whole request to start: this wait cannot block it.
+            # lock here, and has sent the whole request to start: this wait cannot block the start.
             self._begun.wait()
             message = make(progress)
             # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
@@ -265,7 +266,7 @@ class GoalRun:
         return publish
 
     def _refusal_text(self, error: DriverError) -> str:
-        """Return the text of a refusal, with any goal that was preempted in vain."""
+        """Return the text of a refusal, which also names a goal that was preempted in vain."""
         preempted = self.arm_request.preempted
         if not (isinstance(error, GoalRefused) and preempted):
             return str(error)
@@ -283,8 +284,8 @@ class GoalRun:
         """
         Wait until rclpy has put the goal into the state CANCELING.
 
-        rclpy calls back first and changes the state afterwards, possibly in another thread. Until
-        then the goal cannot become CANCELED.
+        rclpy calls the cancel callback first and changes the state afterwards, possibly in another
+        thread. Until the state has changed, the goal cannot become CANCELED.
         """
         tick = threading.Event()
         for _ in range(int(CANCELING_TIMEOUT / 0.001)):

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``~/path_offset``: offsets for the goal that runs, if it allows them (``path_offset``).
+``~/path_offset``: offsets for the running goal, if its ``path_offset`` allows them.
 
 An offset that cannot be followed is ignored with a warning that says why; the offset before it
 stays in effect until it is stale.
@@ -29,7 +29,7 @@ WARNING_PERIOD = 2.0
 
 
 class PathOffsetSubscriber:
-    """Passes offsets to the motion that runs; the node destroys the subscription."""
+    """Passes offsets to the running motion; the node destroys the subscription."""
 
     def __init__(self, node: Node, server: GoalServer) -> None:
         """Subscribe."""
@@ -53,7 +53,7 @@ class PathOffsetSubscriber:
 
     def give(self, message: Vector3Stamped) -> None:
         """
-        Pass an offset to the motion that runs.
+        Pass an offset to the running motion.
 
         :raises DriverError: the offset cannot be followed, or no goal runs.
         """

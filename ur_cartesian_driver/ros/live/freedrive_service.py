@@ -19,12 +19,12 @@ from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 
-#: How long the node waits for the end of freedrive when it is destroyed [s].
+#: How long the node waits for the end of freedrive when the node is destroyed [s].
 JOIN_TIMEOUT = 10.0
 
 
 class FreedriveService:
-    """Holds the arm while freedrive is on: goals are refused and cannot preempt it."""
+    """Serves freedrive, which has the arm while it is on; goals cannot preempt it."""
 
     def __init__(self, node: Node, driver: Driver, arbiter: ArmArbiter) -> None:
         """Start to serve."""
@@ -42,7 +42,7 @@ class FreedriveService:
                 motion.result(JOIN_TIMEOUT)
 
     def _handle(self, request: Any) -> Future[ServiceAnswer]:
-        """Start or end freedrive; the answer comes when the robot has done so, or cannot."""
+        """Start or end freedrive; the answer comes when the robot has done so, or cannot do so."""
         with self._lock:
             motion = self._motion
             if request.data:

@@ -5,8 +5,8 @@
 
 The executor only stores the newest message, and a separate thread processes it. So neither the
 wait for a tf2 frame nor a client that sends quickly holds up the node. A target that cannot be
-followed is ignored with a warning that says why; the target before it stays in effect until it is
-too old.
+followed is ignored with a warning that says why; the previous target stays in effect until that
+one is too old.
 
 A session acquires the arm like a goal, but is treated as older than all goals, so that any goal
 preempts it.
@@ -52,7 +52,7 @@ SAFETY_STOPS = (
 )
 #: Shortest time between two logs of the same warning [s].
 WARNING_PERIOD = 2.0
-#: How long the node waits for the end of a session when it is destroyed [s].
+#: How long the node waits for the end of a session when the node is destroyed [s].
 JOIN_TIMEOUT = 10.0
 SESSION_NAME = 'the session of live targets'
 
@@ -87,7 +87,7 @@ class TargetInhibitor:
     """
     Blocks targets after a stop, until there is a pause between two targets.
 
-    :param pause: the shortest such pause [s].
+    :param pause: the shortest pause that ends the blocking [s].
     """
 
     def __init__(self, pause: float) -> None:
@@ -122,7 +122,7 @@ class LiveTargetSubscriber:
         self._session: LiveSession | None = None
         self._inhibitor = TargetInhibitor(driver.options.live_target_timeout)
         self._had_session = False
-        # Guards the next fields, which hold the newest message that is not processed yet.
+        # Guards the next four fields; ``_pending`` is the newest message not yet processed.
         self._condition = threading.Condition()
         self._pending: Message = None
         self._received = 0
@@ -145,7 +145,7 @@ class LiveTargetSubscriber:
             self._condition.notify_all()
         self._cancel_session()
         self._thread.join()
-        session = self._cancel_session()  # the thread may just have started one
+        session = self._cancel_session()  # the thread may have started a new session
         if session is not None:
             with contextlib.suppress(TimeoutError):
                 session.motion.result(JOIN_TIMEOUT)
@@ -185,7 +185,7 @@ class LiveTargetSubscriber:
             try:
                 self._process(message, received)
             except DriverError as error:
-                reason = str(error).removeprefix('trajectory.')  # not part of a target
+                reason = str(error).removeprefix('trajectory.')  # a target has no trajectory
                 self._logger.warning(
                     f'A message on ~/live_target is ignored: {reason}',
                     throttle_duration_sec=WARNING_PERIOD,
@@ -243,7 +243,7 @@ class LiveTargetSubscriber:
         except BaseException as error:
             self._arbiter.release(arm_request)
             if self._had_session and isinstance(error, RobotNotReady):
-                self._inhibitor.activate()  # it was ready before: something has stopped it
+                self._inhibitor.activate()  # the robot was ready before: it was stopped
             raise
         self._session, self._had_session = session, True
         if arm_request.preempted_by:

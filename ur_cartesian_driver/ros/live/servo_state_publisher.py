@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoRe
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
 
-#: The same as for the other state topics.
+#: The same QoS as for the other state topics.
 SERVO_STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -36,7 +36,7 @@ class ServoStatePublisher:
         driver.add_servo_listener(self._publish)
 
     def _publish(self, report: ServoReport) -> None:
-        """Publish, in the thread of the driver; the end of a stream is never left out."""
+        """Publish a report, in the driver's thread; never leave out the last one of a stream."""
         now = monotonic()
         if now < self._due and report.activity is not ServoActivity.IDLE:
             return

@@ -26,7 +26,7 @@ from ur_cartesian_driver.ros.message_fields import duration_message, pose_messag
 
 _NAN6: Vector6 = (nan,) * 6
 
-#: Largest number of report lines in a result, because rclpy and DDS keep results for a minute.
+#: Largest number of report lines in a result; rclpy and DDS keep each result for a minute.
 MAX_REPORT_LINES = 10_000
 
 
@@ -123,7 +123,7 @@ def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
 
 
 def _report(lines: Sequence[str]) -> list[str]:
-    """Return a report; of one that is too long, only the first and the last lines."""
+    """Return the lines of a report; if there are too many, only the first and the last ones."""
     left_out = len(lines) - MAX_REPORT_LINES
     if left_out <= 0:
         return list(lines)

@@ -4,7 +4,7 @@
 Conversion of a goal message to a goal with resolved frames.
 
 Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
-planning, which knows no messages, checks the rest.
+planning, which knows no messages, checks all else.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def goal_from_message(
     :param now: time of the node's clock when the goal was received [ns].
     :param snapshot: pose of the arm; None if it is not known.
     :param time_tolerance: the value for a ``goal_time_tolerance`` of zero [s].
-    :raises InvalidGoal: a frame is unknown or an enumeration has no such value; the text names
+    :raises InvalidGoal: a frame is unknown, or a number is not in its enumeration; the text names
         the field.
     :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
     """
@@ -61,7 +61,7 @@ def appended_points_from_message(message: Message) -> AppendedPoints:
     """
     Return the points of an ``AppendPoints.Request``.
 
-    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    :raises InvalidGoal: a number is not in its enumeration; the text names the field.
     """
     waypoints, segments = rows_of_points(message, message.points, 'points')
     replacement = enum_member(Replacement, message.replace, 'replace')
@@ -85,7 +85,8 @@ def resolve_frames(
     """
     Return a goal with its frames resolved to their present poses.
 
-    tf2 gives the transforms at the goal's stamp; while that lies in the future, the newest ones.
+    Transforms of tf2 are those at the goal's stamp; the newest ones if the goal has no stamp, or
+    while the stamp lies in the future.
 
     :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
     :param now: time of the node's clock [ns].

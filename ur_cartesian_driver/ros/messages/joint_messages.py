@@ -24,8 +24,8 @@ from ur_cartesian_driver.ros.message_fields import (
     seconds,
 )
 
-#: Codes that become INVALID_GOAL: refused before anything moved, replaced (ros2_control's joint
-#: trajectory controller says the same for these), or cancelled.
+#: Codes that become INVALID_GOAL: the goal was refused before anything moved, was preempted (for
+#: both, ros2_control's joint trajectory controller reports the same), or was cancelled.
 _AS_INVALID_GOAL = (
     ErrorCode.INVALID_POSTURE,
     ErrorCode.UNREACHABLE,
@@ -110,8 +110,8 @@ def joint_error_code(code: ErrorCode) -> ErrorCode:
     """
     Return the code of FollowJointTrajectory for one of ours.
 
-    A motion that was stopped for another reason becomes PATH_TOLERANCE_VIOLATED. No failure
-    becomes 0, which is SUCCESSFUL.
+    Codes that FollowJointTrajectory does not have become INVALID_GOAL or, if the motion was
+    stopped for another reason, PATH_TOLERANCE_VIOLATED. No failure becomes 0, which is SUCCESSFUL.
     """
     if code >= ErrorCode.GOAL_TOLERANCE_VIOLATED:
         return code

@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.ros.message_fields import pose_message
 
-#: Largest number of samples of a path, and of points, that are drawn.
+#: Largest number of drawn samples of a path, and of drawn points.
 MAX_SAMPLES = 5000
 MAX_POINTS = 500
 #: Width of the path and diameter of the points [m].
@@ -108,7 +108,7 @@ def _axes(row: Floats, number: int, header: Header) -> Marker:
 
 
 def _some(count: int, most: int) -> list[int]:
-    """Return indices of rows, spaced evenly if there are too many, including the last row."""
+    """Return indices of rows: all, or evenly spaced ones and the last if there are too many."""
     rows = list(range(0, count, max(1, ceil(count / most))))
     return rows if rows[-1:] == [count - 1] or not count else [*rows, count - 1]
 

@@ -3,8 +3,8 @@
 """
 Points and segments in flat arrays: conversion of rows and goals to ``PackedPoints``.
 
-In the plain form, rclpy makes ten objects for each point, which takes some 0.1 ms. A flat array
-is one object, and one copy.
+In the plain form, rclpy makes ten objects for each point, which takes some 0.1 ms. A flat array of
+all points is a single object, copied in one piece.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTraje
     Return a goal with its points and segments packed.
 
     The goal is returned unchanged if it is packed already, has a jerk (which no motion uses), or
-    will be refused anyway.
+    is malformed, so that it will be refused.
     """
     trajectory = goal.trajectory
     try:
@@ -57,5 +57,5 @@ def in_flat_arrays(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTraje
 
 
 def packed_if_long(goal: FollowCartesianTrajectory.Goal) -> FollowCartesianTrajectory.Goal:
-    """Return a goal of many points in flat arrays, and any other as it is."""
+    """Return a goal of many points in flat arrays, and any other goal unchanged."""
     return in_flat_arrays(goal) if len(goal.trajectory.points) >= MANY_POINTS else goal

@@ -3,7 +3,7 @@
 """
 Messages of the state topics.
 
-Fields of ``DriverStatus`` are filled by their names, so that a field of
+The fields of ``DriverStatus`` are filled by name, so that a new field of
 :class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` needs no line here.
 """
 
@@ -71,9 +71,9 @@ def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
 
 def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
     """
-    Return force [N] and torque [Nm] at the TCP, in its own axes.
+    Return force [N] and torque [Nm] at the TCP, in the axes of the TCP.
 
-    The robot reports them at the TCP, but along the axes of its base.
+    The robot reports both at the TCP, but in the axes of the base.
     """
     to_tcp = conjugate(state.actual_tcp_pose.quaternion)
     wrench = state.actual_tcp_wrench
@@ -126,13 +126,13 @@ def status_message(
     Return the state of the connection and the modes of the robot.
 
     Each field has the value of the same name in the connection status or in the robot's state;
-    only ``speed_scaling`` has ``effective_speed``. The topic is published when the connection or a
-    mode changes, and at least once a second.
+    only ``speed_scaling`` has the value of ``effective_speed``. The topic is published when the
+    connection or a mode changes, and at least once a second.
     """
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
         if name != 'header':
-            # The messages have had this name for the effective speed from the beginning.
+            # Messages have called the effective speed ``speed_scaling`` from the beginning.
             source = 'effective_speed' if name == 'speed_scaling' else name
             value = getattr(connection if hasattr(connection, source) else state, source, None)
             if value is None:
@@ -143,7 +143,7 @@ def status_message(
 
 
 def _unknown(name: str, value: Any) -> Any:
-    """Return the value of a field of the status while the robot does not report it."""
+    """Return the value of a status field that is not known: NaN, UNKNOWN or the default."""
     if isinstance(value, float | np.ndarray):
         return value + nan
     return getattr(DriverStatus, f'{name.upper()}_UNKNOWN', value)

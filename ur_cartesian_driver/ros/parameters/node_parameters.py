@@ -3,7 +3,7 @@
 """
 The values of all parameters: declared on a node, or given without one.
 
-All parameters are read-only: robot and limits must not change under a running goal.
+All parameters are read-only: robot and limits must not change while a goal runs.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def declare_parameters(node: Node) -> Settings:
 
 def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
     """
-    Return settings with given values, and the defaults of all others, without a node.
+    Return settings without a node: the given values, and defaults for all other parameters.
 
     :raises ParameterError: a name is unknown or a value invalid.
     """
@@ -139,5 +139,5 @@ def _fields_of(options: type, values: Mapping[str, ParameterValue]) -> dict[str,
 
 
 def _without_blanks(value: ParameterValue) -> object:
-    """Return a list as a tuple without empty texts."""
+    """Return a list as a tuple without its blank texts, and any other value unchanged."""
     return tuple(text for text in value if text.strip()) if isinstance(value, list) else value

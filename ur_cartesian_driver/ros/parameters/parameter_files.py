@@ -3,7 +3,7 @@
 """
 Parameters without a node, from the same files and arguments that the node accepts.
 
-``ur-cartesian validate`` plans with them as the driver does.
+With these parameters, ``ur-cartesian validate`` plans as the driver does.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
 
 
 def _of_file(file: Path) -> dict[str, ParameterValue]:
-    """Return the parameters of a file for the node, in any namespace."""
+    """Return the parameters that a file gives for the driver's node, in any namespace."""
     content: object = _yaml(file.read_text(encoding='utf-8'), str(file))
     found: dict[str, ParameterValue] = {}
     for node, values in content.items() if isinstance(content, dict) else ():

@@ -86,9 +86,9 @@ class ParameterDeclaration:
 
     def check(self, value: ParameterValue) -> None:
         """
-        Refuse a value of another type or out of range.
+        Refuse a value that has another type or is not allowed.
 
-        :raises ParameterError: the text names the type or the bound.
+        :raises ParameterError: the value is refused; the text names the needed type or values.
         """
         wanted = type(self.default)
         if type(value) is not wanted:
@@ -118,7 +118,7 @@ def _comments(kind: type) -> Iterator[tuple[str, str]]:
     try:
         source = getsource(kind)
     except OSError:
-        return  # an installation of compiled modules only; the parameters work without
+        return  # only compiled modules are installed: the parameters have no descriptions
     comment: list[str] = []
     for line in map(str.strip, source.splitlines()):
         if line.startswith('#:'):

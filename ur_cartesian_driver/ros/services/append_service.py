@@ -3,8 +3,8 @@
 """
 The service that appends points to a running goal with keep_open.
 
-A thread of its own plans the points, one request after the other, so neither the executor nor the
-feedback waits for them. The response is sent when the points are appended or refused.
+A separate thread plans the points, one request after the other, so neither the executor nor the
+feedback waits for it. The response is sent when the points are appended or refused.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class AppendService:
 
         try:
             self._thread.submit(self._append, request).add_done_callback(answer)
-        except RuntimeError:  # the thread takes no more work
+        except RuntimeError:  # close() was called
             future.set_result(_refusal(SHUTDOWN_REFUSAL))
         return future
 
@@ -99,7 +99,7 @@ class AppendService:
         """
         Append the points of a request to a goal, and return the response.
 
-        :raises GoalRefused: nothing was appended.
+        :raises GoalRefused: the request is refused, and nothing was appended.
         """
         # A goal that waits for its start time must not hold up appends to the running one.
         motion = run.motion(0.0 if run.is_waiting else BEGIN_TIMEOUT)

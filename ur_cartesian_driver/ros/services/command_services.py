@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Services that each make one call of the driver, whose answer is the response.
+Services that each pass one call to the driver and respond with its answer.
 
 Their names, types and effects are in ``doc/ros_interface.md``.
 """
@@ -53,7 +53,7 @@ from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
 )
 
-#: Services without request fields; the response is success, and a sentence or the value.
+#: The calls of services without request fields, which respond with a sentence or a value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'resend_robot_program': SendProgramCall(),
     'hand_back_control': HandBackCall(),
@@ -103,7 +103,7 @@ def _output(request: Any) -> ServiceCall:
     return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
 
 
-#: Services with request fields: the type, and the function from a request to its call.
+#: Services with request fields: their type, and the function that makes the call of a request.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'recover': (
         Recover,
@@ -145,7 +145,7 @@ class CommandServices:
         """
         Start to serve.
 
-        :param is_idle: returns whether no goal is being planned, waits or runs.
+        :param is_idle: returns whether no goal or session depends on the present TCP and payload.
         """
         self._driver, self._is_idle = driver, is_idle
         group = MutuallyExclusiveCallbackGroup()

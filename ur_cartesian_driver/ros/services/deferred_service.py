@@ -63,7 +63,7 @@ class DeferredService:
 
 
 def completed_answer(text: str, *, ok: bool = False) -> Future[ServiceAnswer]:
-    """Return an answer that is known at once, mostly a refusal."""
+    """Return a completed future with an answer, which is mostly a refusal."""
     future: Future[ServiceAnswer] = Future()
     future.set_result(ServiceAnswer(ok=ok, text=text))
     return future

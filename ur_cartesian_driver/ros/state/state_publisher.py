@@ -3,8 +3,8 @@
 """
 The topics with the state of the robot, published by a thread of their own.
 
-A timer of the executor would cost twice as much and wait for every other callback. The thread also
-detects changes, so that only one thread publishes and nothing needs a lock.
+A timer of the executor would take twice the computing time and wait for every other callback. The
+thread also detects changes, so that only one thread publishes and nothing needs a lock.
 
 Names, types, units and rates are in ``doc/ros_interface.md``.
 """
@@ -49,7 +49,7 @@ from ur_cartesian_driver.ros.messages.state_messages import (
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
 
-#: The newest value is enough, but reliable subscribers are served too.
+#: Reliable, so that subscribers of either reliability get the topics.
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: Late subscribers get the last value at once.
 LATCHED_QOS = QoSProfile(
@@ -64,7 +64,7 @@ WARNING_PERIOD = 10.0
 
 
 def tf_messages() -> ModuleType | None:
-    """Return ``tf2_msgs.msg``, None if it is not installed; it is not on PyPI."""
+    """Return ``tf2_msgs.msg``; None if tf2_msgs, which is not on PyPI, is not installed."""
     try:
         return importlib.import_module('tf2_msgs.msg')
     except ImportError:
@@ -72,7 +72,7 @@ def tf_messages() -> ModuleType | None:
 
 
 class StatePublisher:
-    """Publishes the state of a driver from its start to :meth:`close`."""
+    """Publishes the state of a driver from :meth:`start` to :meth:`close`."""
 
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Create the publishers."""

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Frames of other nodes from tf2, if it is installed; it is not on PyPI.
+Frames of other nodes, from tf2 if that is installed; tf2 is not on PyPI.
 
 A goal is refused if a transform is missing or old: moving to where a part was some time ago is
 worse than not moving.
@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
-#: Longest wait for a transform [s]: the present one is only published a moment later.
+#: Longest wait for a transform [s]: one for the present time is published only a moment later.
 LOOKUP_TIMEOUT = 0.5
 
 
@@ -47,7 +47,7 @@ class TransformLookup:
         close: Callable[[], None] = lambda: None,
     ) -> None:
         """
-        Use a buffer.
+        Take the buffer to look in.
 
         :param errors: the exceptions that the buffer raises if it has no transform.
         :param now: the node's clock [ns].
@@ -88,7 +88,7 @@ class TransformLookup:
         """
         Return the pose of the source frame in the target frame, to which it must be fixed.
 
-        :raises InvalidGoal: there is no such transform, or the frames move against each other.
+        :raises InvalidGoal: there is no such transform, or only one that can change.
         """
         message = self._lookup(field, target, source, 0)
         if nanoseconds(message.header.stamp) != 0:
@@ -118,7 +118,7 @@ class TransformLookup:
 
 def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
     """
-    Return the transforms that a node receives; None if tf2 is not installed.
+    Return a lookup in the transforms that a node receives; None if tf2 is not installed.
 
     :param max_age: largest age of the newest transform of a frame [s].
     """

@@ -4,9 +4,9 @@
 The functions that programs can call, with one class for each subject.
 
 To add a function, add a public method to the class of its subject. Programs can call every public
-method of the classes in :data:`BUILTIN_GROUPS` under its own name. Its parameters have the names
-and defaults of the script manual, because programs can pass arguments by name. A function that
-takes time is a generator that yields once per controller cycle.
+method of the classes in :data:`BUILTIN_GROUPS` by the method's name. The parameters of a method
+have the names and defaults of the script manual, because programs can pass arguments by name. A
+function that takes time is a generator that yields once per controller cycle.
 `test/sim/programs` has at least one program for each function.
 """
 

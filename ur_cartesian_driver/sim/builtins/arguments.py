@@ -1,6 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks and converts the arguments that programs pass to functions."""
+"""
+Checks and converts the arguments that programs pass to functions.
+
+A check returns the converted value, or raises the error that ends the program.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ from ur_cartesian_driver.urscript.script_values import (
 
 
 def number(value: Value, name: str) -> float:
-    """Return a finite number; any other value ends the program."""
+    """Return the value as a finite number."""
     if not is_number(value):
         raise RuntimeException(f'Type error: {name} must be a number, not a {type_name(value)}')
     if not isfinite(value):
@@ -29,7 +33,7 @@ def number(value: Value, name: str) -> float:
 
 
 def positive(value: Value, name: str) -> float:
-    """Return a number above zero."""
+    """Return the value as a number above zero."""
     result = number(value, name)
     if result <= 0.0:
         raise RuntimeException(f'{name} is {result:g}; it must be greater than 0')
@@ -37,7 +41,7 @@ def positive(value: Value, name: str) -> float:
 
 
 def not_negative(value: Value, name: str) -> float:
-    """Return a number not below zero."""
+    """Return the value as a number of zero or more."""
     result = number(value, name)
     if result < 0.0:
         raise RuntimeException(f'{name} is {result:g}; it must not be negative')
@@ -45,7 +49,7 @@ def not_negative(value: Value, name: str) -> float:
 
 
 def whole(value: Value, name: str) -> int:
-    """Return a whole number; a whole float is accepted, because divisions give floats."""
+    """Return the value as an integer; whole floats are accepted, because divisions give floats."""
     result = number(value, name)
     if not result.is_integer():
         raise RuntimeException(f'{name} is {result:g}; it must be a whole number')
@@ -53,7 +57,7 @@ def whole(value: Value, name: str) -> int:
 
 
 def int32(value: Value, name: str) -> int:
-    """Return a whole number that fits into 32 bits."""
+    """Return the value as an integer that fits into 32 bits."""
     result = whole(value, name)
     if not INT_MIN <= result <= INT_MAX:
         raise RuntimeException(f'{name} is {result}; it must fit into 32 bits')
@@ -61,7 +65,7 @@ def int32(value: Value, name: str) -> int:
 
 
 def within(value: Value, name: str, low: float, high: float) -> float:
-    """Return a number within bounds, both included."""
+    """Return the value as a number from ``low`` to ``high``."""
     result = number(value, name)
     if not low <= result <= high:
         raise RuntimeException(f'{name} is {result:g}; it must be within {low:g}..{high:g}')
@@ -69,7 +73,7 @@ def within(value: Value, name: str, low: float, high: float) -> float:
 
 
 def one_of(value: Value, name: str, choices: tuple[int, ...]) -> int:
-    """Return a whole number that is one of the choices."""
+    """Return the value as an integer that is one of the choices."""
     result = whole(value, name)
     if result not in choices:
         *first, last = map(str, choices)
@@ -78,7 +82,7 @@ def one_of(value: Value, name: str, choices: tuple[int, ...]) -> int:
 
 
 def index(value: Value, name: str, count: int) -> int:
-    """Return a whole number within 0 .. count - 1."""
+    """Return the value as an integer from 0 to ``count`` - 1."""
     result = whole(value, name)
     if not 0 <= result < count:
         raise RuntimeException(f'{name} is {result}; it must be within 0..{count - 1}')
@@ -86,7 +90,7 @@ def index(value: Value, name: str, count: int) -> int:
 
 
 def six(value: Value, name: str) -> Vector6:
-    """Return the six numbers of a list, or of a pose."""
+    """Return the six numbers of a list or a pose."""
     if not isinstance(value, list | ScriptPose) or len(value) != 6:
         raise RuntimeException(f'Type error: {name} must be a list of 6 numbers')
     return vector6(number(item, f'{name}[{i}]') for i, item in enumerate(value))
@@ -117,7 +121,7 @@ def script_pose(value: Pose) -> ScriptPose:
 
 
 def text(value: Value, name: str) -> str:
-    """Return a string."""
+    """Return the value, which must be a string."""
     if not isinstance(value, str):
         raise RuntimeException(f'Type error: {name} must be a string, not a {type_name(value)}')
     return value

@@ -10,7 +10,7 @@ from ur_cartesian_driver.sim.controller import Controller
 
 
 class BuiltinGroup:
-    """The functions of one subject: the public methods of a subclass, see the package."""
+    """The functions of one subject: a subclass has them as public methods, see the package."""
 
     def __init__(self, controller: Controller) -> None:
         """Give the functions access to the state of this controller."""

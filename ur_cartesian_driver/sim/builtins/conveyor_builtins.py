@@ -3,9 +3,9 @@
 """
 Conveyors and their encoders; the simulated belts stand still.
 
-No pulses arrive, so only programs change the tick count of an encoder. While a belt is tracked
+No pulses arrive, so only programs change the tick count of an encoder. While a belt is tracked,
 the moves of a program are ordinary moves, because the belt does not move. A program that changes
-the count of a tracked belt is ended, because the arm would have to follow the belt.
+the tick count of the tracked belt is ended, because the arm would have to follow the belt.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class _Conveyors:
 
 
 class ConveyorBuiltins(BuiltinGroup):
-    """Counts and tracking outlive the program; only `stop_conveyor_tracking` ends tracking."""
+    """Tick counts and tracking outlive the program; `stop_conveyor_tracking` ends tracking."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin with counts of zero."""
+        """Begin with tick counts of zero, and with no tracked belt."""
         super().__init__(controller)
         self._belts = _Conveyors()
 
@@ -66,7 +66,7 @@ class ConveyorBuiltins(BuiltinGroup):
             index(value, name, 12)
 
     def encoder_enable_set_tick_count(self, encoder_index: Value, range_id: Value) -> None:
-        """Set the range of an encoder whose count a program sets."""
+        """Set the counting range of an encoder whose tick count is set by programs."""
         self._encoder(encoder_index).range = RANGES[index(range_id, 'range_id', len(RANGES))]
 
     def encoder_get_tick_count(self, encoder_index: Value) -> float:
@@ -88,30 +88,30 @@ class ConveyorBuiltins(BuiltinGroup):
     def encoder_unwind_delta_tick_count(
         self, encoder_index: Value, delta_tick_count: Value
     ) -> float:
-        """Return a difference of two counts, corrected for a wrap-around between them."""
+        """Return a difference of two tick counts, corrected for a wrap-around between them."""
         turn = self._encoder(encoder_index).range
         delta = number(delta_tick_count, 'delta_tick_count')
         return delta - turn * round(delta / turn)
 
     def conveyor_pulse_decode(self, type: Value, A: Value, B: Value = 0) -> None:
-        """Check the arguments for the first encoder: the older function."""
+        """Check the arguments for the first encoder, like `encoder_enable_pulse_decode`."""
         self.encoder_enable_pulse_decode(0, type, A, B)
 
     def get_conveyor_tick_count(self) -> float:
-        """Return the tick count of the first encoder: the older function."""
+        """Return the tick count of the first encoder (older function)."""
         return self.encoder_get_tick_count(0)
 
     def set_conveyor_tick_count(
         self, tick_count: Value, absolute_encoder_resolution: Value = 0
     ) -> None:
-        """Set range and tick count of the first encoder: the older function."""
+        """Set the range and the tick count of the first encoder (older function)."""
         self.encoder_enable_set_tick_count(0, absolute_encoder_resolution)
         self.encoder_set_tick_count(0, int32(tick_count, 'tick_count'))
 
     def track_conveyor_linear(
         self, direction: Value, ticks_per_meter: Value, encoder_index: Value = 0
     ) -> None:
-        """Track a belt that moves along a direction of the base."""
+        """Track a belt that moves straight in a direction given in the base."""
         six(direction, 'direction')
         number(ticks_per_meter, 'ticks_per_meter')
         self._belts.tracked = index(encoder_index, 'encoder_index', ENCODERS)

@@ -3,7 +3,8 @@
 """
 Functions for programs that control the arm by torques: Jacobians, inertia, centrifugal torques.
 
-The links of this arm have no mass: mass matrix and torques come from the payload, a point mass.
+The links of the simulated arm have no mass, so the mass matrix and the torques come from the
+payload alone, a point mass.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ UNIT_ACCELERATIONS = tuple(vector6(1.0 if i == j else 0.0 for i in range(6)) for
 
 
 class DynamicsBuiltins(BuiltinGroup):
-    """Functions of joint positions and speeds, by default the target's; in base axes."""
+    """Functions of joint positions and speeds (by default the target's); results in base axes."""
 
     def _q(self, q: Value) -> Vector6:
         return self._controller.motion.q if q is None else six(q, 'q')
@@ -37,7 +38,7 @@ class DynamicsBuiltins(BuiltinGroup):
         return self._controller.motion.T_flange_tcp if tcp == 'active_tcp' else pose(tcp, 'tcp')
 
     def get_jacobian(self, q: Value = None, tcp: Value = 'active_tcp') -> Matrix:
-        """Return the matrix that maps joint speeds to the speed of the TCP [m/s, rad/s]."""
+        """Return the matrix that maps joint speeds to the twist of the TCP [m/s, rad/s]."""
         return Matrix(self._controller.arm.jacobian(self._q(q), self._tcp(tcp)).tolist())
 
     def get_jacobian_time_derivative(
@@ -52,7 +53,7 @@ class DynamicsBuiltins(BuiltinGroup):
         return Matrix(((ahead - behind) / (2.0 * DIFFERENCE)).tolist())
 
     def get_mass_matrix(self, q: Value = None, include_rotor_inertia: Value = False) -> Matrix:
-        """Return the matrix that maps joint accelerations to joint moments [kg m^2]."""
+        """Return the matrix [kg m^2] that maps joint accelerations to joint moments."""
         joints = self._q(q)
         columns = [self._payload_moments(joints, ZERO6, qdd) for qdd in UNIT_ACCELERATIONS]
         return Matrix([list(row) for row in zip(*columns, strict=True)])
@@ -60,7 +61,7 @@ class DynamicsBuiltins(BuiltinGroup):
     def get_coriolis_and_centrifugal_torques(
         self, q: Value = None, qd: Value = None
     ) -> list[float]:
-        """Return the joint moments that motion at constant joint speeds needs [Nm]."""
+        """Return the joint moments [Nm] for motion at constant joint speeds, without gravity."""
         return list(self._payload_moments(self._q(q), self._qd(qd), ZERO6))
 
     def _payload_moments(self, q: Vector6, qd: Vector6, qdd: Vector6) -> Vector6:

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Settings of the installation, which PolyScope writes at the head of each program that it saves.
+Functions that change settings of the installation; programs saved by PolyScope begin with them.
 
-Their arguments are checked, but they have no effect on the arm, because buttons, wires and
-machines around it are not simulated.
+The arguments are checked, but the settings have no effect, because the buttons, wires and machines
+around the arm are not simulated.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def _runstate(count: int) -> Callable[[Any, Value, Value], None]:
 
 
 def _runstate_list(count: int) -> Callable[[Any, Value], None]:
-    """Return the older script function, for a list of outputs that are high during a program."""
+    """Return the older script function; it takes the outputs that are high during a program."""
 
     def choose(_: Any, outputs: Value) -> None:
         if type(outputs) is not list:
@@ -78,30 +78,30 @@ class InstallationBuiltins(BuiltinGroup):
         """Remove the actions of all inputs."""
 
     def set_tool_analog_input_domain(self, port: Value, domain: Value) -> None:
-        """Choose 0 = current, 1 = voltage."""
+        """Choose the domain of a tool input: 0 = current, 1 = voltage."""
         index(port, 'port', 2)
         index(domain, 'domain', 2)
 
     def set_analog_inputrange(self, port: Value, range: Value) -> None:
-        """Choose the range of an input in the old numbering: standard 0-1, tool 2-3."""
+        """Choose the range of an input, given by its old number: standard 0-1, tool 2-3."""
         index(port, 'port', 4)
         index(range, 'range', 5)
 
     def set_tool_output_mode(self, mode: Value) -> None:
-        """Choose 0 = digital outputs, 1 = power with both pins."""
+        """Choose the use of the tool's output pins: 0 = digital outputs, 1 = power from both."""
         index(mode, 'mode', 2)
 
     def set_tool_digital_output_mode(self, n: Value, mode: Value) -> None:
-        """Choose 1 = sinking, 2 = sourcing, 3 = both."""
+        """Choose the mode of a tool output: 1 = sinking, 2 = sourcing, 3 = both."""
         index(n, 'n', 2)
         one_of(mode, 'mode', (1, 2, 3))
 
     def set_safety_mode_transition_hardness(self, type: Value) -> None:
-        """Choose 0 = hard, 1 = soft."""
+        """Choose the transition between safety modes: 0 = hard, 1 = soft."""
         index(type, 'type', 2)
 
     def motion_version_set(self, version: Value) -> None:
-        """Choose the version of the motion generator; both are the same here."""
+        """Choose the version of the motion generator; both versions move alike here."""
         one_of(version, 'version', (1, 2))
 
 
@@ -114,7 +114,7 @@ class EuromapBuiltins(BuiltinGroup):
         self._outputs = [False] * EUROMAP_PINS
 
     def get_euromap_input(self, port_number: Value) -> bool:
-        """Return low: there is no machine that could set an input."""
+        """Return False (low), because no machine is simulated that could set the input."""
         index(port_number, 'port_number', EUROMAP_PINS)
         return False
 

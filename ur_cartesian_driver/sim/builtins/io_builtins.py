@@ -29,7 +29,7 @@ class _IoGroup(BuiltinGroup):
 
 
 def _get_n(items: _Items[T]) -> Callable[[Any, Value], T]:
-    """Return the script function that reads item n."""
+    """Return the script function that reads item ``n`` of a list."""
 
     def get(group: _IoGroup, n: Value) -> T:
         values = items(group._io)
@@ -39,7 +39,7 @@ def _get_n(items: _Items[T]) -> Callable[[Any, Value], T]:
 
 
 def _set_n(items: _Items[bool]) -> Callable[[Any, Value, Value], None]:
-    """Return the script function that sets item n."""
+    """Return the script function that sets item ``n`` of a list."""
 
     def set_(group: _IoGroup, n: Value, b: Value) -> None:
         values = items(group._io)
@@ -49,7 +49,7 @@ def _set_n(items: _Items[bool]) -> Callable[[Any, Value, Value], None]:
 
 
 def _read(items: _Items[T]) -> Callable[[Any, Value], T]:
-    """Return the script function that reads an address."""
+    """Return the script function that reads the item at an address."""
 
     def read(group: _IoGroup, address: Value) -> T:
         values = items(group._io)
@@ -61,7 +61,7 @@ def _read(items: _Items[T]) -> Callable[[Any, Value], T]:
 def _write(
     items: _Items[T], checked: Callable[[Value, str], T]
 ) -> Callable[[Any, Value, Value], None]:
-    """Return the script function that writes to an address."""
+    """Return the script function that writes the item at an address."""
 
     def write(group: _IoGroup, address: Value, value: Value) -> None:
         values, new = items(group._io), checked(value, 'value')
@@ -104,7 +104,7 @@ class DigitalBuiltins(_IoGroup):
 
 
 class AnalogBuiltins(_IoGroup):
-    """Analog inputs and outputs [V or A] and the tool's supply."""
+    """Analog inputs and outputs [V or A], and the supply voltage of the tool."""
 
     get_standard_analog_out = _get_n(lambda io: io.analog_out)
     get_analog_out = get_standard_analog_out  # the old name
@@ -120,15 +120,15 @@ class AnalogBuiltins(_IoGroup):
     set_analog_out = set_standard_analog_out  # the old name
 
     def set_analog_outputdomain(self, port: Value, domain: Value) -> None:
-        """Choose 0 = current, 1 = voltage."""
+        """Choose the domain of an analog output: 0 = current, 1 = voltage."""
         self._io.analog_out_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
 
     def set_standard_analog_input_domain(self, port: Value, domain: Value) -> None:
-        """Choose 0 = current, 1 = voltage."""
+        """Choose the domain of an analog input: 0 = current, 1 = voltage."""
         self._io.analog_in_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
 
     def set_tool_voltage(self, voltage: Value) -> None:
-        """Set the tool's supply to 0, 12 or 24 V; a whole float is accepted."""
+        """Set the supply voltage of the tool to 0, 12 or 24 V; whole floats are accepted."""
         volts = whole(voltage, 'voltage')
         if volts not in (0, 12, 24):
             raise RuntimeException(f'voltage is {volts}; it must be 0, 12 or 24')
@@ -143,11 +143,11 @@ class AnalogBuiltins(_IoGroup):
         rx_idle_chars: Value,
         tx_idle_chars: Value,
     ) -> None:
-        """Accept any settings of the tool's serial line; nothing is connected to it here."""
+        """Accept any settings of the tool's serial line, which has no simulated device."""
 
 
 class PortBuiltins(_IoGroup):
-    """Ports: shared with Modbus clients on a real robot, here memory that outlives programs."""
+    """Ports, shared with Modbus clients on a real robot; here, memory that outlives programs."""
 
     read_port_bit = _read(lambda io: io.port_bits)
     read_port_register = _read(lambda io: io.port_registers)

@@ -17,13 +17,13 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 def solve(
     controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
 ) -> Vector6 | None:
-    """Return the joint positions for a TCP pose that are nearest to ``near``, or None."""
+    """Return the joint solution of a TCP pose that is nearest to ``near``; None = no solution."""
     return nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
 
 
 def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     """
-    Return joint positions unchanged; for a pose, return the solution nearest to the present ones.
+    Return joint positions unchanged; convert a pose to its solution nearest to the present joints.
 
     :raises RuntimeException: the pose cannot be reached.
     """
@@ -35,7 +35,7 @@ def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
 
 
 def _reached(q: Vector6 | None, function: str) -> Vector6:
-    """Return the solution, or raise the robot's error when there is none."""
+    """Return the solution, or raise the robot's error if the pose has no solution."""
     if q is None:
         raise RuntimeException(
             'The robot cannot reach the requested pose. Script function '
@@ -45,7 +45,7 @@ def _reached(q: Vector6 | None, function: str) -> Vector6:
 
 
 def pose_of(controller: Controller, value: Value, name: str) -> Pose:
-    """Return a pose unchanged; for joint positions, return the TCP pose at them."""
+    """Return a pose unchanged; convert joint positions to the TCP pose."""
     if is_pose(value):
         return pose(value, name)
     return controller.arm.forward(six(value, name)) @ controller.motion.T_flange_tcp
@@ -69,7 +69,7 @@ class KinematicsBuiltins(BuiltinGroup):
         maxOrientationError: Value = 1e-10,
         tcp: Value = 'active_tcp',
     ) -> list[float]:
-        """Return the joint solution nearest to `qnear`, by default to the present joints."""
+        """Return the joint solution nearest to `qnear` (by default, to the present joints)."""
         return list(_reached(self._solve(x, qnear, tcp), 'get_inverse_kin'))
 
     def get_inverse_kin_has_solution(
@@ -86,12 +86,12 @@ class KinematicsBuiltins(BuiltinGroup):
     def get_forward_kin(
         self, q: Value = 'current_joint_positions', tcp: Value = 'active_tcp'
     ) -> ScriptPose:
-        """Return the pose of the TCP at joint positions, by default at the present ones."""
+        """Return the pose of the TCP at joint positions (by default, at the present ones)."""
         joints = self._controller.motion.q if q == 'current_joint_positions' else six(q, 'q')
         return script_pose(self._controller.arm.forward(joints) @ self._tcp(tcp))
 
     def is_within_safety_limits(self, pose: Value, qNear: Value = None) -> bool:
-        """Return whether a pose can be reached, or joint positions lie within their limits."""
+        """Return whether a pose can be reached; for joint positions, whether they are in range."""
         if is_pose(pose):
             return self._solve(pose, qNear, 'active_tcp') is not None
         limits = self._controller.arm.model.position_limits
@@ -109,7 +109,7 @@ class KinematicsBuiltins(BuiltinGroup):
         return script_pose(self._controller.target.T_base_tcp)
 
     def get_target_waypoint(self) -> ScriptPose:
-        """Return the waypoint of the running move; without one, the target pose of the TCP."""
+        """Return the waypoint of the running move; if none runs, the target pose of the TCP."""
         motion, waypoint = self._controller.motion, self._controller.waypoint
         return script_pose(
             waypoint if waypoint is not None and motion.moving else motion.T_base_tcp

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Modbus signals of programs: they are kept in memory, without any devices.
+The Modbus signals of programs, kept in memory without any devices.
 
-Each device seems to answer but does nothing: inputs stay 0, outputs keep the values that were
-written. A program therefore runs until it waits for its machine.
+To a program, each device seems to answer but does nothing: inputs stay 0, and outputs keep the
+values that were written. A program therefore runs until it waits for a machine to react.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import truth, type_name, Value
 
-#: Initial value of a signal, and whether it is an output, by the number of its type.
+#: Initial value of a signal, and whether the signal is an output; the index is `signal_type`.
 SIGNAL_TYPES = ((False, False), (False, True), (0, False), (0, True))
 MAX_REGISTERS = 123
 
@@ -58,8 +58,9 @@ class ModbusBuiltins(BuiltinGroup):
         """
         Add or replace a signal.
 
-        :param signal_type: 0, 1 = digital input, output; 2, 3 = input register, output register.
-        :param register_count: with more than one register, the value of the signal is a list.
+        :param signal_type: 0 = digital input, 1 = digital output, 2 = input register, 3 = output
+            register.
+        :param register_count: if it is more than one, the value of the signal is a list.
         """
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
@@ -103,14 +104,14 @@ class ModbusBuiltins(BuiltinGroup):
         return value[:] if type(value) is list else value
 
     def modbus_get_error(self, signal_name: Value) -> int:
-        """Return 0 = no error: the device seems to answer."""
+        """Return 0 (no error), because every device seems to answer."""
         self._signal(signal_name)
         return 0
 
     def modbus_set_output_register(
         self, signal_name: Value, register_value: Value, is_secondary_program: Value = False
     ) -> None:
-        """Write the register of a signal, or a list of all its registers."""
+        """Write one register; for a signal that reads and writes, a list of all its registers."""
         signal = self._signal(signal_name)
         given = register_value if type(register_value) is list else [register_value]
         if len(given) != signal.registers_to_write:
@@ -135,7 +136,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_send_custom_command(
         self, IP: Value, slave_number: Value, function_code: Value, data: Value
     ) -> None:
-        """Check the arguments; there is no device that could receive the bytes."""
+        """Check the arguments; no device is simulated that could receive the bytes."""
         text(IP, 'IP')
         index(slave_number, 'slave_number', 256)
         index(function_code, 'function_code', 256)
@@ -157,7 +158,7 @@ class ModbusBuiltins(BuiltinGroup):
     def modbus_set_signal_update_frequency(
         self, signal_name: Value, update_frequency: Value
     ) -> None:
-        """Set the rate at which a device would be polled [Hz]."""
+        """Check the rate [Hz] at which a real device would be polled."""
         self._signal(signal_name)
         not_negative(update_frequency, 'update_frequency')
 

@@ -39,7 +39,7 @@ class MotionBuiltins(BuiltinGroup):
         return self._controller.motion
 
     def _take(self, waypoint: Pose | None = None) -> None:
-        """Take ownership of the motion; a stream of set-points has no waypoint."""
+        """Take ownership of the motion, and note the waypoint (None for set-point streams)."""
         freedrive = self._controller.freedrive
         if freedrive is not FreedriveState.OFF:
             raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')
@@ -72,7 +72,7 @@ class MotionBuiltins(BuiltinGroup):
         t: Value = 0,
         r: Value = 0,
     ) -> Steps:
-        """Move straight in joint space; for a pose, to its solution nearest the present joints."""
+        """Move straight in joint space; a pose is converted to its nearest joint solution."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
@@ -85,7 +85,7 @@ class MotionBuiltins(BuiltinGroup):
     def movel(
         self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
     ) -> Steps:
-        """Move the tool straight; for joint positions, to the TCP pose at them."""
+        """Move the tool straight; joint positions are converted to the TCP pose."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
@@ -116,7 +116,7 @@ class MotionBuiltins(BuiltinGroup):
         yield from self._run(lambda: self._motion.movec(via, to, a_, v_, radius, mode_), to)
 
     def optimovej(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
-        """Move in joint space with limited jerk, at fractions of the joints' limits."""
+        """Move in joint space with limited jerk; `a` and `v` are fractions of the joint limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._joints(goal, 'optimovej')
         yield from self._run(
@@ -124,7 +124,7 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
-        """Move the tool straight with limited jerk, at fractions of the joints' limits."""
+        """Move the tool straight with limited jerk; `a`, `v` are fractions of the joint limits."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
         yield from self._run(lambda: self._motion.optimovel(target, a_, v_, radius), target)
@@ -138,7 +138,7 @@ class MotionBuiltins(BuiltinGroup):
         lookahead_time: Value = 0.1,
         gain: Value = 300,
     ) -> Steps:
-        """Follow a set-point for a time; a and v are ignored, as on the robot."""
+        """Follow a set-point for `t` seconds; `a` and `v` are ignored, as on the robot."""
         target = six(q, 'q')
         settings = (
             positive(t, 't'),
@@ -149,9 +149,10 @@ class MotionBuiltins(BuiltinGroup):
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
-        Move like `movep`; how "servo circular" of the manual differs from it is not published.
+        Move like `movep`: how the manual's "servo circular" differs from it is not published.
 
-        A call at its target takes a cycle, too: programs call it in a loop without another wait.
+        A call takes at least one cycle, even if the tool is already at the target, because
+        programs call `servoc` in a loop that does not wait otherwise.
         """
         passed = False
         for _ in self.movep(pose, a, v, r):
@@ -161,12 +162,12 @@ class MotionBuiltins(BuiltinGroup):
             yield
 
     def speedj(self, qd: Value, a: Value, t: Value = None) -> Steps:
-        """Change to joint speeds; return after `t`, or without it when the speeds are reached."""
+        """Change to joint speeds; return after `t`, or (if None) once the speeds are reached."""
         target, acceleration, time = six(qd, 'qd'), positive(a, 'a'), _duration(t)
         yield from self._run(lambda: self._motion.speedj(target, acceleration, time))
 
     def speedl(self, xd: Value, a: Value, t: Value = None, aRot: Value = 'a') -> Steps:
-        """Change to a tool speed; return after `t`, or without it when the speed is reached."""
+        """Change to a tool speed; return after `t`, or (if None) once the speed is reached."""
         twist, acceleration, time = six(xd, 'xd'), positive(a, 'a'), _duration(t)
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         yield from self._run(
@@ -174,12 +175,12 @@ class MotionBuiltins(BuiltinGroup):
         )
 
     def stopj(self, a: Value) -> Steps:
-        """Brake in joint space; return at rest."""
+        """Brake in joint space; return when the arm is at rest."""
         acceleration = positive(a, 'a')
         yield from self._stop(lambda: self._motion.stopj(acceleration))
 
     def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
-        """Brake the tool along its tangent; return at rest."""
+        """Brake the tool along its tangent; return when the arm is at rest."""
         acceleration = positive(a, 'a')
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         yield from self._stop(lambda: self._motion.stopl(acceleration, angular_acceleration))
@@ -191,7 +192,7 @@ class MotionBuiltins(BuiltinGroup):
         viscous_scale: Value = None,
         coulomb_scale: Value = None,
     ) -> Steps:
-        """Check the torques and wait a cycle; without dynamics, torques do not move the arm."""
+        """Check the torques and wait a cycle; torques cannot move an arm without dynamics."""
         six(torque, 'torque')
         self._take()
         yield
@@ -215,7 +216,7 @@ class ModeBuiltins(BuiltinGroup):
         self._controller.freedrive = FreedriveState.OFF
 
     def get_freedrive_status(self) -> int:
-        """Return 0 = normal operation: the arm is never pushed near a singularity here."""
+        """Return 0 (normal operation): a simulated arm is never pushed near a singularity."""
         return 0
 
     def teach_mode(self) -> None:
@@ -227,7 +228,7 @@ class ModeBuiltins(BuiltinGroup):
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value
     ) -> None:
-        """Enter or change force mode; every type is treated as 2, a frame that does not move."""
+        """Enter or change force mode; every `type` is treated as 2, which has a fixed frame."""
         frame = pose(task_frame, 'task_frame')
         compliant = tuple(flag != 0.0 for flag in six(selection_vector, 'selection_vector'))
         one_of(type, 'type', (1, 2, 3))
@@ -243,11 +244,11 @@ class ModeBuiltins(BuiltinGroup):
         self._controller.contact.force_mode = None
 
     def force_mode_set_damping(self, damping: Value) -> None:
-        """Accept a damping of 0..1, without effect: the simulated law has no damping."""
+        """Accept a damping of 0..1, without effect: the simulated force law has no damping."""
         within(damping, 'damping', 0, 1)
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
-        """Scale the speed of compliant axes per missing force by 0..2."""
+        """Set the factor (0..2) that scales the speed of compliant axes per missing force."""
         self._controller.contact.gain_scaling = within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
@@ -257,7 +258,7 @@ class ModeBuiltins(BuiltinGroup):
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
-    """Return acceleration, speed and time; with a time, the first two only shape its ramps."""
+    """Return acceleration, speed and time; for a time above 0, the others only shape the ramps."""
     time = not_negative(t, 't')
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time
@@ -272,5 +273,5 @@ def _fraction(value: Value, name: str) -> float:
 
 
 def _duration(value: Value) -> float | None:
-    """Return the time of a speed command; None = until the speed is reached."""
+    """Return the duration of a speed command; None = until the speed is reached."""
     return None if value is None else not_negative(value, 't')

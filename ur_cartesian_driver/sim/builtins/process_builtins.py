@@ -39,7 +39,7 @@ class PathOffsetBuiltins(BuiltinGroup):
         self._offset.enabled = True
 
     def path_offset_disable(self, a: Value = 20) -> Steps:
-        """Disable the path offset and brake in joint space; return at rest."""
+        """Disable the path offset and brake in joint space; return when the arm is at rest."""
         acceleration, controller = positive(a, 'a'), self._controller
         controller.ownership.take(controller.programs.current_thread)
         yield from controller.ownership.run(
@@ -62,7 +62,7 @@ class PathOffsetBuiltins(BuiltinGroup):
         self._offset.alpha = within(alpha, 'alpha', 0, 1)
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
-        """Set the limits [m, rad]."""
+        """Set the limits of the offset along [m] and about [rad] each axis."""
         self._offset.max_translation = not_negative(transLimit, 'transLimit')
         self._offset.max_rotation = not_negative(rotLimit, 'rotLimit')
 
@@ -72,7 +72,7 @@ def _frame(type: Value) -> int:
 
 
 class ProcessBuiltins(BuiltinGroup):
-    """Screws, forces and torques are only checked; the reaction to error codes takes effect."""
+    """Arguments for screws and torques are only checked; `pause_on_error_code` takes effect."""
 
     def screw_driving(self, f: Value, v_limit: Value) -> None:
         """Check the force along the tool's z axis [N] and the speed limit [m/s]."""
@@ -92,7 +92,11 @@ class ProcessBuiltins(BuiltinGroup):
         My: Value = None,
         Mz: Value = None,
     ) -> None:
-        """Check limits of forces [N] and torques [Nm] due to acceleration, in a flange frame."""
+        """
+        Check the limits of the forces [N] and torques [Nm] due to acceleration.
+
+        :param frame_offset: pose of the frame of the limits, relative to the flange.
+        """
         pose(frame_offset, 'frame_offset')
         names = ('Fx', 'Fy', 'Fz', 'Mx', 'My', 'Mz')
         given = zip(names, (Fx, Fy, Fz, Mx, My, Mz), strict=True)
@@ -101,10 +105,10 @@ class ProcessBuiltins(BuiltinGroup):
                 not_negative(value, name)
 
     def tool_wrench_limit_disable(self) -> None:
-        """Remove the limits."""
+        """Remove the limits of `tool_wrench_limit_set`."""
 
     def high_holding_torque_enable(self) -> None:
-        """Hold an arm at rest with more torque, which is the default."""
+        """Hold an arm at rest with high torque, as by default."""
 
     def high_holding_torque_disable(self) -> None:
         """Hold an arm at rest with normal torque until the program ends."""
@@ -114,7 +118,7 @@ class ProcessBuiltins(BuiltinGroup):
         within(threshold, 'threshold', 0, 1)
 
     def pause_on_error_code(self, code: Value, argument: Value = None) -> None:
-        """Pause the program when an error code occurs; None = with any argument."""
+        """Pause the program when an error with this code and argument (None = any) occurs."""
         self._controller.process.pause_on.add(
             (whole(code, 'code'), None if argument is None else whole(argument, 'argument'))
         )

@@ -26,7 +26,7 @@ from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, V
 
 
 class TimeBuiltins(BuiltinGroup):
-    """Time, and functions that take time; the speed slider does not scale them."""
+    """Time, interpreter mode and RTDE watchdog; the speed slider does not scale times."""
 
     def get_steptime(self) -> float:
         """Return the duration of a cycle [s]."""
@@ -37,35 +37,35 @@ class TimeBuiltins(BuiltinGroup):
         yield
 
     def sleep(self, t: Value) -> Steps:
-        """Wait for a time [s], rounded up to whole cycles, at least one."""
+        """Wait for `t` seconds, rounded up to whole cycles; at least one cycle."""
         end = self._controller.time + not_negative(t, 't')
         yield
         while self._controller.time < end - 1e-9:
             yield
 
     def time(self, mode: Value = 0) -> Struct:
-        """Return the controller's clock as seconds and nanoseconds."""
+        """Return the time of the controller's clock in seconds and nanoseconds."""
         nanoseconds = round(self._controller.time * 1e9)
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
-        """Execute the statements of clients of the interpreter port, until the mode ends."""
+        """Execute statements that clients send to the interpreter port, until the mode ends."""
         yield from self._controller.interpreter_mode.run(
             clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
         )
 
     def end_interpreter(self) -> None:
-        """End the interpreter mode after the statement that is being executed."""
+        """End interpreter mode when the current statement has ended."""
         self._controller.interpreter_mode.end()
 
     def clear_interpreter(self) -> None:
-        """Delete the statements' definitions, after the statement that is being executed."""
+        """Delete all definitions of interpreter mode, when the current statement has ended."""
         self._controller.interpreter_mode.clear()
 
     def rtde_set_watchdog(
         self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
     ) -> None:
-        """Check until the program ends that an RTDE input is written often enough."""
+        """From now until the program ends, check that an RTDE input is written often enough."""
         self._controller.watch_input(
             text(variable_name, 'variable_name'),
             not_negative(min_frequency, 'min_frequency'),
@@ -88,7 +88,7 @@ class PendantBuiltins(BuiltinGroup):
         error: Value = False,
         blocking: Value = False,
     ) -> Steps:
-        """Show a window; a blocking window holds its thread until the window is closed."""
+        """Show a window; if it is blocking, wait until the window is closed."""
         popup = Popup(
             text=to_text(s),
             title=to_text(title),
@@ -113,7 +113,7 @@ def _list_of(
 
 
 class RobotBuiltins(BuiltinGroup):
-    """The robot's motion [rad, m and their derivatives], its sensors, payload and power."""
+    """The robot's motion, sensors, payload and power; motion in [rad], [m] and [s]."""
 
     get_target_joint_positions = _list_of(lambda c: c.target.q)
     get_joint_positions = get_target_joint_positions  # the old name
@@ -124,15 +124,15 @@ class RobotBuiltins(BuiltinGroup):
     get_target_tcp_speed = _list_of(lambda c: c.target.tcp_twist)
     get_actual_tcp_speed = _list_of(lambda c: c.actual.tcp_twist)
     get_tcp_force = _list_of(lambda c: c.tcp_wrench)
-    # The arm has no dynamics.
+    # Zero, because the simulated arm has no dynamics.
     get_joint_torques = _list_of(lambda _: (0.0,) * 6)
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
-        """Return the actual joint positions of this many cycles ago [rad]."""
+        """Return the actual joint positions [rad] of the cycle that is `steps` cycles ago."""
         return list(self._controller.joint_history(whole(steps, 'steps')))
 
     def force(self) -> float:
-        """Return the force on the tool [N]."""
+        """Return the magnitude of the force on the tool [N]."""
         return hypot(*self._controller.tcp_wrench[:3])
 
     def get_joint_temp(self, j: Value) -> float:
@@ -145,7 +145,7 @@ class RobotBuiltins(BuiltinGroup):
         return 25.0
 
     def get_tool_current(self) -> float:
-        """Return 0: no current of the tool is simulated [A]."""
+        """Return 0 [A], because the current of the tool is not simulated."""
         return 0.0
 
     def get_tool_accelerometer_reading(self) -> list[float]:
@@ -163,7 +163,7 @@ class RobotBuiltins(BuiltinGroup):
         sensor_measuring_offset: Value = None,
         sensor_cog: Value = None,
     ) -> None:
-        """Take the force of an external sensor from RTDE."""
+        """Enable or disable the use of forces that RTDE clients write for an external sensor."""
         self._controller.external_ft = truth(enable)
 
     enable_external_ft_sensor = ft_rtde_input_enable  # the old name
@@ -186,7 +186,7 @@ class RobotBuiltins(BuiltinGroup):
     def set_target_payload(
         self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
     ) -> None:
-        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], without a transition."""
+        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], all at once."""
         not_negative(transition_time, 'transition_time')
         matrix = (0.0,) * 6 if inertia is None else six(inertia, 'inertia')
         if min(matrix[:3]) < 0.0 or max(abs(item) for item in matrix) > 133.0:
@@ -205,7 +205,7 @@ class RobotBuiltins(BuiltinGroup):
     get_target_payload_inertia = _list_of(lambda c: c.payload.inertia)
 
     def set_gravity(self, d: Value) -> None:
-        """Set the acceleration that counters gravity, in the base [m/s^2]."""
+        """Set the acceleration [m/s^2] opposite to gravity, in base axes."""
         self._controller.gravity = three(d, 'd')
 
     def set_pos(self, q: Value) -> None:
@@ -214,9 +214,9 @@ class RobotBuiltins(BuiltinGroup):
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """
-        Reset the full turns of joints without limits.
+        Change the positions of joints without limits by full turns.
 
-        :param qNear: they become the equivalent positions nearest to these; None = no change.
+        :param qNear: positions [rad], to which the new positions are nearest; None = no change.
         """
         if qNear is None:
             return
@@ -230,7 +230,7 @@ class RobotBuiltins(BuiltinGroup):
             self._controller.motion.teleport(six(counted, 'q'))
 
     def set_speed_slider_fraction(self, fraction: Value) -> None:
-        """Set the speed slider."""
+        """Set the speed slider, 0..1."""
         self._controller.set_slider(number(fraction, 'fraction'))
 
     def protective_stop(self) -> Steps:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Remote procedure calls of programs: XML-RPC over the sockets of programs.
+Remote procedure calls of programs, as XML-RPC over the sockets of programs.
 
 A pose is sent as a struct with the members x, y, z, rx, ry and rz, as the manufacturer's example
 servers expect. Each call opens its own connection; the program waits for the answer without a time
@@ -33,7 +33,7 @@ from ur_cartesian_driver.urscript.script_values import (
     Value,
 )
 
-#: An answer longer than this is an error of the server [bytes].
+#: A longer answer [bytes] is treated as an error of the server.
 MAX_ANSWER = 1024 * 1024
 
 
@@ -41,7 +41,7 @@ class RpcBuiltins(BuiltinGroup):
     """The factory of remote objects, whose methods a program calls."""
 
     def rpc_factory(self, type: Value, url: Value) -> RemoteObject:
-        """Return an object with a server's procedures; nothing is sent before the first call."""
+        """Return an object whose methods call a server; nothing is sent before the first call."""
         if text(type, 'type').lower() != 'xmlrpc':
             raise RuntimeException(f'type is {type!r}; it must be "xmlrpc"')
         return RemoteProcedures(self._controller, text(url, 'url'))
@@ -112,7 +112,7 @@ class RemoteProcedures(RemoteObject):
             sockets.close(name)
 
     def _body(self, method: str, received: bytes, closed: bool) -> bytes | None:
-        """Return the body of an HTTP answer; None = it has not fully arrived."""
+        """Return the body of an HTTP answer; None = the answer has not fully arrived."""
         head, separator, body = received.partition(b'\r\n\r\n')
         if len(received) > MAX_ANSWER:
             raise self._failure(method, 'the answer is longer than 1 MiB')

@@ -3,8 +3,9 @@
 """
 The socket functions of URScript programs.
 
-A timeout of zero or less is no time limit. If the peer has closed the connection, a read ends at
-once with the same result as after a timeout. An incomplete value stays in the buffer.
+A timeout of zero or less means no time limit. Once the peer has closed the connection, a read
+without enough data ends at once, with the same result as after a timeout. An incomplete value
+stays in the buffer.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import to_text, Value
 
 CONNECT_TIMEOUT = 2.0
-#: Most reads of one socket in a cycle; the next read waits for the next cycle. This bound and TCP
-#: hold back a peer that writes without a pause, so that the program can do its other work. The
-#: bound of a real controller is not published.
+#: Most reads of one socket in a cycle; a further read waits for the next cycle. With TCP's flow
+#: control, this bound holds back a peer that writes without a pause, so that the program can do
+#: its other work. The bound of a real controller is not published.
 READS_PER_CYCLE = 32
-#: Most values in one read of numbers, and most characters in one string.
+#: Most values in one read of numbers; most characters in one string that is read without a suffix.
 MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 
 T = TypeVar('T')
@@ -35,7 +36,7 @@ class SocketBuiltins(BuiltinGroup):
     """Functions that wait on the controller's clock, so they also work on the virtual clock."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin without reads."""
+        """Begin with no reads counted."""
         super().__init__(controller)
         #: Socket name -> the cycle of its last read, and the number of reads in that cycle.
         self._reads: dict[str, tuple[int, int]] = {}
@@ -51,7 +52,7 @@ class SocketBuiltins(BuiltinGroup):
     def socket_open(
         self, address: Value, port: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, bool]:
-        """Connect; give up after 2 s."""
+        """Connect; return whether this succeeds within 2 s."""
         name = text(socket_name, 'socket_name')
         self._sockets.open(name, text(address, 'address'), whole(port, 'port'))
         deadline = self._now + CONNECT_TIMEOUT
@@ -63,13 +64,13 @@ class SocketBuiltins(BuiltinGroup):
         return self._sockets.state(name) is SocketState.OPEN
 
     def socket_close(self, socket_name: Value = 'socket_0') -> None:
-        """Close a socket; a name that is not open is no error."""
+        """Close a socket; an unknown name is no error."""
         self._sockets.close(text(socket_name, 'socket_name'))
 
     def _wait(
         self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
     ) -> Generator[None, None, T | None]:
-        """Return the result of `take` on the received bytes; None after a timeout or a close."""
+        """Return the result of `take` on the received bytes; None = timeout, or socket closed."""
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
@@ -84,7 +85,7 @@ class SocketBuiltins(BuiltinGroup):
             yield
 
     def _has_read_enough(self, name: str) -> bool:
-        """Count a read; return whether it has to wait for the next cycle."""
+        """Count a read; return whether this read has to wait for the next cycle."""
         now = self._controller.cycles
         cycle, reads = self._reads.get(name, (now, 0))
         reads = reads + 1 if cycle == now else 1
@@ -95,7 +96,7 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_binary_integer(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, list[int]]:
-        """Read 32 bit integers in network order: [n, v1 .. vn], or [0, -1 .. -1]."""
+        """Return 32 bit integers in network order as [n, v1 .. vn]; on failure [0, -1 .. -1]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _exactly(4 * count))
         if data is None:
@@ -105,7 +106,7 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_byte_list(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, list[int]]:
-        """Read bytes: [n, v1 .. vn], or [0, -1 .. -1]."""
+        """Return bytes as [n, v1 .. vn]; on failure [0, -1 .. -1]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _exactly(count))
         return [0] + [-1] * count if data is None else [count, *data]
@@ -113,7 +114,7 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_ascii_float(
         self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, list[float]]:
-        """Read numbers written as `(1.4, 2)`: [n, v1 .. vn], or [0, nan .. nan]."""
+        """Return numbers written as `(1.4, 2)` as [n, v1 .. vn]; on failure [0, nan .. nan]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _through(b')'))
         try:
@@ -132,7 +133,7 @@ class SocketBuiltins(BuiltinGroup):
         interpret_escape: Value = False,
         timeout: Value = 2,
     ) -> Generator[None, None, str]:
-        """Read all text received, or the part between prefix and suffix; '' after a timeout."""
+        """Return all received text, or the part between prefix and suffix; on failure ''."""
         before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
         data = yield from self._wait(socket_name, timeout, _between(before, after))
         return '' if data is None else data.decode('latin-1')
@@ -140,14 +141,14 @@ class SocketBuiltins(BuiltinGroup):
     def socket_read_line(
         self, socket_name: Value = 'socket_0', timeout: Value = 2
     ) -> Generator[None, None, str]:
-        """Read one line; return it without its line end, or '' after a timeout."""
+        """Return one line without its line end; on failure ''."""
         data = yield from self._wait(socket_name, timeout, _through(b'\n'))
         return '' if data is None else data.decode('latin-1').rstrip('\r\n')
 
     def socket_get_var(
         self, name: Value, socket_name: Value = 'socket_0'
     ) -> Generator[None, None, int]:
-        """Send `GET name`; return the value in the answer `name value`, 0 after a timeout."""
+        """Send `GET name`; return the value in the answer `name value`; on failure 0."""
         self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
         answer = yield from self.socket_read_line(socket_name)
         try:
@@ -165,15 +166,15 @@ class SocketBuiltins(BuiltinGroup):
         return self._send(struct.pack('>i', int32(value, 'value')), socket_name)
 
     def socket_send_byte(self, value: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send the lowest 8 bits."""
+        """Send the lowest 8 bits of a value as one byte."""
         return self._send(bytes([whole(value, 'value') & 0xFF]), socket_name)
 
     def socket_send_string(self, str: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send the text of a value."""
+        """Send a value as text."""
         return self._send(to_text(str).encode('latin-1', 'replace'), socket_name)
 
     def socket_send_line(self, str: Value, socket_name: Value = 'socket_0') -> bool:
-        """Send the text of a value and a line end."""
+        """Send a value as text, followed by a line end."""
         return self._send((to_text(str) + '\n').encode('latin-1', 'replace'), socket_name)
 
     def _send(self, data: bytes, socket_name: Value) -> bool:

@@ -3,8 +3,8 @@
 """
 The simulated controller as a command: its options and its output.
 
-``ur-cartesian sim`` is one command of many; :func:`main` is ``ur-controller-sim``, the command of
-the simulator when it is installed alone.
+With the driver, the simulator is the subcommand ``ur-cartesian sim``; installed alone, it is the
+command ``ur-controller-sim``, which calls :func:`main`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a simulated controller until it is interrupted; return the exit status."""
-    from ur_cartesian_driver.sim.command_line.simulate import simulate  # the whole simulator
+    from ur_cartesian_driver.sim.command_line.simulate import simulate  # slow, so not at the top
 
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
     return run_command(NAME, simulate, arguments)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a command in a shell: signals end it like Ctrl-C, and each error is one sentence."""
+"""Runs a shell command: signals end it like Ctrl-C, and an error is printed as one line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from types import FrameType
 
 from ur_cartesian_driver.motion.errors import DriverError
 
-#: Plus the number of a signal: the exit status of a command that the signal ended, as in a shell.
+#: The exit status of a command ended by a signal is this plus the signal's number, as in a shell.
 SIGNAL_STATUS = 128
 
 
@@ -24,7 +24,7 @@ def run_command(
 ) -> int:
     """Run a command and return its exit status; 0 means that it succeeded."""
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # SIGINT is ignored by default in a background process, SIGHUP after nohup.
+    # Shells make background processes ignore SIGINT, and nohup SIGHUP; only SIGHUP stays ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) != signal.SIG_IGN:
@@ -45,7 +45,7 @@ def run_command(
 
 
 def _end(number: int, _frame: FrameType | None) -> None:
-    """Clean up like after Ctrl-C, but end with the exit status of this signal."""
+    """Clean up as after Ctrl-C, but end with the exit status of this signal."""
     raise KeyboardInterrupt(number)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Run the simulated controller that the options describe, and show its state."""
+"""Runs the simulated controller that the options describe, and shows its state."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     """
     Return the configuration of the simulated robot.
 
-    :raises ValueError: there is no such robot, or its calibration is not readable.
+    :raises ValueError: an option has an impossible value, or the calibration has a mistake.
+    :raises OSError: the calibration or a program cannot be read.
     """
     files = [arguments.program] if arguments.program else []
     if arguments.programs:
@@ -64,14 +65,14 @@ def _program_name(file: Path) -> str:
 
 
 def imperfections(arguments: argparse.Namespace) -> Imperfections | None:
-    """Return the imperfections of the simulated robot from the arguments; None = none."""
+    """Return the imperfections of the robot from the arguments; None = a perfect robot."""
     if arguments.imperfect is None:
         return None
     return typical_imperfections(robot_model(arguments.model), arguments.imperfect)
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:
-    """Return the calibrated DH table from the arguments; None = the nominal one."""
+    """Return the calibrated DH table from the arguments; None = the nominal table."""
     if arguments.calibration is not None:
         return read_calibration(Path(arguments.calibration), model)
     if arguments.calibration_seed is not None:
@@ -80,7 +81,7 @@ def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | N
 
 
 async def _simulate(robot: SimulatedRobot) -> None:
-    """Print the ports of the simulator, then its state if the output is a terminal."""
+    """Run the robot; print its ports and, if the output is a terminal, its state."""
     showing = asyncio.create_task(_show_status(robot))
     try:
         await robot.run(on_listening=lambda: _show_ports(robot))

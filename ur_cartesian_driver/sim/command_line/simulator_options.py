@@ -115,7 +115,7 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def take_negative_numbers(command: argparse.ArgumentParser) -> None:
-    """Accept numbers that begin with a minus as a value; argparse has no public option for it."""
+    """Accept values that begin with a minus, such as -1.5,2; argparse has no public way."""
     command._negative_number_matcher = _NUMBERS
 
 
@@ -152,24 +152,24 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
 
 
 def fault(text: str) -> Fault:
-    """Return a fault of the simulator, with its trigger."""
+    """Return the fault of the simulator that a text describes, with its trigger."""
     return parsed(parse_fault, text)
 
 
 def joints(text: str) -> tuple[float, ...]:
-    """Return six joint positions [rad]."""
+    """Return six joint positions [rad], given with commas between them."""
     return six_numbers(text, (MAX_JOINT_VALUE, MAX_JOINT_VALUE))
 
 
 def port_number(text: str) -> int:
-    """Return the number of a port; 0 = any."""
+    """Return the number of a port; 0 = any free port."""
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f'{text} is no port; give 0 to 65535')
     return int(text)
 
 
 def parsed(parse: Callable[[str], T], text: str) -> T:
-    """Return the parsed text; if the parser refuses it, argparse prints the reason."""
+    """Return the parsed text; if ``parse`` refuses the text, argparse prints the reason."""
     try:
         return parse(text)
     except ValueError as error:
@@ -180,7 +180,7 @@ def six_numbers(text: str, bounds: tuple[float, float]) -> tuple[float, ...]:
     """
     Return six numbers separated by commas.
 
-    :param bounds: largest magnitudes of the first three numbers, and of the last three.
+    :param bounds: largest magnitude of the first three numbers, and of the last three.
     """
     try:
         numbers = tuple(float(part) for part in text.split(','))

@@ -63,7 +63,7 @@ class _WordReader:
         return word
 
     def skip(self, word: str) -> bool:
-        """Take the next word if it is this one; return whether it is."""
+        """Take the next word if it equals ``word``; return whether it was taken."""
         if self.peek() != word:
             return False
         self.take()
@@ -129,7 +129,7 @@ _DEVIATION: dict[str, Reader] = {
     'amount': _number('an amount'),
 }
 
-#: First word of a fault -> its class, and the readers of its fields from the following words.
+#: First word of a fault -> class of the fault, and the readers of its fields, which follow.
 _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
     {
         **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
@@ -162,7 +162,7 @@ def parse_fault(text: str) -> Fault:
     """
     Return the fault that a text describes.
 
-    :raises ValueError: a word is not understood; the text names it.
+    :raises ValueError: a word is not understood or a value is impossible; the text names which.
     """
     words = _WordReader(text)
     if words.peek() not in _KINDS:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The faults of the simulated robot: each is a value with its effect and its trigger.
+The faults of the simulated robot: each fault is a value that contains its effect and its trigger.
 
 `fault_parser` reads faults from text; `injector` makes them happen.
 """
@@ -21,7 +21,7 @@ DeviationShape: TypeAlias = Literal['offset', 'ramp', 'noise']
 DEVIATION_AXES: tuple[DeviationAxis, ...] = get_args(DeviationAxis)
 DEVIATION_QUANTITIES: tuple[DeviationQuantity, ...] = get_args(DeviationQuantity)
 DEVIATION_SHAPES: tuple[DeviationShape, ...] = get_args(DeviationShape)
-#: Number of random bytes that the robot sends if no other number is given.
+#: Number of random bytes in a garbage fault, if no other number is given.
 GARBAGE_SIZE = 64
 
 
@@ -30,21 +30,21 @@ GARBAGE_SIZE = 64
 
 @dataclass(frozen=True, slots=True)
 class AfterTime:
-    """A time has passed on the controller's clock since the fault was set [s]."""
+    """A time [s] has passed on the controller's clock since the fault was set."""
 
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class AfterDistance:
-    """The TCP has moved this far since the fault was set [m]."""
+    """The TCP has travelled a distance [m] since the fault was set."""
 
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneCrossing:
-    """The TCP crosses a plane of the base, given by one coordinate [m]."""
+    """The TCP crosses the plane ``axis = position`` [m], in coordinates of the base."""
 
     axis: Literal['x', 'y', 'z']
     position: float
@@ -59,7 +59,7 @@ IMMEDIATELY = AfterTime()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """Something that goes wrong at a moment."""
+    """Something that goes wrong when its trigger is reached."""
 
     trigger: FaultTrigger = IMMEDIATELY
 
@@ -73,14 +73,14 @@ class InterfaceFault(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LastingInterfaceFault(InterfaceFault):
-    """Something that stays wrong with the connections of an interface."""
+    """Something that goes wrong with the connections of an interface for a duration."""
 
-    #: [s]
+    #: Time until the connections are sound again [s].
     duration: float = inf
 
 
 class FaultEvent(Enum):
-    """An act of another client, or of a person at the robot."""
+    """An event that another client, a person at the robot or the robot itself causes."""
 
     PROTECTIVE_STOP = 'protective_stop'
     EMERGENCY_STOP = 'emergency_stop'
@@ -98,7 +98,7 @@ class FaultEvent(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventFault(Fault):
-    """An event of safety, power or program that the client did not ask for."""
+    """An event of safety, power or program for which the client did not ask."""
 
     action: FaultEvent
 
@@ -138,10 +138,10 @@ class DeviationFault(Fault):
     quantity: DeviationQuantity
     axis: DeviationAxis
     shape: DeviationShape
-    #: The offset, the ramp per second, or the standard deviation of the noise [m, rad and their
-    #: derivatives].
+    #: The offset, the growth of the ramp per second, or the standard deviation of the noise [m or
+    #: rad; per s for a twist, per s^2 for an acceleration].
     amount: float
-    #: [s]
+    #: Time until the deviation ends [s].
     duration: float = inf
     seed: int = 0
 
@@ -154,14 +154,14 @@ class DeviationFault(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DropFault(LastingInterfaceFault):
-    """All connections of an interface are cut, and none is accepted for the duration."""
+    """All connections of an interface are cut, and no new ones are accepted for a duration."""
 
-    #: [s]
+    #: Time during which no new connections are accepted [s].
     duration: float = 0.0
 
 
 class HalfOpenFault(InterfaceFault):
-    """The present connections stay open but dead, while new ones work, as if a cable was cut."""
+    """The present connections stay open but carry no data, as after a cut; new ones work."""
 
 
 class SilenceFault(LastingInterfaceFault):
@@ -187,7 +187,7 @@ class ThrottleFault(LastingInterfaceFault):
     rate: float
 
     def __post_init__(self) -> None:
-        """Reject a rate of zero or less: this would be the fault silence."""
+        """Reject a rate of zero or less."""
         if self.rate <= 0.0:
             raise ValueError(
                 f'The rate is {self.rate:g} bytes/s; use more than 0, or the fault silence.'
@@ -202,7 +202,7 @@ class GarbageFault(InterfaceFault):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Reject a size of zero or less, or too large for a connection."""
+        """Reject a size of zero or less, or of more than a million bytes."""
         if not 1 <= self.size <= 1_000_000:
             raise ValueError(f'The size of the garbage is {self.size} bytes; use 1 to 1000000.')
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 
-#: Most bytes that are held back here; further bytes stay in the kernel, and so with the peer.
+#: Most received bytes that are held back here; further bytes wait in the kernel, then at the peer.
 _MAX_INCOMING = 65_536
 
 
@@ -16,7 +16,7 @@ class ImpairedSockets:
     Script sockets that faults can impair.
 
     They wrap :class:`~ur_cartesian_driver.sim.sockets.script_sockets.ScriptSockets`; without a
-    fault every call goes straight through.
+    fault, every call is passed on to the wrapped sockets.
     """
 
     def __init__(self, sockets: ScriptSockets) -> None:

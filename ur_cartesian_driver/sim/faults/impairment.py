@@ -3,8 +3,8 @@
 """
 Impaired connections, without sockets or a clock: which bytes are held back, and until when.
 
-The server of an impaired connection hands the bytes of both directions over, and asks once per
-cycle for the bytes that are due; a sound connection is not handled here. Times are on the
+The server of an impaired connection hands over the bytes of both directions, and asks once per
+cycle for the bytes that are due. Sound connections are not handled here. Times are on the
 controller's clock, so results are deterministic on the virtual clock.
 """
 
@@ -18,11 +18,11 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Impairment:
-    """The faults of all connections of an interface."""
+    """The combined faults that affect all connections of an interface."""
 
-    #: Messages of the robot are lost.
+    #: Whether messages of the robot are lost.
     drops_outgoing: bool = False
-    #: New connections are closed at once.
+    #: Whether new connections are closed at once.
     refuses_connections: bool = False
     #: Delay in each direction [s].
     delay: float = 0.0
@@ -31,7 +31,7 @@ class Impairment:
 
 
 class Impairable(Protocol):
-    """The operations of faults on an interface and its connections."""
+    """The operations by which faults affect an interface and its connections."""
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
         """Impair all connections from now on; None = end the impairment."""
@@ -50,14 +50,14 @@ class Impairable(Protocol):
 
 
 class DelayLine:
-    """Bytes that are delayed in one direction."""
+    """The delayed bytes in one direction of a connection."""
 
     def __init__(self, now: float) -> None:
         """Begin empty."""
         self._pieces: deque[tuple[float, bytes]] = deque()
         self._budget = 0.0
         self._last = now
-        #: Bytes that are held back.
+        #: Number of bytes that are held back.
         self.size = 0
 
     def put(self, data: bytes, due: float) -> None:
@@ -67,9 +67,9 @@ class DelayLine:
 
     def take(self, now: float, rate: float = inf) -> bytes:
         """
-        Return the bytes that have arrived since the last call.
+        Return the bytes that have become due since the last call.
 
-        :param rate: bound on bytes per second; a piece may arrive in parts.
+        :param rate: bound on the returned bytes per second; a piece can be returned in parts.
         """
         self._budget = inf if rate == inf else self._budget + rate * (now - self._last)
         self._last = now if now < inf else self._last
@@ -94,7 +94,7 @@ class ImpairedConnection:
         """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
-        #: The delay lines of the client's bytes, and of the robot's bytes.
+        #: The delay line of the client's bytes; the delay line of the robot's bytes.
         self.incoming, self.outgoing = DelayLine(now), DelayLine(now)
 
     @property
@@ -108,13 +108,13 @@ class ImpairedConnection:
         )
 
     def queue_outgoing(self, data: bytes, now: float) -> None:
-        """Take bytes from the robot."""
+        """Queue bytes that the robot sends."""
         drops_outgoing = self.impairment is not None and self.impairment.drops_outgoing
         if not self.frozen and not drops_outgoing:
             self.outgoing.put(data, now + self._delay)
 
     def queue_incoming(self, data: bytes, now: float) -> None:
-        """Take bytes from the client."""
+        """Queue bytes that the client has sent."""
         if not self.frozen:
             self.incoming.put(data, now + self._delay)
 
@@ -131,5 +131,5 @@ class ImpairedConnection:
         return 0.0 if self.impairment is None else self.impairment.delay
 
     def _release_terms(self, now: float) -> tuple[float, float]:
-        """Return the time up to which pieces are due and their rate; infinite when sound again."""
+        """Return the time up to which bytes are due, and their rate; inf without impairment."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

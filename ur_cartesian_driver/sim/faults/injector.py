@@ -3,8 +3,8 @@
 """
 Makes faults happen to the simulated robot when they are triggered.
 
-:class:`FaultInjector` counts the controller's cycles, so it is as deterministic as the controller;
-it costs nothing while no fault is set.
+:class:`FaultInjector` uses the controller's clock, so it is as deterministic as the controller.
+While no fault is set, the injector costs no time.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 _log = logging.getLogger(__name__)
 
-# Tolerance, because cycles are summed in floats.
+# Tolerance [s, m], because cycles are summed in floats.
 _ROUNDING = 1e-9
 
 
@@ -53,7 +53,7 @@ def _safety(event: SafetyEvent) -> Callable[[Controller], object]:
     return lambda controller: controller.safety_event(event)
 
 
-#: Event -> its action, which returns the reason if it is refused.
+#: Event -> function that causes the event; it returns the reason if the controller refuses.
 _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType(
     {
         FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
@@ -74,7 +74,7 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType
 
 @dataclass(slots=True)
 class _PendingFault:
-    """A fault that has not happened yet, and the values from which its trigger counts."""
+    """A fault that has not happened yet, with time and travel of the TCP when it was set."""
 
     fault: Fault
     set_at: float
@@ -85,7 +85,7 @@ class _PendingFault:
 
 @dataclass(slots=True)
 class _ActiveFault:
-    """A fault that lasts, the time of its start, and the source of its noise."""
+    """A lasting fault that has begun, the time of its start, and the source of its noise."""
 
     fault: TimedFault
     since: float
@@ -154,7 +154,7 @@ class FaultInjector:
     # Triggers
 
     def _measure_path(self) -> None:
-        """Add the distance that the TCP has moved; a change of the active TCP adds nothing."""
+        """Add the travel of the TCP in this cycle; a change of the active TCP adds nothing."""
         vx, vy, vz, _, _, _ = self._controller.motion.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 
@@ -223,7 +223,7 @@ class FaultInjector:
         )
 
     def _impairments(self) -> dict[str, Impairment]:
-        """Return the impairment of each interface: the sum of its faults."""
+        """Return interface -> impairment, which combines all faults of the interface."""
         found: dict[str, Impairment] = {}
         for running in self._active:
             fault = running.fault

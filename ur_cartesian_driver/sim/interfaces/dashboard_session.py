@@ -35,7 +35,7 @@ _RUNTIME_WORDS = {
     RuntimeState.PAUSED: 'PAUSED',
 }
 #: Commands that control the arm, its power or its programs. They are refused in local control,
-#: and permanently to a client that connected in it.
+#: and always to a client that connected in local control.
 _REMOTE_ONLY = frozenset(
     {
         'load',
@@ -64,7 +64,7 @@ class DashboardHandlers:
     """
     The effects of the commands on a controller and its pendant.
 
-    A method carries out a command; it returns None for success, otherwise the reply.
+    A method that carries out a command returns None for success, otherwise the reply.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -81,7 +81,7 @@ class DashboardHandlers:
 
     @property
     def loaded(self) -> str:
-        """The name of the loaded program; an empty, unnamed program is loaded from the start."""
+        """The name of the loaded program; at the start, this is an empty, unnamed program."""
         return self.programs.loaded or '<unnamed>'
 
     @property
@@ -102,7 +102,7 @@ class DashboardHandlers:
     # Effects of commands
 
     def load(self, name: str) -> str | None:
-        """Load a program; some clients write its name in quotation marks."""
+        """Load a program; quotation marks, which some clients put around the name, are removed."""
         name = name.strip('"')
         refusal = self.controller.load_program(name)
         if not refusal or refusal.startswith('File not found'):
@@ -125,7 +125,7 @@ class DashboardHandlers:
         return None
 
     def restart_safety(self, _: str) -> None:
-        """Leave a fault or violation, if there is one; afterwards the arm has no power."""
+        """Leave a fault or violation, if there is one; afterwards, the arm is without power."""
         if self.controller.safety_event(SafetyEvent.RESTART):
             self.controller.power_off()
 
@@ -149,7 +149,7 @@ class DashboardHandlers:
         return None
 
     def set_operational_mode(self, mode: str) -> str | None:
-        """Take control of the operational mode."""
+        """Set the operational mode, and take control of it."""
         word = mode.upper()
         if word not in ('MANUAL', 'AUTOMATIC'):
             return f'could not understand: "set operational mode {mode}"'
@@ -161,7 +161,7 @@ class DashboardHandlers:
         self.pendant.operational_mode = 'NONE'
 
 
-#: Commands to the controller; a command fails if it returns a reason.
+#: Command -> function that carries it out; the command fails if the function returns a reason.
 _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
     {
         'play': lambda controller: controller.programs.play(),
@@ -170,12 +170,12 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'power on': Controller.power_on,
         'power off': Controller.power_off,
         'brake release': Controller.release_brakes,
-        # The controller keeps running, or nothing could be tested afterwards.
+        # Only the arm: without a running controller, nothing could be tested afterwards.
         'shutdown': Controller.power_off,
         'close popup': Controller.close_popups,
     }
 )
-#: Commands with another effect; the remaining commands only reply.
+#: Command with another effect -> its handler; all remaining commands only reply.
 _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = MappingProxyType(
     {
         'load': DashboardHandlers.load,
@@ -189,7 +189,7 @@ _HANDLERS: Mapping[str, Callable[[DashboardHandlers, str], str | None]] = Mappin
         'clear operational mode': DashboardHandlers.clear_operational_mode,
     }
 )
-#: Values in replies, if not the argument itself: {0} = the handlers, {1} = the argument.
+#: Command -> value in its reply, by default the argument; {0} = the handlers, {1} = the argument.
 _VALUES: Mapping[str, str] = MappingProxyType(
     {
         'running': '{0.running}',
@@ -208,7 +208,7 @@ _VALUES: Mapping[str, str] = MappingProxyType(
         'is in remote control': '{0.remote_control}',
         'get serial number': '20000000000',
         'get robot model': '{0.robot_model}',
-        # Nothing is written.
+        # The next two commands only reply; no file is written.
         'generate flight report': '0',
         'generate support file': '{1}/ur_20000000000_2026-01-01_00-00-00.zip',
     }

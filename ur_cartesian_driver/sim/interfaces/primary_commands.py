@@ -31,7 +31,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
         'stop program': lambda controller: controller.programs.stop(),
         'pause program': lambda controller: controller.programs.pause(),
         'resume program': lambda controller: controller.programs.play(),
-        # These send motions to the arm or only to the screen; here there is no difference.
+        # On a robot, motions go to the arm or only to the screen; here there is no difference.
         'set real': lambda _: None,
         'set sim': lambda _: None,
     }

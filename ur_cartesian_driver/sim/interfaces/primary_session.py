@@ -1,11 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One client of an interface that accepts scripts: primary, secondary, real-time.
+One client of an interface that accepts scripts: primary, secondary or real-time.
 
-All three accept programs and commands, and send different data; apart from the greeting, the data
-goes to all clients. A client is refused in local control, and permanently if it connected in local
-control. Each interface has a read-only twin, which sends the same data and ignores its input.
+All three interfaces accept programs and commands, but send different data; apart from the
+greeting, the data goes to all clients. In local control, input is refused; a client that connected
+in local control is always refused. Each interface has a read-only twin, which sends the same data
+and ignores all input.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ class ScriptSession(ClientSession):
 
 
 class PrimarySession(ScriptSession):
-    """A client of the primary or secondary interface, both of which begin with the version."""
+    """A client of the primary or secondary interface, which first sends the version."""
 
     def open(self) -> bytes:
-        """Return the version message, for which clients wait before anything else."""
+        """Return the version message, for which clients wait at the start."""
         return version_frame(self._controller)
 
 
@@ -49,7 +50,7 @@ class ReadOnlySession(ClientSession):
         """
         Ignore the client's messages.
 
-        :param greeting: the first bytes of the interface.
+        :param greeting: the first bytes that the interface sends.
         """
         self._greeting = greeting
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot state on the primary and secondary interface, ten times a second, and the greeting."""
+"""The data of the primary and secondary interfaces: greeting, messages, ten states per second."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED, FIXED
 
-#: Fields of a sub-package -> RTDE outputs with the same meaning.
+#: Field of a sub-package -> RTDE output with the same meaning.
 JOINT_OUTPUTS: Mapping[str, str] = MappingProxyType(
     {
         'q_actual': 'actual_q',
@@ -52,16 +52,16 @@ TOOL_OUTPUTS: Mapping[str, str] = MappingProxyType(
     {'voltage_48v': 'actual_robot_voltage', 'temperature': 'tool_temperature', 'mode': 'tool_mode'}
 )
 
-#: Timestamp of the version message, as recorded on four robots (3.5 to 5.1).
+#: Timestamp of the version message, as recorded on four robots (software 3.5 to 5.1).
 NO_TIMESTAMP = 2**64 - 1
 #: States per second.
 STATE_RATE = 10.0
 #: Reported limit of the joint accelerations [rad/s^2], as recorded on a UR5e.
 _JOINT_ACCELERATION = 40.0
-#: Type of the robot -> type of its controller box; the others are not known.
+#: Type of the robot -> type of its controller box; the boxes of other robots are not known.
 _CONTROLLER_BOXES = {1: 4, 2: 5, 3: 6, 4: 16, 7: 10, 8: 11}
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
-#: Limit that is sent for an endless joint instead of infinity [rad].
+#: Position limit [rad] that is sent for an endless joint, instead of infinity.
 _UNLIMITED = 1e6
 
 
@@ -81,7 +81,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """The data for all clients: messages at once, states periodically and at a new safety mode."""
+    """The data for all clients: messages at once, states periodically and at mode changes."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute the sub-packages that never change."""
@@ -96,7 +96,7 @@ class PrimaryStream:
             yield encode_message(message)
 
     def is_due(self) -> bool:
-        """Return whether a state is due in this cycle; to be called once per cycle."""
+        """Return whether a state is due in this cycle; call this once per cycle."""
         before, self._safety_mode = self._safety_mode, self._controller.safety.mode
         return (
             self._controller.cycles % self._cycles_per_state == 0
@@ -142,7 +142,7 @@ def _mode(controller: Controller) -> RobotModeData:
 
 
 def _outputs(controller: Controller, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return fields that take their values from RTDE outputs, so that the interfaces agree."""
+    """Return fields with the values of RTDE outputs, so that both interfaces agree."""
     return {
         field: COMPUTED[name](controller) if name in COMPUTED else FIXED[name]
         for field, name in names.items()

@@ -3,8 +3,8 @@
 """
 One HTTP client of the Robot API of PolyScope X, and the effect of each request.
 
-Paths and bodies are written out here again instead of taken from the driver's table: a simulator
-with the same table would agree with its mistakes. doc/simulation.md lists the documented answers.
+Paths and bodies of requests are repeated here. If the simulator used the driver's table, tests
+could not find mistakes in the table. doc/simulation.md states the sources and the assumptions.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ BASE_PATH = '/universal-robots/robot-api'
 FIRST_VERSION = (10, 11)
 #: Largest request [bytes].
 _MAX_REQUEST_SIZE = 65536
-#: Time after which an action that is not done is answered with 504 [s].
+#: Time after which an unfinished action is answered with 504 [s].
 _ACTION_TIMEOUT = 10.0
 
 _PROGRAM_STATES = {
@@ -42,7 +42,7 @@ _PROGRAM_STATES = {
     RuntimeState.PAUSING: 'PAUSED',
     RuntimeState.PAUSED: 'PAUSED',
 }
-#: Safety modes with another name in the API, which has only five modes.
+#: Safety modes with another name in the API, which has only five safety modes.
 _SAFETY_MODES = {
     SafetyMode.ROBOT_EMERGENCY_STOP: 'EMERGENCY_STOP',
     SafetyMode.SYSTEM_EMERGENCY_STOP: 'EMERGENCY_STOP',
@@ -55,7 +55,7 @@ _FORBIDDEN = {
 
 
 class Refused(Exception):
-    """A request that is not carried out."""
+    """Raised for a request that is not carried out."""
 
     def __init__(self, status: HTTPStatus, message: str, **fields: Any) -> None:
         """Take the status and the fields of the answer."""
@@ -65,7 +65,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """An answer that is due when the robot has carried out the request."""
+    """A request whose answer is due when the robot has carried it out."""
 
     is_done: Callable[[Controller], bool]
     message: str
@@ -92,7 +92,7 @@ def _restart_safety(controller: Controller) -> None:
     controller.power_off()
 
 
-#: Action on the arm -> its effect, and the condition for its answer.
+#: Action on the arm -> its effect, and whether the action is done and can be answered.
 _STATE_ACTIONS: Mapping[
     str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
 ] = MappingProxyType(
@@ -103,7 +103,7 @@ _STATE_ACTIONS: Mapping[
             lambda c: _refuse_if(c.release_brakes()),
             lambda c: c.power.mode is RobotMode.RUNNING,
         ),
-        # Without the waiting time of the pendant, as the client library's tests expect.
+        # No unlock delay: the tests of the manufacturer's client library unlock at once.
         'UNLOCK_PROTECTIVE_STOP': (
             lambda c: _refuse_if(c.safety_event(SafetyEvent.UNLOCK_BY_LINE)),
             lambda c: c.safety.mode is not SafetyMode.PROTECTIVE_STOP,
@@ -123,7 +123,7 @@ def _play(controller: Controller, state: RuntimeState) -> None:
     _refuse_if(controller.programs.play())
 
 
-#: Action on the program -> its effect, and the condition for its answer.
+#: Action on the program -> its effect, and whether the action is done and can be answered.
 _PROGRAM_ACTIONS: Mapping[
     str, tuple[Callable[[Controller], object], Callable[[Controller], bool]]
 ] = MappingProxyType(
@@ -219,13 +219,13 @@ def _log(controller: Controller, body: Body) -> Fields:
 
 
 def _openapi(controller: Controller, _: Body) -> Fields:
-    """Return the version of the API, by which clients decide which requests they can send."""
+    """Return the version of the API, from which clients conclude which requests exist."""
     version = controller.config.version[:2]
     number = '5.0.107' if version >= (10, 14) else '3.1.4' if version >= (10, 12) else '3.0.0'
     return {'openapi': '3.1.0', 'info': {'title': 'Robot API', 'version': number}}
 
 
-#: Method and path below BASE_PATH -> the first software that has this request, and its effect.
+#: Method and path below BASE_PATH -> first software version with this request, and its effect.
 _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProxyType(
     {
         ('GET', '/openapi.json'): (FIRST_VERSION, _openapi),
@@ -262,7 +262,7 @@ _ROUTES: Mapping[tuple[str, str], tuple[tuple[int, int], Handler]] = MappingProx
 
 
 class RobotApiSession(ClientSession):
-    """Answers one request after the other; an action is answered when it is done."""
+    """Answers one request after the other, and each action when it is done."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for requests."""
@@ -283,7 +283,7 @@ class RobotApiSession(ClientSession):
         """
         Return the answers that are due; called in each cycle.
 
-        :raises HangUp: with the answers, if the client has sent its last request.
+        :raises HangUp: the client's last request is answered; the exception carries the answers.
         """
         answers = b''
         while True:
@@ -308,7 +308,7 @@ class RobotApiSession(ClientSession):
         return b''
 
     def _next_request(self) -> tuple[str, str, bytes] | None:
-        """Return method, path and body of the next request; None = it is not complete."""
+        """Return method, path and body of the next request; None = the request is incomplete."""
         head, end, rest = bytes(self._buffer).partition(b'\r\n\r\n')
         if not end:
             return None
@@ -354,7 +354,7 @@ class RobotApiSession(ClientSession):
         return _response(HTTPStatus.OK, answer)
 
     def _not_found(self, path: str) -> bytes:
-        """Return the answer to an unknown path; a superfluous last slash is redirected."""
+        """Return the answer to an unknown path; a known path with a last slash is redirected."""
         known = {f'{BASE_PATH}{route}/' for _, route in _ROUTES}
         if path in known:
             return _response(HTTPStatus.TEMPORARY_REDIRECT, {}, location=path.rstrip('/'))

@@ -3,8 +3,8 @@
 """
 The effects of writing RTDE inputs.
 
-The controller's outputs and slider come with a mask of the channels to set. A package is applied
-as a whole, masks first, wherever they are in the recipe.
+The inputs that set the controller's outputs or slider come with a mask of the channels to set. A
+package is applied as a whole, so the order of masks and values in the recipe does not matter.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _DIGITAL = (
 
 
 def apply_inputs(controller: Controller, values: Mapping[str, Any]) -> None:
-    """Apply one input package: name -> value."""
+    """Apply one input package, given as name -> value."""
     if values.get('speed_slider_mask', 0) & 1 and 'speed_slider_fraction' in values:
         controller.set_slider(values['speed_slider_fraction'])
     for side, name in _DIGITAL:

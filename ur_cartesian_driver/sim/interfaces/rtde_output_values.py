@@ -3,8 +3,8 @@
 """
 The values of the RTDE outputs in the simulated controller.
 
-Actual values equal the targets, unless the arm is compliant, is imperfect, or a fault makes them
-differ. Only the payload has a mass, the links have none. Outputs of quantities that are not
+Actual values equal the targets, unless the arm is compliant or imperfect, or a fault makes them
+differ. Only the payload has a mass; the links have none. Outputs of quantities that are not
 simulated (temperatures, encoders) are zero or have the plausible values of :data:`FIXED`.
 """
 
@@ -36,7 +36,7 @@ Getter = Callable[['Controller'], Any]
 
 #: Values of ``joint_mode`` and ``tool_mode``.
 _RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
-#: Supply voltage of the arm [V], and its current at rest [A].
+#: Supply voltage of a powered arm [V]; supply current [A].
 _VOLTAGE, _CURRENT = 48.0, 0.5
 
 
@@ -56,24 +56,24 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
     """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
     motion = controller.motion
     if not any(motion.qd) and not any(motion.qdd):
-        return ZERO6  # most arms stand most of the time
+        return ZERO6  # a shortcut, because most arms stand still most of the time
     return _point_acceleration(
         controller.arm, motion.q, motion.qd, motion.qdd, motion.T_flange_tcp.position
     )
 
 
-@lru_cache(maxsize=1)  # target and actual acceleration, to each client: the same in a cycle
+@lru_cache(maxsize=1)  # used several times per cycle: by each client, for target and actual
 def _point_acceleration(
     arm: Arm, q: Vector6, qd: Vector6, qdd: Vector6, offset: Vector3
 ) -> Vector6:
-    """Return the acceleration of a point given in flange coordinates [m/s^2, rad/s^2]."""
+    """Return the acceleration [m/s^2, rad/s^2] of a point given in flange coordinates [m]."""
     frames = arm.frames(q)
     point = point_motion(frames, qd, qdd, flange_point(frames, offset))
     return (*point.acceleration, *point.angular_acceleration)
 
 
 def _payload_moments(controller: Controller) -> Vector6:
-    """Return the joint moments that carry and accelerate the payload, a point mass [Nm]."""
+    """Return the joint moments [Nm] that carry and accelerate the payload, a point mass."""
     mass, motion = controller.payload.mass, controller.motion
     if mass == 0.0 or controller.power.mode is not RobotMode.RUNNING:
         return ZERO6
@@ -92,7 +92,7 @@ def _tool_mode(controller: Controller) -> int:
 
 
 def _joint_mode(controller: Controller) -> int:
-    """Return the mode of each joint; the brakes hold until the arm is RUNNING."""
+    """Return the mode of the joints; a powered arm that is not RUNNING is held by its brakes."""
     if controller.power.mode is RobotMode.RUNNING:
         return _RUNNING
     return _IDLE if _powered(controller) else _POWER_OFF
@@ -103,7 +103,7 @@ def _actual_acceleration(controller: Controller) -> Vector6:
 
 
 def _target_currents(controller: Controller) -> Vector6:
-    """Return the joint currents without noise [A]; only an imperfect arm has currents."""
+    """Return the joint currents [A] without noise; only an imperfect arm has currents."""
     imperfections = controller.config.imperfections
     return imperfections.holding_current if imperfections and _powered(controller) else ZERO6
 
@@ -122,7 +122,7 @@ def _scaled_momentum(controller: Controller) -> float:
     return controller.payload.mass * hypot(*controller.motion.tcp_twist[:3])
 
 
-#: Outputs that are computed.
+#: Output -> function that computes it.
 COMPUTED: Mapping[str, Getter] = MappingProxyType(
     {
         'timestamp': lambda c: c.timestamp,
@@ -188,7 +188,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
     }
 )
 
-#: Outputs that never change, because their cause is not simulated.
+#: Output -> its constant value, because its cause is not simulated.
 FIXED: Mapping[str, Any] = MappingProxyType(
     {
         'joint_temperatures': (25.0,) * 6,
@@ -201,7 +201,7 @@ FIXED: Mapping[str, Any] = MappingProxyType(
 
 
 def _register_getters(direction: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
-    """Return the functions that read the registers of one direction, by output."""
+    """Return output -> function that reads it, for the registers of one direction."""
 
     def item(values: str, i: int) -> Getter:
         return lambda controller: getattr(of(controller), values)[i]

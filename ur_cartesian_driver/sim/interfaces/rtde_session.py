@@ -34,7 +34,7 @@ class _OutputSchedule:
             for name, zero in zip(output.recipe.names, output.recipe.zeros(), strict=True)
         ]
         #: Cycles per package, rounded down as in the manufacturer's guide: a client that asks for
-        #: 300 of 500 Hz gets 500.
+        #: 300 Hz on a robot with 500 Hz gets 500 Hz.
         self._cycles = max(1, floor(maximum / output.frequency + 1e-9))
 
     def is_due(self, cycle: int) -> bool:
@@ -73,7 +73,7 @@ class RtdeSession(ClientSession):
         """
         Wait for requests.
 
-        :param taken_inputs: the inputs that are reserved by clients; shared by all sessions.
+        :param taken_inputs: the inputs that clients have reserved; all sessions share this set.
         """
         major, minor, bugfix, build = controller.config.version
         self._controller = controller

@@ -3,8 +3,8 @@
 """
 A TCP port that serves any number of clients of one kind.
 
-A session decides on the answers; it has no socket, only bytes in and bytes out. A client that
-does not read is dropped, so that it cannot stall the cycle or the other clients.
+A session converts a client's bytes to answers, without access to the socket. A client that does
+not read is dropped, so that it cannot stall the cycle or the other clients.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impair
 
 _log = logging.getLogger(__name__)
 
-#: Most bytes that a client can leave unread, in addition to those in the kernel.
+#: Most bytes that a client can leave unread, not counting bytes in the kernel.
 MAX_UNREAD_BYTES = 1_000_000
-#: A client with more unread bytes gets no states: many clients send scripts and never read.
+#: A client with more unread bytes gets no states but is kept: many clients only send scripts.
 MAX_UNREAD_BYTES_FOR_STATE = 16_384
 
 
@@ -65,7 +65,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._server = server
         self.session = server.make_session()
         self._transport: asyncio.Transport | None = None
-        #: None unless a fault impairs this connection.
+        #: The state of this connection under a fault; None = no fault impairs the connection.
         self._impaired: ImpairedConnection | None = None
         self._closing_after_send = False
 
@@ -116,7 +116,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._transport.close()
 
     def write(self, data: bytes) -> None:
-        """Send one piece; drop a client that does not read."""
+        """Send data, or drop a client that does not read."""
         if self._impaired is None:
             self._send(data)
             return
@@ -192,7 +192,7 @@ class TcpServer(Generic[S]):
         self.connections: set[_ClientConnection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
-        #: The impairment of all connections, and the controller's clock during it [s].
+        #: The impairment of all connections; the controller's clock at the last fault update [s].
         self.impairment: Impairment | None = None
         self.now = 0.0
 
@@ -204,7 +204,7 @@ class TcpServer(Generic[S]):
 
     @property
     def refuses_connections(self) -> bool:
-        """Whether new connections are closed at once, because the server closes or by a fault."""
+        """Whether new connections are closed at once: the server is closing, or a fault is set."""
         return self.closing or (
             self.impairment is not None and self.impairment.refuses_connections
         )
@@ -260,7 +260,7 @@ class TcpServer(Generic[S]):
             connection.abort()
 
     def freeze(self) -> None:
-        """Make all connections half-open: send and receive nothing, do not hang up."""
+        """Make all connections half-open: they stay, but nothing is sent or received."""
         for connection in self.connections:
             connection.impair_connection(self.impairment).frozen = True
 

@@ -4,10 +4,10 @@
 The motion that the robot measures.
 
 The simulated arm follows its targets exactly, so actual values equal the targets, unless the arm
-is compliant, is configured as imperfect, or a fault makes them deviate. A deviation of the pose
-changes pose and joint positions, a deviation of the twist changes twist and joint speeds; as with
-a faulty measurement, neither changes the other. A deviation of the acceleration changes
-acceleration and accelerometer and, integrated, twist and joint speeds: many clients check these.
+is compliant or configured as imperfect, or a fault makes them deviate. A deviation of the pose
+changes the joint positions accordingly, but not the twist, as with a faulty measurement. A
+deviation of the twist changes the joint speeds, but not the pose. A deviation of the acceleration
+changes the accelerometer and, integrated, twist and joint speeds, which many clients check.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.contact.contact_motion import ContactMotion
 from ur_cartesian_driver.sim.motion.imperfect_arm import ImperfectArm, Imperfections, Motion
 
-# A solution farther than this from the target is on another branch [rad].
+# A solution farther than this [rad] from the undisturbed joints is on another branch.
 _BRANCH_JUMP = 0.5
 
 
@@ -40,12 +40,12 @@ class ActualMotion:
         """
         Follow the targets of this motion.
 
-        :param imperfections: of the arm; None = it follows its targets exactly.
+        :param imperfections: the imperfections of the arm; None = a perfect arm.
         :param contact: the compliance of the arm.
         """
         self._motion, self._contact = motion, contact
         self.imperfect_arm = ImperfectArm(motion, imperfections) if imperfections else None
-        #: The motion without faults and compliance.
+        #: The measured motion before faults and compliance are added.
         self._undisturbed: Motion = self.imperfect_arm or motion
         self._pose_fault: Vector6 | None = None
         self._twist_fault: Vector6 | None = None
@@ -63,7 +63,7 @@ class ActualMotion:
     def deviate(
         self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
     ) -> None:
-        """Set the deviations of this cycle, in base axes; None = none."""
+        """Set the deviations of this cycle, in base axes; None = no deviation."""
         self._pose_fault = pose
         self.acceleration_error = acceleration or ZERO6
         if acceleration is None:
@@ -128,7 +128,7 @@ class ActualMotion:
         return q
 
     def _joint_change(self, change: Vector6) -> Vector6:
-        """Return the joint change for a small change of the TCP; the smallest one if singular."""
+        """Return the joint change for a small TCP change; if singular, by least squares."""
         jacobian = self._motion.arm.jacobian(self._undisturbed.q, self._motion.T_flange_tcp)
         return vector6(float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
 

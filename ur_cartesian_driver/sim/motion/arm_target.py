@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The target of the arm in a cycle: its position, its motion, and the TCP."""
+"""The target of the arm in a cycle: position, motion and TCP."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
     twist_between,
 )
 
-#: An arm that has stood still for this long is steady [s].
+#: Time of standing still after which an arm is steady [s].
 STEADY_AFTER = 0.5
 
 
 class TargetRates(NamedTuple):
-    """Joint speeds [rad/s] and accelerations [rad/s^2], and the twist in base axes."""
+    """Joint speeds [rad/s], joint accelerations [rad/s^2] and TCP twist (base axes)."""
 
     qd: Vector6
     qdd: Vector6
@@ -35,8 +35,9 @@ class ArmTarget:
     """
     The target of the last cycle.
 
-    ``q``, ``qd``, ``qdd`` [rad, rad/s, rad/s^2], ``T_base_tcp`` and ``tcp_twist`` (base axes,
-    [m/s, rad/s]). Speeds are differences of positions over the cycle, so they always agree.
+    It consists of ``q`` [rad], ``qd`` [rad/s], ``qdd`` [rad/s^2], ``T_base_tcp`` and ``tcp_twist``
+    (base axes [m/s, rad/s]). Speeds are differences of positions over the cycle, so positions and
+    speeds always agree.
 
     :param cycle: duration of a cycle [s].
     :param q: joint positions at the start [rad].
@@ -83,14 +84,14 @@ class ArmTarget:
         return self.arm.forward(q) @ self._T_flange_tcp
 
     def ik_branch(self) -> IkBranchTracker:
-        """Return the IK branch on which the arm is."""
+        """Return the tracker of the IK branch on which the arm is."""
         return IkBranchTracker(self.kinematics, self.q, self.T_base_tcp, self.T_tcp_flange)
 
     def move_to(self, q: Vector6, pose: Pose, rates: TargetRates | None = None) -> None:
         """
         Move the target to joint positions and their pose in this cycle.
 
-        :param rates: the speeds and accelerations; None = as differences over the cycle.
+        :param rates: the speeds and accelerations; None = compute differences over the cycle.
         """
         if rates is None:
             rate = 1.0 / self.cycle
@@ -105,7 +106,7 @@ class ArmTarget:
         self._still_for = 0.0 if max(map(abs, qd)) > NO_CHANGE else self._still_for + self.cycle
 
     def hold(self) -> None:
-        """Stay in place for this cycle."""
+        """Keep the target in place for this cycle."""
         self.qdd = difference_rate(STILL, self.qd, 1.0 / self.cycle)
         self.qd = self.tcp_twist = STILL
         self._still_for += self.cycle
@@ -119,7 +120,7 @@ class ArmTarget:
         return other
 
     def take_over(self, other: ArmTarget) -> None:
-        """Take over the position and the motion of another target."""
+        """Copy the position and the motion of another target."""
         self.q, self.qd, self.qdd = other.q, other.qd, other.qdd
         self.T_base_tcp, self.tcp_twist = other.T_base_tcp, other.tcp_twist
         self._still_for = other._still_for

@@ -1,20 +1,20 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The controller's path offset: a Cartesian offset on top of the motion of a program.
+The controller's path offset: a Cartesian offset that is added to the motion of a program.
 
 The motion runs as if there were no offset, and in each cycle the target is displaced by the
-filtered offset. Frames, filter, limits and the final stop follow the script manual. The rules on
-which the manual says nothing are ours:
+filtered offset. Frames, filter, limits and the stop at the end follow the script manual. The
+following rules are ours, because the manual has none:
 
 * a new offset replaces the previous offset, even if that was set in another frame;
-* the offset is held at rest, in pauses and in stops; it has no effect while set-points (servoj,
-  speedj, speedl) lead the arm, which start from the displaced position;
-* the frame MOTION is kept while the tool stands still or moves along its own z axis; before the
-  first motion this frame does not exist, and offsets in it have no effect;
+* the offset remains at rest, in pauses and in stops; while set-points (servoj, speedj, speedl)
+  lead the arm, the offset has no effect, and the set-points start from the displaced position;
+* the frame MOTION keeps its axes while the tool stands still or moves along its own z axis; before
+  the first motion this frame does not exist, and offsets in this frame have no effect;
 * an offset that needs more than the maximum speed of a joint, or a joint acceleration above
-  :data:`MAX_JOINT_ACCELERATION`, causes a protective stop, of which the manual only warns;
-* when the program ends, the offset is held until the arm stands still, and the arm stays there.
+  :data:`MAX_JOINT_ACCELERATION`, causes a protective stop (the manual only warns of such stops);
+* when the program ends, the offset remains until the arm stands still; the arm does not return.
 """
 
 from __future__ import annotations
@@ -50,15 +50,16 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 
-#: Frames of an offset, as programs name them.
+#: Frames of an offset, by their numbers in programs.
 BASE, TCP, MOTION, WORLD = FRAMES = (1, 2, 3, 4)
-#: The default limits of a robot [m, rad].
+#: Default limit of the translation [m]; of the rotation [rad].
 MAX_TRANSLATION, MAX_ROTATION = 0.1, 0.52
-#: The frame MOTION is kept below this speed [m/s], and along the tool's z axis within this sine.
+#: The frame MOTION keeps its axes if the speed of the tool is below this [m/s]; or if the sine of
+#: the angle between the motion and the tool's z axis is below this.
 _MIN_SPEED, _MIN_ANGLE_SINE = 1e-6, 0.01
-#: Smaller differences between filtered and wanted offset are treated as zero [m, rad].
+#: Smaller differences [m, rad] between filtered and wanted offset are treated as zero.
 _NONE = 1e-12
-#: A step that is too long by less than this factor is accepted as rounding.
+#: A step that exceeds a limit by less than this factor is accepted, because of rounding.
 _ROUNDING = 1.0 + 1e-6
 
 Axes = tuple[Vector3, Vector3, Vector3]
@@ -76,14 +77,14 @@ class ControllerPathOffset:
         """Begin without an offset."""
         self._motion = motion_target
         self.enabled = False
-        #: Coefficient of the filter, 1 = no filter; limits along and about each axis [m, rad].
+        #: Coefficient of the filter (1 = no filter); limits along [m] and about [rad] each axis.
         self.alpha, self.max_translation, self.max_rotation = 1.0, MAX_TRANSLATION, MAX_ROTATION
         #: The displaced target; None = there is no offset.
         self.target: ArmTarget | None = None
         self._frame, self._wanted, self._applied = BASE, ZERO6, ZERO6
         #: The axes of the frame MOTION in the base; None before the first motion.
         self._axes: Axes | None = None
-        #: Displacement of the joints from the motion, and its rate [rad, rad/s].
+        #: Displacement of the joints by the offset [rad]; rate of this displacement [rad/s].
         self._change, self._change_rate = ZERO6, ZERO6
 
     @property
@@ -131,7 +132,7 @@ class ControllerPathOffset:
         self.target, self._applied, self._change, self._change_rate = None, ZERO6, ZERO6, ZERO6
 
     def end_of_program(self) -> None:
-        """Hold the offset until the arm stands still; reset limits and filter."""
+        """Keep the offset until the arm stands still; reset limits and filter."""
         self.enabled, self.alpha = False, 1.0
         self.max_translation, self.max_rotation = MAX_TRANSLATION, MAX_ROTATION
         self._axes = None if self.target is None else self._axes
@@ -216,7 +217,7 @@ class ControllerPathOffset:
         )
 
     def _displaced(self, pose: Pose) -> Pose:
-        """Return a pose of the motion displaced by the offset."""
+        """Return the pose that results when the offset displaces a pose of the motion."""
         offset = self._applied
         if self._frame == TCP:
             return pose @ Pose.from_rotation_vector(offset)

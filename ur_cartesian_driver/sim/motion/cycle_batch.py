@@ -4,10 +4,10 @@
 Solve several hundred cycles of a path together, before they are due.
 
 While the speed scaling does not change, the cycles up to the end of a section of the path are
-known. Solving them together with numpy takes a small fraction of the time that they take one by
-one (:mod:`~.cycle_stepper`), with the same positions up to rounding. Any interference (another
-scaling, a stop, a new motion, a teleported arm) discards the remaining cycles. If the arm cannot
-keep to the time of the path, its cycles are done one by one.
+known. Solving these cycles together with numpy takes a small fraction of the time for solving
+them one by one (:mod:`~.cycle_stepper`), with the same positions up to rounding. Any change
+(another scaling, a stop, a new motion, a teleported arm) discards the remaining cycles. If the arm
+cannot keep to the time of the path, the cycles are solved one by one.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from ur_cartesian_driver.motion.geometry.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget, TargetRates
 from ur_cartesian_driver.sim.motion.paths.path_motion import PathMotion
 
-#: Most and fewest cycles in a batch: for fewer cycles numpy takes longer.
+#: Most cycles in a batch; fewest cycles, because numpy is slow for short batches.
 _MAX_CYCLES = 384
 _MIN_CYCLES = 12
-#: Cycles that are done one by one after a batch that could not be solved.
+#: Number of cycles that are solved one by one after a batch could not be solved.
 _BACK_OFF = 50
 
 
 class CycleStep(NamedTuple):
-    """The progress of a motion in one cycle, and the time of the path that it took [s]."""
+    """The next target of a motion, and the path time [s] that the motion advances to it."""
 
     q: Vector6
     pose: Pose
@@ -56,10 +56,11 @@ class CycleBatch:
     def __init__(self, target: ArmTarget) -> None:
         """Begin without solved cycles."""
         self._target = target
-        #: The cycles, last first: joints, pose, rates, and time in the section of the path [s].
+        #: The solved cycles, last first: joints, pose, rates, time in the section of the path [s].
         self._cycles: list[list[float]] = []
-        #: The cycles were solved for this motion; section, time of a cycle [s], max tool speed.
+        #: The motion for which the cycles were solved.
         self._motion: PathMotion | None = None
+        #: Section, path time per cycle [s] and bound on the tool speed [m/s] of the solution.
         self._solved_for = (0, 0.0, 0.0)
         #: Whether the cycles were solved by inverse kinematics.
         self.on_tool_path = False
@@ -69,14 +70,14 @@ class CycleBatch:
 
     def next(self, motion: PathMotion, duration: float, max_tool_speed: float) -> CycleStep | None:
         """
-        Advance a motion by its next solved cycle; None = this cycle has to be done by itself.
+        Advance a motion by its next solved cycle; None = this cycle has to be solved singly.
 
-        :param duration: the time of the path in a cycle [s].
+        :param duration: the path time per cycle [s].
         :param max_tool_speed: bound on the tool speed [m/s].
         """
         target, asked = self._target, (motion.index, duration, max_tool_speed)
         if self._motion is not motion or self._solved_for != asked:
-            # Solve only after two equal calls: while the scaling changes, batches are useless.
+            # Solve only after two equal calls, because no batch lasts while the scaling changes.
             self._motion, self._solved_for, self._cycles, self._back_off = motion, asked, [], 0
             return None
         if not self._cycles or self._q is not target.q or not target.tcp_is_active:
@@ -97,7 +98,7 @@ class CycleBatch:
     def _solve(
         self, motion: PathMotion, duration: float, max_tool_speed: float
     ) -> list[list[float]]:
-        """Return the next cycles within the section, as far as the arm can follow."""
+        """Return the next cycles within the section, up to one that the arm cannot follow."""
         target, section = self._target, motion.sections[motion.index]
         stands = section.profile.length <= 0.0
         if stands or duration <= 0.0 or not target.tcp_is_active:
@@ -105,7 +106,7 @@ class CycleBatch:
         count = min(int((motion.next_change - motion.time) / duration) - 1, _MAX_CYCLES)
         if count < _MIN_CYCLES:
             return []
-        # Added up like single cycles, so that the times are rounded in the same way.
+        # The times are summed one by one, so that they are rounded as in single cycles.
         times = np.add.accumulate([motion.time, *([duration] * count)])[1:]
         setpoints = section.path.rows(section.offset + section.profile.rows(times))
         self.on_tool_path = setpoints.shape[1] == 7
@@ -131,7 +132,7 @@ class CycleBatch:
         return self._as_cycles(q[: count + 1], poses[: count + 1], times[:count])
 
     def _as_cycles(self, q: Floats, poses: Floats, times: Floats) -> list[list[float]]:
-        """Return cycles with their rates, last one first; row 0 is the arm's present position."""
+        """Return cycles with their rates, last first; row 0 of the inputs is the present state."""
         rate = 1.0 / self._target.cycle
         qd = rate * np.diff(q, axis=0)
         qdd = rate * np.diff(qd, axis=0, prepend=np.array([self._target.qd]))

@@ -4,7 +4,7 @@
 One cycle of a motion, as far as the arm can follow.
 
 Limits stretch the time and keep the path: the step of a cycle is shortened if a joint would exceed
-its speed or could no longer brake before the end of its range, or if the tool would be too fast.
+its speed limit or could not brake before the end of its range, or if the tool would be too fast.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from ur_cartesian_driver.sim.motion.servo_motions import JointStopMotion, ServoL
 
 Motion: TypeAlias = PathMotion | ServoLikeMotion
 
-#: A step that is too long by less than this factor is accepted as rounding.
+#: A step that exceeds a limit by less than this factor is accepted, because of rounding.
 ROUNDING = 1.0 + 1e-6
 # A step is shortened this many times before its end is considered out of reach.
 _ATTEMPTS = 12
-# Near a singularity, half a step turns the joints hardly less than the whole step. The step is
-# therefore divided by a power of the factor by which it is too long, but not by more than this
-# power, nor by more than this multiple of the factor.
+# Near a singularity, half a step turns the joints almost as far as the whole step. A step that is
+# too long by some factor is therefore divided by a power of this factor, but at most by the power
+# with this exponent, and at most by this multiple of the factor.
 _MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
-# A tool motion that is slower than this fraction of its speed for this long [s] is stuck, unless a
-# joint turns faster than this fraction of its limit: then the arm passes a singularity.
+# A tool motion is stuck if it is slower than this fraction of its speed; for longer than this [s];
+# while no joint is faster than this fraction of its limit, as when the arm passes a singularity.
 _STALLED = 0.01
 _STALLED_AFTER = 1.0
 _TURNING = 0.2
-# If the first step of a joint line is too long by this factor, the line does not begin where the
-# tool's path before it ends.
+# If the first step of a joint line is too long by this factor, the line does not begin at the
+# joints with which the preceding tool path ends.
 _JUMP_RATIO = 50.0
 
 
@@ -61,9 +61,9 @@ class CycleStepper:
         self, motion: Motion, duration: float, max_tool_speed: float
     ) -> CycleStep | MotionFault:
         """
-        Advance by ``duration`` [s] or as far as the arm can follow.
+        Advance a motion by ``duration`` [s], or by less if the arm cannot follow.
 
-        :param max_tool_speed: bound on the tool speed [m/s], which joint stops can exceed.
+        :param max_tool_speed: bound on the tool speed [m/s]; joint stops can exceed this bound.
         :returns: the step, or a fault if the arm cannot follow.
         """
         if isinstance(motion, PathMotion):
@@ -100,19 +100,19 @@ class CycleStepper:
         return target.kinematics.motion_fault(target.q, arm.joints(setpoint))
 
     def _pose(self, setpoint: Setpoint, q: Vector6) -> Pose:
-        """Return T_base_tcp of a set-point that the joints reach."""
+        """Return T_base_tcp at a set-point, at which the joints are ``q``."""
         if isinstance(setpoint, Pose) and self._target.tcp_is_active:
             return setpoint
         return self._target.forward(q)
 
     def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
-        """Return whether a step does not shrink with its time: a jump to another branch."""
+        """Return whether joint travel does not shrink with the time of a step: a branch jump."""
         if isinstance(setpoint, Pose):
             return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
         return self._on_tool_path and joints > _JUMP_RATIO
 
     def _stalls(self, slow: bool) -> bool:
-        """Return whether a tool motion has hardly advanced for a while, so it never will."""
+        """Return whether a tool motion has been too slow for longer than ``_STALLED_AFTER``."""
         self._stalled_for = self._stalled_for + self._target.cycle if slow else 0.0
         return self._stalled_for > _STALLED_AFTER
 
@@ -121,8 +121,8 @@ def _step_divisor(step: tuple[float, float], before: tuple[float, float]) -> flo
     """
     Return the divisor that makes a step short enough, by a secant in logarithms.
 
-    :param step: the time of the step, and the factor by which it is too long.
-    :param before: the same of the step that was tried before.
+    :param step: the time of the step, and the factor by which the step is too long.
+    :param before: the same two values for the step that was tried before.
     """
     (h, ratio), (h_before, ratio_before) = step, before
     if ratio_before <= ratio:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-An arm that does not follow its targets exactly, and a controller that does not keep up.
+An arm that does not follow its targets exactly, and a controller that leaves out packets.
 
 Each joint lags behind its target, is held back by friction, bends under acceleration and rings
 when the acceleration changes. Measured positions have noise and a finite resolution; the measured
@@ -20,50 +20,50 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
-#: Friction and ringing below which a joint is considered settled [rad], [rad/s].
+#: A joint with a smaller lag [rad] and smaller speeds [rad/s] is considered settled.
 _RESIDUE = 1e-8
-#: Period of the noise, and shift of the noise from one quantity to the next [cycles].
+#: Period of the noise; shift of the noise from one quantity to the next [cycles].
 _NOISE_CYCLES, _NOISE_SHIFT = 1009, 337
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imperfections:
     """
-    The imperfections of an arm and its controller; the defaults are an e-Series.
+    The imperfections of an arm and its controller; the defaults are those of an e-Series arm.
 
-    "Recorded" marks figures from recordings of real arms; the others are assumed.
+    "Recorded" marks figures from recordings of real arms; the other figures are assumed.
     """
 
-    #: Time by which a joint lags behind its target [s]. Recorded: 0.0003 to 0.0013, with an error
-    #: of at most 0.0005 rad at 0.5 rad/s (UR5e), 0.001 at 0.8 and 0.0036 at 2.7 (UR3).
+    #: Time by which a joint lags behind its target [s]. Recorded: 0.0003 to 0.0013 s; errors of at
+    #: most 0.0005 rad at 0.5 rad/s (UR5e), 0.001 rad at 0.8 and 0.0036 rad at 2.7 rad/s (UR3).
     lag: float = 0.0005
-    #: Error of a moving joint opposite to its direction [rad]. Recorded: 0.0001 to 0.0003.
+    #: Error of a moving joint opposite to its motion [rad]. Recorded: 0.0001 to 0.0003.
     friction: float = 0.00015
     #: Error of a resting joint opposite to the direction of its last motion [rad]. Recorded:
     #: 0.0001 or less on e-Series and UR3, 0.0002 to 0.0004 on a CB3 UR10.
     static_error: float = 0.0001
     #: Time constant of the change between ``friction`` and ``static_error`` [s]. Assumed.
     friction_time: float = 0.02
-    #: Error of a joint per acceleration [rad per rad/s^2]. Assumed; with this value, stops from 2
-    #: to 4 rad/s^2 ring for as long as recorded.
+    #: Error of a joint per acceleration [rad per rad/s^2]. Assumed; with this value, the arm rings
+    #: after stops at 2 to 4 rad/s^2 for as long as recorded.
     acceleration_error: float = 8e-5
     #: Frequency of the ringing after a change of acceleration [Hz]. Assumed.
     ringing_frequency: float = 10.0
-    #: Decay rate of the ringing [1/s]. Recorded: at most 0.31 s above 0.005 rad/s, at most 0.58 s
-    #: above 0.001 rad/s.
+    #: Decay rate of the ringing [1/s]. Recorded: the speed stays above 0.005 rad/s for at most
+    #: 0.31 s, and above 0.001 rad/s for at most 0.58 s.
     ringing_decay: float = 6.0
     #: Noise of measured joint positions, peak to peak [rad]. Recorded, including the resolution:
     #: 0.00005 to 0.00017.
     position_noise: float = 1e-4
-    #: Resolution of measured joint positions [rad]. Assumed: 17 bits, the least noise recorded.
+    #: Resolution of measured joint positions [rad]. Assumed: 17 bits, as the least noise recorded.
     position_resolution: float = 2.0 * pi / 2**17
     #: Noise of measured joint speeds, peak to peak [rad/s]. Assumed.
     speed_noise: float = 0.002
     #: Smaller speeds are measured as exactly 0 while the target stands still [rad/s]. Recorded.
     speed_deadband: float = 0.001
-    #: Share of RTDE packets after which one is left out. Recorded: 0.07 at 500 Hz.
+    #: Fraction of RTDE packets after which one is left out. Recorded: 0.07 at 500 Hz.
     single_gaps: float = 0.07
-    #: Share of RTDE packets after which up to ``max_skipped`` are left out. Recorded: "a few".
+    #: Fraction of RTDE packets after which up to ``max_skipped`` are left out. Recorded: "a few".
     long_gaps: float = 0.002
     #: Most RTDE packets that are left out in a row. Recorded: gaps of 12 ms at 500 Hz, of 40 ms at
     #: 125 Hz.
@@ -118,7 +118,7 @@ class ImperfectArm:
             _Joint(imperfections, motion.cycle, position, random.uniform(-1.0, 1.0))
             for position in motion.q
         ]
-        # The noise is drawn once, because a cycle has little time.
+        # The noise is drawn in advance, because a cycle has little time.
         self._noise = [
             vector6(random.uniform(-0.5, 0.5) for _ in range(6)) for _ in range(_NOISE_CYCLES)
         ]
@@ -145,7 +145,7 @@ class ImperfectArm:
         self._qd = None
 
     def _noise_of(self, quantity: int) -> Vector6:
-        """Return the noise of this cycle, as shares of its peak-to-peak value."""
+        """Return the noise of this cycle, as fractions of the noise's peak-to-peak value."""
         return self._noise[(self._cycle + quantity * _NOISE_SHIFT) % _NOISE_CYCLES]
 
     @property
@@ -162,7 +162,7 @@ class ImperfectArm:
         return self._qd
 
     def currents(self) -> Vector6:
-        """Return the measured currents of the joints of an arm that is switched on [A]."""
+        """Return the measured joint currents [A] of an arm that is switched on."""
         current, noise = self._imperfections.holding_current, self._imperfections.current_noise
         return add_scaled6(current, self._noise_of(2), noise)
 
@@ -186,10 +186,10 @@ class ImperfectArm:
 
 class _Joint:
     """
-    One joint: a first-order lag, friction, and a damped oscillator that its acceleration excites.
+    One joint: a first-order lag, friction, and a damped oscillator excited by the acceleration.
 
-    Friction and oscillator are solved exactly for conditions that are constant over a cycle, so
-    any cycle is short enough.
+    Friction and oscillator are solved exactly for inputs that are constant over a cycle, so the
+    result is also correct for long cycles.
     """
 
     __slots__ = (
@@ -217,10 +217,10 @@ class _Joint:
         """
         Begin at rest at ``q`` [rad].
 
-        :param direction: direction of the motion before, -1 to 1; it scales the static error.
+        :param direction: -1 to 1, direction of the previous motion; scales the static error.
         """
         self._imperfections, self._cycle = imperfections, cycle
-        # A ramp is followed with exactly this lag, independent of the cycle.
+        # With this fraction, a ramp is followed with exactly the lag, independent of the cycle.
         self._follow_share = cycle / (cycle + imperfections.lag)
         self._drag_share = 1.0 - exp(-cycle / imperfections.friction_time)
         decay, omega = imperfections.ringing_decay, 2.0 * pi * imperfections.ringing_frequency
@@ -230,15 +230,15 @@ class _Joint:
         self.target = self._followed = q
         self._direction, self._drag = direction, -imperfections.static_error * direction
         self._bend = self._bend_speed = 0.0
-        #: Position [rad] and speed [rad/s] of the joint.
+        #: Position of the joint [rad]; its speed [rad/s].
         self.position, self.speed = q + self._drag, 0.0
-        #: Whether the joint does not change until its target moves.
+        #: Whether the joint stays at rest until its target moves.
         self.is_settled = True
-        #: Whether the speed is measured as something other than 0.
+        #: Whether the measured speed can differ from 0.
         self.reads_speed = False
 
     def follow(self, q: float, qd: float, qdd: float) -> None:
-        """Follow the target for a cycle [rad, rad/s, rad/s^2]."""
+        """Follow the target ``q`` [rad], ``qd`` [rad/s], ``qdd`` [rad/s^2] for a cycle."""
         imperfections = self._imperfections
         self.target = q
         self._followed += self._follow_share * (q - self._followed)
@@ -247,7 +247,7 @@ class _Joint:
         self._bend = bent + self._by_bend[0] * bend + self._by_speed[0] * speed
         self._bend_speed = self._by_bend[1] * bend + self._by_speed[1] * speed
         deadband, friction = imperfections.speed_deadband, imperfections.static_error
-        # A smaller speed can be rounding of inverse kinematics, whose sign means nothing.
+        # A smaller speed can be a rounding error of inverse kinematics, with a meaningless sign.
         if abs(qd) > deadband:
             self._direction, friction = copysign(1.0, qd), imperfections.friction
         self._drag -= self._drag_share * (self._drag + friction * self._direction)

@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From motion calls to one target per control cycle.
+Turns motion calls into one target per control cycle.
 
 A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of the motion. The
-caller polls ``Move.returned`` and can make its next call in the same cycle; then the motion goes
-on without an idle cycle.
+caller polls ``Move.returned``. If the next call comes in the cycle in which ``returned`` becomes
+true, the motion goes on without an idle cycle.
 
 Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
-are solved by inverse kinematics in each cycle, starting from the previous solution; if there is no
-solution, the arm creeps up to the last one that exists and stops there with a fault.
+are solved by inverse kinematics in each cycle, starting from the previous solution. If a path
+leads to a point without a solution, the arm creeps up to this point and stops with a fault.
 """
 
 from __future__ import annotations
@@ -63,20 +63,21 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: The first path of a program starts slowly: for this long [s], the rate of its time grows evenly
-#: from 0 to 1, which delays it by half of this time. Recorded on UR3, UR3e and UR10e.
+#: The first path of a program starts slowly: within this time [s], the rate of the path's time
+#: grows evenly from 0 to 1, so the path takes longer by half of this time. Recorded on UR3, UR3e
+#: and UR10e.
 START_TIME = 0.16
-#: Acceleration and speed of movej without `a` and `v` [rad/s^2, rad/s]. Recorded on a UR3; the
-#: manual rounds them to 1.4 and 1.05.
+#: Acceleration [rad/s^2] of a movej without `a`; speed [rad/s] of a movej without `v`. Recorded on
+#: a UR3; the manual rounds the values to 1.4 and 1.05.
 DEFAULT_JOINT_ACCELERATION, DEFAULT_JOINT_SPEED = radians(80.0), radians(60.0)
 
 
 class MotionGenerator:
     """
-    The target of the arm, one control cycle after the other; see :class:`ArmTarget`.
+    Computes the target of the arm, one control cycle after the other; see :class:`ArmTarget`.
 
     ``warnings`` collects reports until the controller takes them. After a ``fault`` the arm stands
-    still until ``clear_fault``. All motions except joint stops keep ``max_tool_speed`` [m/s].
+    still until ``clear_fault``. Only joint stops can exceed ``max_tool_speed`` [m/s].
 
     :param cycle: duration of a cycle [s].
     :param q: joint positions at the start [rad].
@@ -89,21 +90,22 @@ class MotionGenerator:
         self.max_tool_speed = MAX_TOOL_SPEED
         #: Speed at which movel turns the tool for each m/s of its ``v`` [rad/s].
         self.turn_ratio = 1.0
-        #: The target of the motion, and the offset that a program adds to the target.
+        #: The target of the motion; the offset that a program adds to the target.
         self._target = ArmTarget(arm, cycle, q)
         self.path_offset = ControllerPathOffset(self._target)
         self._active = RunningMotion(self._target)
         self._reports = MotionReports()
         self._paths = PathQueue(self._target, self._active, self._reports)
         self._stepper = CycleStepper(self._target)
-        #: The rate at which the time of a path runs, without speed scaling: 1 except at the start.
+        #: The rate at which the time of a path runs before speed scaling; it is less than 1 only
+        #: while the first path of a program starts.
         self._start_rate = 1.0
 
     # -- state -------------------------------------------------------------------------------
 
     @property
     def _displaced(self) -> ArmTarget:
-        """The target with the path offset."""
+        """The target, displaced by the path offset if there is one."""
         return self.path_offset.target or self._target
 
     @property
@@ -154,7 +156,7 @@ class MotionGenerator:
 
     @property
     def scaling(self) -> float:
-        """The speed scaling of the last cycle: as requested, or less at a limit of the arm."""
+        """The speed scaling of the last cycle, which limits of the arm can reduce."""
         return min(self._active.rate, self._active.scale)
 
     @property
@@ -182,14 +184,14 @@ class MotionGenerator:
         t: float = 0.0,
         r: float = 0.0,
     ) -> Move:
-        """Move straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
+        """Move straight in joint space; a [rad/s^2], v [rad/s] of the leading axis; r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         return self._start_path('movej', self._joint_path('movej', q), parameters, r)
 
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Move the tool straight; a, v [m/s^2, m/s], for rotations times :attr:`turn_ratio`."""
+        """Move the tool straight; a [m/s^2], v [m/s], times :attr:`turn_ratio` for rotations."""
         parameters, ratio = ProfileParameters(acceleration=a, speed=v, time=t), self.turn_ratio
         return self._start_path(
             'movel', lambda start: LinearMovePath(start.pose, T_base_tcp, ratio), parameters, r
@@ -199,8 +201,8 @@ class MotionGenerator:
         """
         Move straight at constant tool speed, through circular fillets.
 
-        The speed is constant up to the fillet: if no other motion follows, the arm brakes within
-        the fillet, harder than ``a`` if necessary.
+        The speed is constant up to the fillet. If no other motion follows, the arm therefore
+        brakes within the length of the fillet, harder than ``a`` if necessary.
         """
         radius = self._drivable_radius('movep', r, v)
         parameters = constant_speed_parameters(a, v, radius)
@@ -222,13 +224,13 @@ class MotionGenerator:
         )
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
-        """Like movej with limited jerk; a, v fractions in (0, 1] of the joints' limits."""
+        """Move like movej with limited jerk; a and v are fractions (0, 1] of the joint limits."""
         check_fractions('optimovej', a, v)
         move_path = self._joint_path('optimovej', q)
         return self._start_path('optimovej', move_path, self._fastest(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
-        """Like movel with limited jerk; a, v fractions in (0, 1] of the joints' limits."""
+        """Move like movel with limited jerk; a and v are fractions (0, 1] of the joint limits."""
         check_fractions('optimovel', a, v)
         return self._start_path('optimovel', _linear_path(T_base_tcp), self._fastest(a, v), r)
 
@@ -265,7 +267,7 @@ class MotionGenerator:
         )
 
     def _drivable_radius(self, name: str, radius: float, speed: float) -> float:
-        """Return the blend radius; 0 = no blend, if the tool would pass it within one cycle."""
+        """Return the blend radius, or 0 (no blend) if the tool passes the radius in one cycle."""
         if not 0.0 < radius < speed * self.cycle:
             return radius
         self._reports.blend_too_small(name, radius)
@@ -276,7 +278,7 @@ class MotionGenerator:
     def servoj(
         self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
     ) -> Move:
-        """Move the set-point to ``q`` within ``t`` scaled seconds, and follow the set-point."""
+        """Move the set-point to ``q`` within ``t`` [s] of scaled time; the arm follows it."""
         qd, before = self._active.nominal_joint_speed(), self._active.motion
         begin = before.setpoint(before.elapsed) if isinstance(before, ServoMotion) else self.q
         return self._replace(
@@ -284,7 +286,7 @@ class MotionGenerator:
         )
 
     def speedj(self, qd: Vector6, a: float, t: float | None = None) -> Move:
-        """Change to joint speeds [rad/s] and hold them; return after ``t`` or when reached."""
+        """Change to joint speeds [rad/s] and hold them; see :class:`JointSpeedMotion`."""
         return self._replace(
             JointSpeedMotion(self.q, self._active.nominal_joint_speed(), qd, a, t)
         )
@@ -292,26 +294,26 @@ class MotionGenerator:
     def speedl(
         self, twist: Vector6, a: float, t: float | None = None, a_rot: float | None = None
     ) -> Move:
-        """Change to a tool speed (base axes [m/s, rad/s]) and hold it."""
+        """Change to a twist of the tool (base axes [m/s, rad/s]) and hold this twist."""
         now, a_rot = self._active.nominal_twist(), a if a_rot is None else a_rot
         return self._replace(ToolSpeedMotion(self.T_base_tcp, now, twist, a, a_rot, t))
 
     def stopj(self, a: float) -> Move:
         """
-        Brake in joint space at ``a`` [rad/s^2], in real time; the path is not kept.
+        Brake in joint space at ``a`` [rad/s^2], regardless of speed scaling and path.
 
         A stop takes at least one cycle, because programs repeat it until the arm is steady.
         """
         return self._replace(self._active.joint_stop(a))
 
     def stopl(self, a: float, a_rot: float | None = None) -> Move:
-        """Brake along the tool's tangent, in real time; a stop takes at least one cycle."""
+        """Brake along the tool's tangent, regardless of speed scaling; takes at least a cycle."""
         if not self.moving:
             return self.stopj(a)
         return self._replace(self._active.tool_stop(a, a if a_rot is None else a_rot))
 
     def end_path_offset(self, a: float) -> Move:
-        """Brake in joint space at ``a`` [rad/s^2], and continue from there without an offset."""
+        """Brake in joint space at ``a`` [rad/s^2], and end the path offset without a jump."""
         self.path_offset.end()
         return self._replace(JointStopMotion(self._target.q, self._target.qd, a))
 
@@ -326,7 +328,7 @@ class MotionGenerator:
         self._start_rate = 0.0
 
     def stop_at_once(self) -> None:
-        """Stop at the present target, as if the power is cut; a running call returns."""
+        """Stop at the present target, as if the power was cut; a running call returns."""
         self._paths.clear()
         self._active.abort()
         self._active.motion = None
@@ -396,7 +398,7 @@ class MotionGenerator:
                 active.move.returned = True
 
     def _next_start_rate(self) -> float:
-        """Return the mean rate of a path's time in this cycle; it does not grow in a pause."""
+        """Return the mean start rate in this cycle; the start rate does not grow in a pause."""
         if self._active.scale <= 0.0:
             return 1.0
         before = self._start_rate

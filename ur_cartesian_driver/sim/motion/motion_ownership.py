@@ -6,9 +6,8 @@ Ownership of the arm among the threads of a program.
 A thread owns the motion from its first motion call until the thread ends, or until the arm stands
 still and the thread is in no motion call. Meanwhile a motion call of any other thread, including a
 stop, ends the program. If a thread is killed in the middle of a call, the arm keeps moving; if no
-thread takes over in the same cycle, the controller brakes. (A stream of servoj, speedj or speedl
-that is not continued in the cycle in which its last call returned is ended by the motion
-generator.)
+thread takes over in the same cycle, the controller brakes. (The motion generator ends a stream of
+servoj, speedj or speedl that is not continued in the cycle in which its last call returned.)
 """
 
 from __future__ import annotations
@@ -23,13 +22,14 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 #: A running script function that takes time: it yields once per cycle.
 Steps = Generator[None, None, None]
 
-#: Deceleration when the controller brakes by itself: a program has ended off a path, a thread was
-#: killed, a move is aborted [rad/s^2]. Not published; users call the robot's stop very sudden.
+#: Deceleration [rad/s^2] of a stop by the controller itself, because a program has ended off a
+#: path, a thread was killed or a move is aborted. Not published; users call the robot's stop very
+#: sudden.
 HARD_STOP = 15.0
 
 
 class FreedriveState(Enum):
-    """Whether a person guides the arm by hand."""
+    """Whether a person can guide the arm by hand."""
 
     OFF = ''
     FREEDRIVE = 'freedrive'
@@ -60,14 +60,14 @@ class MotionOwnership:
         self._owner, self._abandoned = thread, False
 
     def abort(self) -> None:
-        """Make the running move brake and return, if it can be aborted."""
+        """Make the running move brake and return, if the move is abortable."""
         self._aborting = self._abortable > 0
 
     def run(self, call: Callable[[], Move], abortable: bool = False) -> Steps:
         """
         Make a call of the motion generator and wait until the call can return.
 
-        :param abortable: `abort` makes the call brake at :data:`HARD_STOP` and return.
+        :param abortable: whether `abort` makes the call brake at :data:`HARD_STOP` and return.
         :raises RuntimeException: the motion generator refuses the call.
         """
         try:
@@ -79,7 +79,7 @@ class MotionOwnership:
         finished = False
         try:
             if move.returned and not self._motion.moving:
-                yield  # a move to the arm's own position takes a cycle, too: programs repeat it
+                yield  # a move to the present position takes a cycle, too: programs may repeat it
             while not move.returned:
                 if self._aborting and abortable:
                     self._aborting = False

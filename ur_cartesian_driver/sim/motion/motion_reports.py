@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault, MotionWarning, Move
 
-#: Arguments of C171 by move: for a skipped waypoint, and for a blend that is too small.
+#: Move -> argument of error code C171 for a skipped waypoint.
 _BLEND_SKIPPED_ARGUMENTS = {
     'movej': 4,
     'optimovej': 4,
@@ -15,6 +15,7 @@ _BLEND_SKIPPED_ARGUMENTS = {
     'movec': 0,
     'movep': 9,
 }
+#: Move -> argument of error code C171 for a blend that is too small.
 _BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
 
 
@@ -29,7 +30,7 @@ class MotionReports:
         self._too_fast: Move | None = None
 
     def blend_skipped(self, name: str) -> None:
-        """Report a waypoint whose blend overlaps the one before."""
+        """Report a waypoint that is skipped because its blend overlaps the previous blend."""
         self._warn(
             171,
             _BLEND_SKIPPED_ARGUMENTS[name],
@@ -46,7 +47,7 @@ class MotionReports:
         )
 
     def waypoint_within_blend(self, name: str) -> None:
-        """Report a waypoint that lies within the blend before it."""
+        """Report a waypoint that lies within the blend of the previous waypoint."""
         self._warn(
             197,
             0,
@@ -55,7 +56,7 @@ class MotionReports:
         )
 
     def movep_too_fast(self, call: Move, reason: str) -> None:
-        """Report once for each movep that the arm cannot keep its speed."""
+        """Report that the arm cannot keep the speed of a movep; once for each movep."""
         if call is not self._too_fast:
             self._too_fast = call
             self._warn(196, 0, f'MoveP speed too high: {reason}')

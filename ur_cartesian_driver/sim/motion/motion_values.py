@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Values between callers and motion generator: running calls, faults, warnings, errors."""
+"""Values that the motion generator gives to its callers: calls, faults, warnings, errors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 class MotionError(Exception):
-    """A motion call is refused; nothing has moved. The text is for the author of the program."""
+    """Raised if a motion call is refused before anything moves; programmers read the text."""
 
 
 @dataclass(slots=True)
@@ -17,8 +17,8 @@ class Move:
     One running motion call.
 
     ``returned`` becomes true when the script call can return: the waypoint is reached, the next
-    cycle enters its blend, the stop has ended, the time is over, or another motion took over. The
-    arm may still be moving.
+    cycle enters its blend, the stop has ended, the time is over, or another motion has taken over.
+    The arm can still be moving then.
     """
 
     returned: bool = False

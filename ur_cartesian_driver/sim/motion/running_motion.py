@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The running motion of the arm, and its replacement by a servo-like motion or a stop."""
+"""The running motion of the arm, and its replacement by another motion or a stop."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
     ToolStopMotion,
 )
 
-#: Deceleration when servoj set-points stop coming, or before a path begins [rad/s^2].
+#: Deceleration [rad/s^2] if no further servoj set-point comes, or if a path move is called that
+#: cannot begin while the arm moves.
 UNATTENDED_DECELERATION = 15.0
 
 
 class RunningMotion:
     """
-    The running motion, its call, and the speeds from which another motion takes over.
+    The running motion and its call; also computes the speeds at which the next motion begins.
 
     :param target: the target of the arm.
     """
@@ -35,7 +36,7 @@ class RunningMotion:
         self._target = target
         self.motion: Motion | None = None
         self.move: Move | None = None
-        #: The speed scaling of the last cycle: as requested, and as achieved by the arm.
+        #: The speed scaling of the last cycle: as requested; as achieved by the arm.
         self.scale = self.rate = 1.0
 
     @property
@@ -49,7 +50,7 @@ class RunningMotion:
         return isinstance(self.motion, SetpointMotion) and self.motion.is_over
 
     def replace(self, motion: ServoLikeMotion) -> Move:
-        """Run a motion without a path from now on."""
+        """Run a servo-like motion from now on, and return its call."""
         self.abort()
         self._target.activate_tcp()
         self.motion, self.move = motion, Move()
@@ -78,11 +79,11 @@ class RunningMotion:
             self.motion = self.joint_stop(UNATTENDED_DECELERATION)
 
     def joint_stop(self, a: float) -> JointStopMotion:
-        """Return the stop in joint space from the present speed; in real time."""
+        """Return the motion that stops the joints from their present speed, in unscaled time."""
         return JointStopMotion(self._target.q, self._joint_speed(), a)
 
     def tool_stop(self, a: float, a_rot: float) -> ToolStopMotion:
-        """Return the stop along the tool's tangent from the present speed; in real time."""
+        """Return the motion that stops the tool along its tangent, in unscaled time."""
         return ToolStopMotion(self._target.T_base_tcp, self._twist(), a, a_rot)
 
     def nominal_joint_speed(self) -> Vector6:
@@ -98,7 +99,7 @@ class RunningMotion:
         return self._unscaled(self._twist())
 
     def _joint_speed(self) -> Vector6:
-        """Return the joint speed at the end of the last cycle; the target has the mean speed."""
+        """Return the joint speed at the end of the last cycle; on a path, the mean speed in it."""
         motion = self.motion
         if motion is None or isinstance(motion, JointStopMotion):
             return STILL if motion is None else motion.qd
@@ -107,7 +108,7 @@ class RunningMotion:
         return self._target.qd
 
     def _twist(self) -> Vector6:
-        """Return the twist of the TCP at the end of the last cycle."""
+        """Return the TCP twist at the end of the last cycle; on a path, the mean twist in it."""
         motion = self.motion
         if motion is None or isinstance(motion, ToolStopMotion):
             return STILL if motion is None else motion.twist

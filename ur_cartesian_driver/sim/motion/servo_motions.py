@@ -4,7 +4,7 @@
 Motions without a path: servoj, speedj, speedl and the two stops.
 
 ``preview`` looks ahead without changing the motion, because the step may have to be shortened.
-Stops run in real time, independent of the speed scaling, so that they always end; the other
+Stops run in real time, independent of the speed scaling, so that stops always end; the other
 motions run in scaled time.
 """
 
@@ -68,7 +68,7 @@ class JointSpeedMotion(_JointMotion):
     """
     speedj: the leading axis changes its speed at ``acceleration``; all axes arrive together.
 
-    :param duration: [s] after which the call returns; None = when the speed is reached.
+    :param duration: time after which the call returns [s]; None = when the speed is reached.
     """
 
     target: Vector6
@@ -76,14 +76,14 @@ class JointSpeedMotion(_JointMotion):
     duration: float | None
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
-        """Return set-point and state after ``h`` seconds, from the mean speed."""
+        """Return set-point and state after ``h`` seconds (exact integral of the speed)."""
         change = subtract6(self.target, self.qd)
         size = max(map(abs, change))
         full = h if size <= _MIN_SPEED else min(h, size / self.acceleration)
         step = self.acceleration * h
         part = step / size if size > step else 1.0
         qd = self.target if part >= 1.0 else add_scaled6(self.qd, change, part)
-        # The change takes ``full`` seconds at the mean of both speeds, the rest has the new speed.
+        # For ``full`` seconds the speed changes (at the mean of both speeds), then it is constant.
         q = add_scaled6(add_scaled6(self.q, self.qd, 0.5 * full), qd, 0.5 * full)
         q = add_scaled6(q, qd, h - full)
         return q, (q, qd, self.elapsed + h)
@@ -97,13 +97,13 @@ class JointSpeedMotion(_JointMotion):
 @dataclass(slots=True)
 class ServoMotion(_JointMotion):
     """
-    servoj: qdd = gain (u - (q + lookahead qd)), limited; u runs evenly between set-points.
+    servoj: qdd = gain (u - (q + lookahead qd)), limited, with a set-point u that moves evenly.
 
     A recorded UR5e agrees with this law within 0.06 urad, at gain 300 and lookahead 0.1. The law
     follows a ramp with a lag of exactly ``lookahead``; its natural frequency is sqrt(gain), its
     damping ratio lookahead sqrt(gain) / 2.
 
-    :param begin: the previous set-point, from which u runs to the target during the duration.
+    :param begin: the previous set-point, from which u moves to the target during the duration.
     """
 
     begin: Vector6
@@ -124,7 +124,7 @@ class ServoMotion(_JointMotion):
         return q, (q, qd, self.elapsed + h)
 
     def setpoint(self, elapsed: float) -> Vector6:
-        """Return u at a time after the call [s]."""
+        """Return the set-point u at a time after the call [s]."""
         if elapsed >= self.duration - _ROUNDING:
             return self.target
         change = subtract6(self.target, self.begin)
@@ -166,7 +166,7 @@ class ToolSpeedMotion(_ToolMotion):
 
     :param acceleration: bound on the linear acceleration of the tool [m/s^2].
     :param acceleration_rot: bound on the angular acceleration of the tool [rad/s^2].
-    :param duration: [s] after which the call returns; None = when the speed is reached.
+    :param duration: time after which the call returns [s]; None = when the speed is reached.
     """
 
     target: Vector6
@@ -190,7 +190,7 @@ class ToolSpeedMotion(_ToolMotion):
 
 @dataclass(slots=True)
 class ToolStopMotion(_ToolMotion):
-    """stopl: the tool brakes along its tangent, its rotation at ``acceleration_rot``."""
+    """stopl: the tool brakes along its tangent; translation and rotation stop together."""
 
     acceleration: float
     acceleration_rot: float
@@ -214,7 +214,7 @@ ServoLikeMotion: TypeAlias = SetpointMotion | StopMotion
 
 
 def _speed_call_is_over(duration: float | None, elapsed: float, reached: bool) -> bool:
-    """Return whether a speed call can return; it takes a cycle even if its speed is reached."""
+    """Return whether a speed call can return; without a duration, after at least a cycle."""
     if duration is None:
         return elapsed > 0.0 and reached
     return elapsed >= duration - _ROUNDING
@@ -226,7 +226,7 @@ def _approach_twist(
     """
     Return the twist after a change towards the target for ``h`` seconds.
 
-    It changes along a straight line, so translation and rotation arrive together.
+    The twist changes along a straight line, so translation and rotation arrive together.
     """
     change = subtract6(target, twist)
     time = max(norm(change[:3]) / acceleration, norm(change[3:]) / acceleration_rot)
@@ -234,7 +234,7 @@ def _approach_twist(
 
 
 def _integrated_pose(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
-    """Return a pose after a motion of ``h`` seconds at the mean of two twists."""
+    """Return the pose after a motion for ``h`` seconds at the mean of two twists."""
     half = 0.5 * h
     vx, vy, vz, wx, wy, wz = (half * (a + b) for a, b in zip(before, after, strict=True))
     turn = quaternion_from_rotation_vector((wx, wy, wz))

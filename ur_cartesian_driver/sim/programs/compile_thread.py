@@ -4,7 +4,7 @@
 Compiles programs in parallel with the controller's cycles.
 
 Compiling takes about 7 us per byte, so a large program would delay the cycles by seconds. A thread
-therefore compiles the programs, one after the other. The event loop uses the compiled programs
+therefore compiles the programs, one after the other. The event loop starts each compiled program
 between two cycles.
 """
 
@@ -21,11 +21,11 @@ from typing import TypeVar
 
 T = TypeVar('T')
 
-#: Longest time for which a compiling thread keeps the interpreter lock when a cycle needs it [s];
-#: Python's default of 5 ms is longer than a cycle.
+#: Longest time [s] for which a compiling thread keeps the interpreter lock when a cycle needs the
+#: lock; Python's default of 5 ms is longer than a cycle.
 SWITCH_INTERVAL = 1e-4
-#: Programs with more objects are exempt from garbage collection, which would delay the cycles by a
-#: second; objects that remain when such a program ends stay in memory.
+#: The objects of a program with more than this are never garbage-collected, because a collection
+#: would delay the cycles by a second; reference cycles among them stay in memory.
 MAX_NEW_OBJECTS = 100_000
 
 
@@ -45,9 +45,9 @@ class CompileThread:
 
     def compile(self, work: Callable[[], T], then: Callable[[T], None]) -> None:
         """
-        Do some work in the thread.
+        Call ``work`` in the thread.
 
-        :param then: called in the event loop, with the result of the work.
+        :param then: called in the event loop, with the result of ``work``.
         """
 
         def finish(result: T) -> None:
@@ -73,9 +73,9 @@ class CompileThread:
 
     def close(self) -> None:
         """
-        End the thread after the program that it is compiling, without waiting for it.
+        Tell the thread to end after the program that it is compiling, without waiting.
 
-        To be called in the event loop.
+        Call this in the event loop.
         """
         self._closed = True
         self._jobs.put(None)
@@ -92,8 +92,8 @@ class _InterpreterForCycles:
     """
     The settings of Python during compiling: fast thread switches and no garbage collection.
 
-    Several simulators in one process can compile at the same time: the first one to begin changes
-    the settings, the last one to end restores them.
+    Several simulators in one process can compile at the same time: the first to begin changes the
+    settings, and the last to end restores the settings.
     """
 
     def __init__(self) -> None:

@@ -125,7 +125,7 @@ class InterpreterMode:
 
         :param clear_queue: whether to discard the statements that have been waiting.
         :param clear_on_end: whether to delete the statements' definitions when the mode ends.
-        :raises RuntimeException: the call is not in the main thread, or inside a statement.
+        :raises RuntimeException: the call is not in the main thread, or is in such a statement.
         """
         interpreter = self._programs.interpreter
         if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:
@@ -150,11 +150,11 @@ class InterpreterMode:
         self._interpreter = None
 
     def end(self) -> None:
-        """End the mode after the statement that is being executed."""
+        """End the mode when the current statement has ended."""
         self._end_wanted = True
 
     def clear(self) -> None:
-        """Clear the mode after the statement that is being executed."""
+        """Delete all definitions of statements when the current statement has ended."""
         self._clear_wanted = True
 
     def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:

@@ -12,7 +12,7 @@ Programs from start to end: one primary program, and secondary programs in paral
 
 If a program is stopped while the arm moves, the controller stops the arm on its path; the next
 program starts when the arm stands still. A program that does not compile is refused with line and
-column; the running program goes on.
+column of the error, and the running program goes on.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 T = TypeVar('T')
 
-#: A cache, because clients send the same program again and again; its tree is immutable.
+#: A cache, because clients send the same program again and again; syntax trees are immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
 
 #: States of a program that has not ended.
@@ -71,7 +71,7 @@ class ProgramArm(Protocol):
 
     @property
     def at_rest(self) -> bool:
-        """Whether the arm stands still, at the end of a motion or paused on its path."""
+        """Whether the arm stands still, because no motion runs or because of a pause."""
 
     @property
     def on_path(self) -> bool:
@@ -87,10 +87,10 @@ class ProgramArm(Protocol):
         """End the modes that a program has switched on: force mode, freedrive, watchdogs."""
 
     def end_of_frame(self) -> None:
-        """Brake if no thread continues the motion."""
+        """Brake if a thread was killed in a motion that no other thread continues."""
 
     def release(self, thread: Hashable) -> None:
-        """Take the motion from a thread that has ended."""
+        """Take the ownership of the motion from a thread that has ended."""
 
     def start_refusal(self) -> str:
         """Return the reason why no program can run now; empty = a program can run."""
@@ -125,7 +125,7 @@ class ProgramRunner:
         self._queued: tuple[str, ScriptInterpreter] | None = None
         self._secondaries: list[ScriptInterpreter] = []
         self._loaded: ScriptProgram | None = None
-        #: Names of the program that was compiled last, because the same program often follows.
+        #: Names of the program that was compiled last, for reuse if the same program follows.
         self._newest_scope: Scope | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
@@ -136,9 +136,9 @@ class ProgramRunner:
         self.name = ''
         #: Called when a program has ended, to close its sockets.
         self.on_end: Callable[[], None] | None = None
-        #: Number of stops: a program that was sent before a stop does not start after it.
+        #: Number of stops: a program that was sent before a stop does not start after the stop.
         self._stops = 0
-        #: Compiles and passes the result on: at once, or in a thread while the cycles go on.
+        #: Function that compiles: at once, or in a thread while the cycles go on.
         self.compile_aside: CompileAside = _compile_at_once
 
     @property
@@ -161,7 +161,7 @@ class ProgramRunner:
         """
         Compile a program and start it; a `sec` runs in parallel with the primary program.
 
-        :param line_offset: number of lines put before the text of the client.
+        :param line_offset: number of lines that precede the client's own lines in ``text``.
         """
         stops = self._stops
 
@@ -200,8 +200,8 @@ class ProgramRunner:
         """
         Load the program that `play` starts; return the reason of a refusal, else an empty string.
 
-        A script that a client has sent is not loaded, so once stopped it cannot be played, as on
-        the robot.
+        As on the robot, a script that a client has sent is not loaded, so it cannot be played once
+        it has been stopped.
         """
         if self.running:
             return 'a program is running'
@@ -238,7 +238,7 @@ class ProgramRunner:
         Start the waiting program, once the arm stands still.
 
         A program that comes during or after a stream of set-points starts at once and can continue
-        the stream: clients stream `speedj` and `speedl`, each as a program of its own.
+        the stream: some clients send each `speedj` or `speedl` of a stream as a separate program.
         """
         taken_over = self.state is RuntimeState.STOPPING and not self._arm.on_path
         if self._queued is None or not (taken_over or self.state is RuntimeState.STOPPED):
@@ -253,7 +253,7 @@ class ProgramRunner:
         self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
     def play(self) -> str:
-        """Resume, or start the loaded program; return the reason of a refusal, or ''."""
+        """Resume the program or start the loaded one; return the reason of a refusal, or ''."""
         reason = self._arm.start_refusal()
         if reason:
             return reason
@@ -286,7 +286,7 @@ class ProgramRunner:
             return
         self.state = RuntimeState.STOPPING
         if self._stepping is not None and self._stepping is self._interpreter:
-            self._stepping.stop()  # called by its own function; ends when this returns
+            self._stepping.stop()  # inside one of its functions; ends when that function returns
         else:
             self._finish()
 
@@ -328,7 +328,7 @@ class ProgramRunner:
         self._stepping = interpreter
         try:
             interpreter.step()
-        except Exception as error:  # a defect of a function must not end the simulator
+        except Exception as error:  # a mistake in a script function must not end the simulator
             _log.exception('A function of program %s failed', self.name)
             interpreter.error = RuntimeException(f'Internal error of the simulator: {error!r}')
             self._stepping = None
@@ -347,7 +347,7 @@ class ProgramRunner:
             self.pause()
 
     def _run_secondary(self, interpreter: ScriptInterpreter) -> None:
-        """Run a whole secondary program; stop one that does not end within a frame."""
+        """Run a secondary program for one frame; stop it if it has not ended by then."""
         self._run(interpreter)
         error = interpreter.error
         if interpreter.running:

@@ -6,7 +6,8 @@ Cuts the stream of a script port into programs and single lines.
 A program begins with `def` or `sec` in column 1 and can come in any number of pieces. If its whole
 body is indented, it ends with `end` in column 1, as the robot's manual demands. A program without
 indentation ends when all its blocks have ended. (If blocks were counted in indented programs, too,
-a program that lacks an `end` would never be answered.) Any other line is a command or a statement.
+a program that lacks an inner `end` would never be complete, and its client would get no error.)
+Any other line is a command or a statement.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class UploadedLine:
 
 @dataclass(frozen=True, slots=True)
 class UploadTooLong:
-    """A line or program that exceeds the bound; the rest of it is skipped."""
+    """A line or program that exceeds the bound, so that the remainder is skipped."""
 
     text: str = (
         f'The program is longer than {MAX_UPLOAD_SIZE >> 20} MiB, which this controller does not '
@@ -65,7 +66,7 @@ class UploadDecoder:
         self._size = 0
         self._open_blocks = 0
         self._indented = True
-        #: Whether the rest of a program that is too long is being received.
+        #: Whether the remainder of a program that is too long is being received.
         self._skipping = False
 
     def feed(self, data: bytes) -> list[UploadedItem]:
@@ -79,7 +80,7 @@ class UploadDecoder:
         return found
 
     def _skip(self) -> UploadTooLong:
-        """Discard the program, and skip the rest of it up to its `end` in column 1."""
+        """Discard the program, and skip its remaining lines up to an `end` in column 1."""
         self._program, self._size, self._skipping = [], 0, True
         return UploadTooLong()
 
@@ -115,5 +116,5 @@ def _block_balance(line: str) -> int:
     try:
         words = [token.text for token in scan(line) if token.kind is TokenKind.KEYWORD]
     except CompileError:
-        return 0  # the compiler will report the fault
+        return 0  # the compiler will report the mistake
     return sum(word in _BLOCKS for word in words) - words.count('end')

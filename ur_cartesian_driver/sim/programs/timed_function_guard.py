@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The functions of a secondary program, which takes no time while the primary program runs."""
+"""The functions of secondary programs, which have to end within one cycle."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ur_cartesian_driver.urscript.script_errors import RuntimeException
 Builtins = Mapping[str, Any]
 
 
-#: Functions that act at once and only then take time, for which a secondary program does not wait.
+#: Functions that act at once and then wait; a secondary program can call them, but does not wait.
 ACT_AT_ONCE = frozenset({'protective_stop'})
 
 
 def refuse_timed_functions(builtins: Builtins) -> Builtins:
-    """Return the functions of a secondary program, where those that take time raise an error."""
+    """Return the functions of secondary programs: functions that take time raise an error."""
     return {
         name: _without_time(name, function) if inspect.isgeneratorfunction(function) else function
         for name, function in builtins.items()

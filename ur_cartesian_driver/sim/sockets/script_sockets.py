@@ -3,8 +3,8 @@
 """
 The sockets that programs open, as the builtins see them.
 
-No method waits: a builtin asks once per cycle and yields in between. `tcp_script_sockets` uses
-real TCP; the sockets in memory are for programs on the virtual clock.
+No method waits: a builtin polls its socket once per cycle and yields in between.
+`tcp_script_sockets` uses real TCP; the sockets in memory are for programs on the virtual clock.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class ScriptSockets(Protocol):
         """Return the state; CLOSED if the name is unknown or the peer has closed."""
 
     def received(self, name: str) -> bytearray:
-        """Return the unread bytes; the reader deletes those it takes."""
+        """Return the unread bytes; the caller deletes the bytes that it takes."""
 
     def send(self, name: str, data: bytes) -> bool:
         """Send without waiting; return whether the socket accepted the data."""
@@ -41,14 +41,14 @@ class ScriptSockets(Protocol):
         """Close; an unknown name is no error."""
 
     def close_all(self) -> None:
-        """Close every socket, as the end of a program does."""
+        """Close every socket; also called when a program ends."""
 
     def poll(self) -> None:
         """Continue connecting and sending; called once per cycle."""
 
 
 class MemorySocket:
-    """One end of a connection in memory; the test that holds it is the peer."""
+    """A connection in memory; the test that holds this object is the program's peer."""
 
     def __init__(self) -> None:
         """Begin open, with nothing in either direction."""
@@ -57,7 +57,7 @@ class MemorySocket:
         self.state = SocketState.OPEN
 
     def feed(self, data: bytes) -> None:
-        """Send to the program."""
+        """Send data to the program."""
         self.incoming += data
 
     def take(self) -> bytes:
@@ -72,7 +72,7 @@ class MemorySocket:
 
 
 class MemorySockets:
-    """Connections to peers in this process: port -> function called with each new connection."""
+    """Connections to listeners in this process: port -> function that gets each connection."""
 
     def __init__(self) -> None:
         """Begin without listeners."""

@@ -3,9 +3,9 @@
 """
 The sockets of programs over real TCP, polled by the controller's cycle.
 
-The event loop does not serve these sockets, because a program reads only in its own cycle: unread
-bytes stay in the kernel, and while a program is paused, TCP's flow control stops its peer, as on
-the robot.
+The event loop does not serve these sockets, because a program reads only when it is executed:
+unread bytes stay in the kernel, and while a program is paused, TCP's flow control stops the peer,
+as on the robot.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import socket
 
 from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 
-#: Bound on bytes read ahead of the program, and on bytes that a slow peer has not taken.
+#: Bound on received bytes that the program has not taken, and on bytes that wait to be sent.
 _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
@@ -75,7 +75,7 @@ class _ScriptConnection:
             self.close()
 
     def receive(self) -> None:
-        """Read from the kernel, up to the limit."""
+        """Read from the kernel until ``_MAX_BUFFERED`` bytes wait for the program."""
         while self.state is SocketState.OPEN and len(self.incoming) < _MAX_BUFFERED:
             assert self._socket is not None
             try:
@@ -144,7 +144,7 @@ class TcpScriptSockets:
         self._resolver: ThreadPoolExecutor | None = None
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Begin to connect; host names are looked up in a thread, as that may take seconds."""
+        """Begin to connect; a thread looks up host names, because that can take seconds."""
         self.close(name)
         connection = _ScriptConnection(port, self.on_data, self._host)
         self._connections[name] = connection

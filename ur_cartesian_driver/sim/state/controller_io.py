@@ -3,8 +3,8 @@
 """
 Inputs, outputs and registers of the simulated controller.
 
-RTDE clients and programs read and write them. Registers are plain lists, indexed as in the robot's
-manual: bit 0-127, integer and float 0-47.
+RTDE clients and programs read and write these values. Registers are plain lists, indexed as in the
+robot's manual: bits 0-127, integers 0-47, floats 0-47.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PORTS = 256
 
 
 #: Registers that RTDE transfers one by one: type in RTDE, list in :class:`Registers`, numbers.
-#: RTDE packs the bits before number 64 into integers.
+#: (RTDE transfers bits 0-63 in integers.)
 _SINGLE_REGISTERS = (
     ('bit', 'bits', range(64, REGISTER_BITS)),
     ('int', 'integers', range(REGISTER_INTEGERS)),
@@ -30,7 +30,7 @@ _SINGLE_REGISTERS = (
 
 
 def single_registers(direction: str) -> Iterator[tuple[str, str, int]]:
-    """Yield RTDE name, list in :class:`Registers` and number of the single registers."""
+    """Yield RTDE name, list in :class:`Registers` and number of each single register."""
     for kind, values, numbers in _SINGLE_REGISTERS:
         for i in numbers:
             yield f'{direction}_{kind}_register_{i}', values, i
@@ -43,7 +43,7 @@ def pack_bits(bits: list[bool]) -> int:
 
 @dataclass(slots=True)
 class Registers:
-    """One direction of the general purpose registers."""
+    """The general purpose registers of one direction, input or output."""
 
     bits: list[bool] = field(default_factory=lambda: [False] * REGISTER_BITS)
     integers: list[int] = field(default_factory=lambda: [0] * REGISTER_INTEGERS)
@@ -52,7 +52,7 @@ class Registers:
 
 @dataclass(slots=True)
 class DigitalPort:
-    """The digital channels of one side: standard, configurable and tool."""
+    """The digital channels of one direction, input or output."""
 
     standard: list[bool] = field(default_factory=lambda: [False] * STANDARD)
     configurable: list[bool] = field(default_factory=lambda: [False] * CONFIGURABLE)
@@ -84,10 +84,12 @@ class ControllerIo:
 
     digital_in: DigitalPort = field(default_factory=DigitalPort)
     digital_out: DigitalPort = field(default_factory=DigitalPort)
-    #: Values in [V] or [A], and their domains; True = voltage.
+    #: Values of the analog inputs [V or A].
     analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    #: Domain of each analog input; True = voltage.
     analog_in_voltage: list[bool] = field(default_factory=lambda: [True, True])
-    #: Outputs are 4 mA at first, as recorded in URSim and as set by programs from the pendant.
+    #: Values of the analog outputs [V or A]; 4 mA at first, as recorded in URSim and as set by
+    #: programs from the pendant.
     analog_out: list[float] = field(default_factory=lambda: [0.004, 0.004])
     analog_out_voltage: list[bool] = field(default_factory=lambda: [False, False])
     tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of the controller to all clients of the primary interface, and its log."""
+"""Messages of the controller to all clients of the primary interface, and the log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
 )
 from ur_cartesian_driver.sim.state.controller_state import Popup
 
-#: Bound on messages to be sent and on log lines.
+#: Bound on the number of messages to be sent, and on the number of log lines.
 _MAX_LOG_LINES = 10_000
 #: Longest text in a message [bytes]: a frame must stay below 4092.
 _MAX_TEXT_LENGTH = 4000
@@ -41,7 +41,7 @@ class ControllerMessages:
         self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
         #: Called with code and argument of each error.
         self.on_error: Callable[[int, int], None] | None = None
-        #: Texts of programs and errors, as lines.
+        #: Texts of programs, and errors; one per line.
         self.log: deque[str] = deque(maxlen=_MAX_LOG_LINES)
 
     def take(self) -> list[PrimaryMessage]:
@@ -55,7 +55,7 @@ class ControllerMessages:
         self.log.append(text)
 
     def text(self, text: str) -> None:
-        """Send a text of a program, or of the controller."""
+        """Send a text of a program or of the controller, and write it to the log."""
         self.log.append(text)
         self.pending.append(TextMessage(timestamp=self._stamp(), text=_cut(text)))
 
@@ -64,7 +64,7 @@ class ControllerMessages:
         self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
     def exception(self, line: int, column: int, text: str) -> None:
-        """Report the error at which a program does not start or ends; line and column from 1."""
+        """Report an error that stops a program or its start; line and column begin at 1."""
         self.log.append(f'{line}:{column}: {text}')
         self.pending.append(
             RuntimeExceptionMessage(
@@ -73,7 +73,7 @@ class ControllerMessages:
         )
 
     def error(self, code: int, argument: int, text: str) -> None:
-        """Send an error code; the controller reports even a protective stop as a warning."""
+        """Send an error code as a warning, as the robot does even for a protective stop."""
         message = ErrorCodeMessage(
             timestamp=self._stamp(),
             code=code,
@@ -94,8 +94,8 @@ class ControllerMessages:
         """
         Report that a window is shown.
 
-        Body: u32 request, u8 type of the request, flags warning, error, blocking, u8 length of
-        the title, title, text.
+        The body is: u32 request, u8 type of the request, u8 each for warning, error and blocking,
+        u8 length of the title, title, text.
         """
         title = popup.title.encode()[:255]
         flags = bytes([0, popup.warning, popup.error, popup.blocking])

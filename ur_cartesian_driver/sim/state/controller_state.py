@@ -44,7 +44,7 @@ class Pendant:
 class ProcessState:
     """Process settings of a program; they end with the program."""
 
-    #: Codes and arguments (None: any) of errors that pause the program.
+    #: Codes and arguments (None = any argument) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
     def has_pause_on(self, code: int, argument: int) -> bool:

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Power and safety of the simulated arm, as two tables.
+Power and safety of the simulated arm, as two state machines.
 
 Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each step takes time; a
-command only sets the goal. Power goes off at once.
+command only sets the mode that has to be reached. Power goes off at once.
 
-The safety system is a second state machine. The controller carries out its demands: a
-protective stop brakes the arm on its path and pauses the program, an emergency stop does the same
-and then cuts the power (a category 1 stop), a violation or fault cuts the power at once.
+The controller carries out the demands of the safety system: a protective stop brakes the arm on
+its path and pauses the program, an emergency stop does the same and then cuts the power (a
+category 1 stop), a violation or fault cuts the power at once.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _POWER_CUT_TRANSITIONS = {
     for event in (SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)
 }
 
-#: An event that is not in the table is refused.
+#: Safety mode -> event -> next safety mode; an event that is not in the table is refused.
 SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
     {
         SafetyMode.NORMAL: _STOP_TRANSITIONS,
@@ -103,7 +103,7 @@ _POWER_SEQUENCE = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, Robo
 
 
 class SafetySystem:
-    """The safety system's mode and when it was entered."""
+    """The mode of the safety system, and the time at which the mode began."""
 
     def __init__(self, unlock_delay: float) -> None:
         """
@@ -135,10 +135,10 @@ class SafetySystem:
 
 
 class ArmPower:
-    """The arm's power: its robot mode, and the mode that was commanded."""
+    """The power of the arm: the present robot mode and the commanded robot mode."""
 
     def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
-        """Begin in a mode of the sequence; times in [s]."""
+        """Begin in a robot mode; the times are those of the two slow steps [s]."""
         self.mode = mode
         self._goal = mode
         self._times = {
@@ -149,7 +149,7 @@ class ArmPower:
         self._since = 0.0
 
     def on(self, now: float) -> None:
-        """Go to IDLE; an arm in RUNNING stays there."""
+        """Go to IDLE; an arm that is RUNNING stays RUNNING."""
         self._raise_goal(RobotMode.IDLE, now)
 
     def release_brakes(self, now: float) -> None:
@@ -166,6 +166,6 @@ class ArmPower:
         self._goal = max(self._goal, goal)
 
     def step(self, now: float) -> None:
-        """Go to the next mode when the time of the present mode is over."""
+        """Go one mode towards the commanded mode when the time of the present mode is over."""
         if self.mode < self._goal and now - self._since >= self._times[self.mode]:
             self.mode, self._since = _POWER_SEQUENCE[_POWER_SEQUENCE.index(self.mode) + 1], now

@@ -31,7 +31,8 @@ BREAK = 'break'
 CONTINUE = 'continue'
 RETURN = 'return'
 
-#: A thread yields this to let another one run in the same controller cycle, and None to take time.
+#: A thread yields SWITCH to let another thread run in the same controller cycle; it yields None to
+#: take time.
 SWITCH = object()
 
 
@@ -71,7 +72,7 @@ class Runtime(Protocol):
         """Raise an error: the thread used up its budget without yielding."""
 
     def pay_for(self, items: int, line: int, column: int) -> None:
-        """Spend fuel on the items of a long value, which takes longer than one node."""
+        """Spend fuel on the items of a long value: they take longer than one node."""
 
     def switches_now(self) -> bool:
         """Return whether another thread runs before the next statement."""

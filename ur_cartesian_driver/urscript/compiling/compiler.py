@@ -3,7 +3,7 @@
 """
 Compiles syntax trees to Python closures, once per program, so that a cycle costs little.
 
-Work is counted in nodes of the tree, a block at a time: entering a block pays for all its nodes.
+Work is counted in nodes of the tree. Entering a block of statements pays for all its nodes.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def compile_program(
     """
     Compile a checked program and return the body of its main thread.
 
-    :param procedures: existing functions by the identity of their scopes; the program's functions
-        are added.
+    :param procedures: the functions that exist already, by the id of their scopes; those of the
+        program are added.
     :param lazily: compile each function when it is called for the first time.
     """
     procedures |= {id(scope): _procedure(scope, runtime.interleaves) for scope in root.walk()}
@@ -56,7 +56,7 @@ def compile_program(
 
 
 def _procedure(scope: Scope, interleaves: bool) -> CompiledFunction:
-    """Return a function without its body, because functions call each other."""
+    """Return a function without its body; bodies come later, because functions call each other."""
     return CompiledFunction(
         name=scope.definition.name if scope.definition else '',
         suspends=scope.suspends or interleaves,
@@ -79,7 +79,7 @@ class _Compiler(ExpressionCompiler):
         return self._block(self._scope.body, self._scope.owner)
 
     def _body_of_first_call(self, procedure: CompiledFunction) -> CompiledNode:
-        """Return code that compiles the body, puts the result in its own place, and runs it."""
+        """Return code that, when first run, replaces itself by the compiled body and runs that."""
 
         def plain(frame: StackFrame) -> Any:
             procedure.body = self._body()
@@ -92,7 +92,7 @@ class _Compiler(ExpressionCompiler):
         return CompiledNode(steps if procedure.suspends else plain, procedure.suspends)
 
     def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> CompiledNode:
-        """Compile consecutive statements, which are paid for at the beginning."""
+        """Compile consecutive statements; all their nodes are paid for at the beginning."""
         first = statements[0] if statements else owner
         call_location = (first.line, first.column)
         codes = [code for statement in statements for code in self._statement(statement)]
@@ -172,7 +172,7 @@ class _Compiler(ExpressionCompiler):
                 return
 
     def _critical(self, node: tree.CriticalStatement) -> CompiledNode:
-        """Compile the entry or exit of a critical section; taking time in it lets others run."""
+        """Compile the entry or exit of a critical section; taking time in one lets others run."""
         runtime, enter = self._runtime, node.enter
 
         def plain(frame: StackFrame) -> None:
@@ -243,7 +243,7 @@ class _Compiler(ExpressionCompiler):
     def _path(
         self, target: tree.Expression
     ) -> tuple[tree.NameExpression, list[str | int], list[CompiledNode]]:
-        """Return the variable, keys (field names or numbers of indices), and code of indices."""
+        """Return the variable, the keys (field name or count of indices), and code of indices."""
         if isinstance(target, tree.FieldExpression):
             base, keys, indices = self._path(target.target)
             return base, [*keys, target.name], indices

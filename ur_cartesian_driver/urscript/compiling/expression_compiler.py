@@ -3,8 +3,8 @@
 """
 Compiles expressions to closures.
 
-When a value is stored, passed or returned, it is copied if it may also be stored elsewhere: lists
-are values in this language. An error gets the position of its operator, index or call.
+Lists are values in this language: a list that is stored, passed or returned is copied if it may
+also be stored elsewhere. An error gets the position of its operator, index or call.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class ExpressionCompiler:
                 return make(found)
 
             return self._positioned(node, items, made)
-        value = make(numbers)  # which cannot fail
+        value = make(numbers)  # cannot fail
         signs = sum(isinstance(item, tree.UnaryExpression) for item in node.items)
         run = (lambda frame: value[:]) if is_list else (lambda frame: value)
         return CompiledNode(run, False, 1 + len(numbers) + signs)
@@ -243,7 +243,7 @@ class ExpressionCompiler:
     def _item(
         node: tree.IndexExpression, target: CompiledNode, index: CompiledNode
     ) -> CompiledNode:
-        """Compile the common `list[int]`, fast if nothing is wrong."""
+        """Compile the common case `list[int]`, with a fast path for a valid index."""
         run_target, run_index = target.run, index.run
 
         def run(frame: StackFrame) -> Value:
@@ -322,7 +322,7 @@ class ExpressionCompiler:
         return sequence(arguments, new_frame)
 
     def _enter(self, node: tree.CallExpression) -> Callable[[], Thread]:
-        """Return a function that counts a call in its thread and limits the depth."""
+        """Return a function that adds a call to the depth of its thread, up to a limit."""
         runtime = self._runtime
         call_location = (node.line, node.column)
 
@@ -391,7 +391,7 @@ class ExpressionCompiler:
             try:
                 if isinstance(target, values.RemoteObject):
                     return target.call(node.method, arguments)
-                # Moving the items of a list up is quicker than copying them.
+                # Shifting the items of a list is quicker than copying them.
                 runtime.pay_for(values.size_of(target) // 16, *call_location)
                 return call_method(target, node.method, arguments)
             except Exception as error:
@@ -422,7 +422,7 @@ def _unset(node: tree.NameExpression) -> RuntimeException:
 def _from_builtin(
     node: tree.CallExpression | tree.MethodCallExpression, error: Exception, name: str = ''
 ) -> RuntimeException | RecursionError:
-    """Turn any error of a builtin into a runtime exception at its call."""
+    """Turn an error of a builtin, except RecursionError, into a runtime exception at its call."""
     if isinstance(error, RecursionError):
         return error
     if isinstance(error, RuntimeException):

@@ -5,13 +5,14 @@ Resolves the meaning of each name before anything runs.
 
 The rules: every variable that the body of the program assigns is global, however it is marked. In
 a function or thread `local x = ...` makes x a local of the whole function and `global x = ...`
-makes it a global of the program. A bare assignment writes the global of that name if the program
-has one anywhere, and otherwise makes a local. A function sees all functions of the scopes around
-it, wherever the text defines them, but not the locals of the enclosing function. If a scope
-defines a name twice, the later definition applies, because exported programs include a file twice.
+makes it a global of the program. An unmarked assignment there writes the global of that name if
+the program has one anywhere, and otherwise makes a local. A function sees all functions of the
+scopes around it, wherever the text defines them, but not the locals of the enclosing function. If
+a scope defines a function twice, the later definition applies, because an exported program can
+include a file twice.
 
 The same walk finds unknown names, calls with wrong arguments, and the functions that can take
-time: only those need a Python generator.
+time: only these functions need a Python generator.
 """
 
 from __future__ import annotations
@@ -40,14 +41,14 @@ _COMPOUND = (
 
 @dataclass(slots=True, kw_only=True)
 class Scope:
-    """The names of one function, or (without a parent) of the program's body."""
+    """The names of one function, or of the body of a program, or of a line added to one."""
 
     parent: Scope | None
     owner: tree.FunctionDefinition | tree.ScriptProgram
     globals: dict[str, int]
     locals: dict[str, int] = field(default_factory=dict)
     functions: dict[str, Scope] = field(default_factory=dict)
-    #: Functions that this one calls, and whether it can take time.
+    #: The functions that this one calls; whether this one can take time.
     calls: list[Scope] = field(default_factory=list)
     suspends: bool = False
 
@@ -83,7 +84,7 @@ def resolve(
     """
     Check a program and return the scope of its body.
 
-    :param enclosing: scope of the program that this one continues; it is not changed.
+    :param enclosing: scope of the program that this one continues; that scope is not changed.
     :raises CompileError: the first unknown name or call with wrong arguments.
     """
     root = Scope(
@@ -158,9 +159,9 @@ def bind(
     definition: tree.FunctionDefinition, call: tree.CallExpression
 ) -> dict[str, tree.CallArgument]:
     """
-    Match the arguments of a call with the parameters of a function of the program.
+    Match the arguments of a call with the parameters of a function that the program defines.
 
-    :raises CompileError: too many, unknown, duplicate or missing arguments.
+    :raises CompileError: an argument is unknown, duplicate or missing, or there are too many.
     """
     parameters = [parameter.name for parameter in definition.parameters]
     bound: dict[str, tree.CallArgument] = {}

@@ -1,10 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The grammar rules of expressions; one method reads all operators, by their precedence.
+The grammar rules of expressions; one method reads all binary operators, by their precedence.
 
-The head of the following module describes the grammar:
-:mod:`~ur_cartesian_driver.urscript.parsing.parser`.
+The docstring of :mod:`~ur_cartesian_driver.urscript.parsing.parser` describes the grammar.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _PRECEDENCE = {
     '+': 5, '-': 5, '*': 6, '/': 6, '%': 6,
 }  # fmt: skip
 _NOT = 3
-#: Symbols that, after a value, belong to it.
+#: Symbols that continue a value if they follow it.
 _POSTFIXES = frozenset({'.', '(', '['})
 
 CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}

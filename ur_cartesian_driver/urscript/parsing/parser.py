@@ -1,14 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Tokens to syntax tree: recursive descent, one method per rule.
+Turns tokens into a syntax tree, by recursive descent: one method per rule.
 
 This module parses programs and statements; expressions are in
 :mod:`~ur_cartesian_driver.urscript.parsing.expression_parser`.
 
 Line ends do not matter: a statement ends where its expression cannot continue, so `a = 1 b = 2`
 are two statements, and an operator at the end of a line continues the expression. There are two
-exceptions: the value of `return` and the texts of a label must be on the same line.
+exceptions: the value of `return` must be on the line of `return`, and a further text of a label on
+the line of the label's first text.
 
     program     = ("def" | "sec") NAME "(" ")" ":" block "end"
     block       = { statement }
@@ -51,7 +52,7 @@ from ur_cartesian_driver.urscript.parsing.expression_parser import CONSTANTS, Ex
 from ur_cartesian_driver.urscript.parsing.scanner import Token, TokenKind
 from ur_cartesian_driver.urscript.parsing.token_reader import source_position
 
-#: Errors for statements that people try because other languages have them.
+#: Error texts for statements that people try because other languages have them.
 _OF_OTHERS = {
     'for': "there is no 'for'; count in a 'while' loop",
     'elseif': "'elseif' is written 'elif'",
@@ -65,7 +66,7 @@ def parse(text: str) -> tree.ScriptProgram:
     """
     Parse one program, with any blank lines and comments around it.
 
-    :raises CompileError: at the first token that fits no rule.
+    :raises CompileError: a token fits no rule; the error has the position of the first such token.
     """
     parser = Parser(text)
     try:
@@ -76,9 +77,9 @@ def parse(text: str) -> tree.ScriptProgram:
 
 def parse_line(text: str) -> tree.ScriptProgram:
     """
-    Parse statements that belong to a running program, as if they were a program.
+    Parse statements for a program that runs already; return them as the body of a program.
 
-    :raises CompileError: at the first token that fits no rule.
+    :raises CompileError: a token fits no rule; the error has the position of the first such token.
     """
     parser = Parser(text)
     try:
@@ -93,7 +94,7 @@ class Parser(ExpressionParser):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._loops = 0
-        #: The beginning of the first block whose `end` is in another column, or None.
+        #: The first token of the first block whose `end` is in another column than that token.
         self._misaligned: Token | None = None
 
     # Programs, functions and blocks
@@ -132,8 +133,8 @@ class Parser(ExpressionParser):
         """
         Read { statement }, up to one of the keywords that close it.
 
-        If an `end` is missing, the text does not show which block lacks it: the error names the
-        first block that, by the indentation, is closed by the `end` of another.
+        If an `end` is missing, the text does not show which block lacks it. So the error names the
+        first block whose `end` is not indented like the block's beginning.
 
         :param start: the token that began the block.
         """
@@ -243,10 +244,10 @@ class Parser(ExpressionParser):
 
     def _case_has_end(self, switch: Token) -> bool:
         """
-        Return whether cases have their own `end`, judged at the end of the first case.
+        Return whether each case has an `end` of its own, judged after the first case.
 
-        Both styles occur. If one `end` follows another, the first belongs to the switch if it is
-        in the column of the switch, else to the case.
+        Both styles occur. If two `end` follow each other, the first one belongs to the switch if
+        it is in the column of the switch, and otherwise to the case.
         """
         if not self._at('end'):
             return False
@@ -271,7 +272,7 @@ class Parser(ExpressionParser):
         return tree.WhileStatement(condition=condition, body=body, **source_position(start))
 
     def _return(self) -> tree.ReturnStatement:
-        """Read "return" [ expression ]; the value is on the line of the keyword."""
+        """Read "return" [ expression ]; the expression begins on the line of "return"."""
         start = self._advance()
         value = self._expression() if self._same_line() and self._starts_expression() else None
         return tree.ReturnStatement(value=value, **source_position(start))
@@ -310,7 +311,7 @@ class Parser(ExpressionParser):
         )
 
     def _label(self) -> tree.LabelStatement:
-        """Read "$" NUMBER STRING { STRING }, on one line."""
+        """Read "$" NUMBER STRING { STRING }; the strings are on one line."""
         start = self._advance()
         number = self._expect_kind(TokenKind.NUMBER)
         text = self._expect_kind(TokenKind.STRING).text
@@ -344,7 +345,7 @@ class Parser(ExpressionParser):
     def _assignment(
         self, target: tree.Expression, qualifier: Literal['', 'global', 'local'], start: Token
     ) -> tree.AssignStatement:
-        """Read the value; the target must be a variable or a part of one."""
+        """Read "=" expression, after a target that must be a variable or a part of one."""
         base: tree.Expression = target
         while isinstance(base, tree.IndexExpression | tree.FieldExpression):
             base = base.target

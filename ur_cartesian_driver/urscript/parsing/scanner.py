@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Text to tokens.
+Splits text into tokens.
 
-Newlines are white space. A token knows its line; the parser uses it only in the few places where
-the language depends on lines.
+Newlines are white space. Each token has a line number, which the parser uses only in the few
+places where the language depends on lines.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: `sec` is not among them, because it is also a field of the result of `time()`.
+#: `sec` is not a keyword, because it is also a field of the result of `time()`.
 KEYWORDS = frozenset({
     'and', 'break', 'case', 'continue', 'def', 'default', 'elif', 'else', 'end', 'enter_critical',
     'exit_critical', 'false', 'False', 'global', 'halt', 'if', 'join', 'kill', 'local', 'None',
@@ -25,7 +25,7 @@ KEYWORDS = frozenset({
 #: Longer symbols come first, so that `<=` is not read as `<`.
 SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$!')
 
-#: Integers of the controller have 32 bits; a longer literal is read as a float.
+#: Integers of the controller have 32 bits; a larger literal is read as a float.
 INT_LIMIT = 2**31
 
 _WORD = re.compile(r'[A-Za-z_][A-Za-z_0-9]*')
@@ -51,7 +51,7 @@ class TokenKind(Enum):
 
 
 class Token(NamedTuple):
-    """A token; `text` of a string is the text between the quotes."""
+    """A token; the `text` of a string is what is between its quotes."""
 
     kind: TokenKind
     text: str
@@ -62,7 +62,7 @@ class Token(NamedTuple):
     def number(self) -> int | float:
         """The value of a number."""
         value = float(self.text)
-        # Python refuses to read integers of thousands of digits.
+        # float() comes first, because Python's int() refuses thousands of digits.
         if self.text.isdigit() and value < INT_LIMIT:
             return int(self.text)
         return value
@@ -78,7 +78,8 @@ def scan(text: str) -> list[Token]:
     """
     Split a text into tokens, the last of which is END.
 
-    :raises CompileError: at the first character that begins no token.
+    :raises CompileError: a character begins no token, a number is malformed, or a string is not
+        closed.
     """
     tokens: list[Token] = []
     line, line_start = 1, 0

@@ -4,7 +4,7 @@
 The syntax tree: data only.
 
 Every node is frozen and has the 1-based line and column of its most characteristic token. The
-parser makes the nodes; the scopes and the compiler read them.
+parser makes the nodes; name resolution (`scopes`) and the compiler read them.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ConstantExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NameExpression(Expression):
-    """A variable that is read, or assigned to when it is a target."""
+    """A variable that is read, or is assigned to if it is the target of an assignment."""
 
     identifier: str
 
@@ -79,7 +79,7 @@ class UnaryExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinaryExpression(Expression):
-    """Arithmetic or a comparison; both operands are always evaluated."""
+    """An arithmetic operation or a comparison; both operands are always evaluated."""
 
     operator: str
     left: Expression
@@ -88,7 +88,7 @@ class BinaryExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogicalExpression(Expression):
-    """`and`, `or`, `xor`; `and` and `or` evaluate the right side only if it matters."""
+    """`and`, `or`, `xor`; `and` and `or` evaluate the right side only if it decides the result."""
 
     operator: str
     left: Expression
@@ -164,7 +164,7 @@ class CallStatement(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionalBlock(SyntaxNode):
-    """A condition (of `if`, `elif`) or a value (of `case`), and its block."""
+    """A condition of `if` or `elif`, or a value of `case`, with its block."""
 
     condition: Expression
     body: StatementBlock
@@ -172,7 +172,7 @@ class ConditionalBlock(SyntaxNode):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IfStatement(Statement):
-    """`if`, any number of `elif`, and `else` (empty when there is none)."""
+    """`if`, any number of `elif`, and `else`, whose block is empty if it is missing."""
 
     branches: tuple[ConditionalBlock, ...]
     otherwise: StatementBlock
@@ -231,7 +231,7 @@ class JoinStatement(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KillStatement(Statement):
-    """End a thread and its children."""
+    """End a thread and all threads that it started."""
 
     handle: Expression
 
@@ -291,7 +291,7 @@ def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
             yield from value
 
 
-#: The fields that hold other nodes, by kind of node; kept because all walks through trees ask.
+#: The fields that hold other nodes, by kind of node; cached because every walk needs them.
 _FIELDS: dict[type[SyntaxNode], tuple[str, ...]] = {}
 #: Types of fields that hold no nodes.
 _IS_PLAIN = re.compile(r'(?:int|float|str|bool|None|OneOf\[.*\]|[ |])+').fullmatch

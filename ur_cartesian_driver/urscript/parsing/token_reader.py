@@ -11,26 +11,27 @@ from typing import TypedDict, TypeVar
 from ur_cartesian_driver.urscript.parsing.scanner import scan, syntax_error, Token, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Largest nesting of blocks, brackets and signs.
+#: Deepest nesting of blocks, brackets, signs and `not`.
 MAX_NESTING = 50
-#: Largest number of operators of equal precedence in a row; each makes the tree a node deeper.
+#: Largest number in a row of operators of equal precedence, or of calls, indices and fields; each
+#: of these makes the tree one node deeper.
 MAX_CHAIN = 100
 
-#: The kinds of tokens that are fixed words or symbols of the language.
+#: The kinds of tokens whose texts the language defines: its words and symbols.
 FIXED = (TokenKind.KEYWORD, TokenKind.SYMBOL)
 
 T = TypeVar('T')
 
 
 class SourcePosition(TypedDict):
-    """The position arguments of a node."""
+    """The arguments of a node that give its position."""
 
     line: int
     column: int
 
 
 def source_position(token: Token) -> SourcePosition:
-    """Return the position of a token as arguments of a node."""
+    """Return the position of a token, as arguments for a node."""
     return SourcePosition(line=token.line, column=token.column)
 
 
@@ -88,7 +89,7 @@ class TokenReader:
 
     @contextmanager
     def _nested(self) -> Iterator[None]:
-        """Limit the nesting depth."""
+        """Go one level deeper, within MAX_NESTING."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise self.error(f'more than {MAX_NESTING} levels inside one another')
@@ -96,7 +97,7 @@ class TokenReader:
         self._nesting -= 1
 
     def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
-        """Read `[ item { "," item } ]` up to the closing bracket."""
+        """Read [ item { "," item } ] and then the bracket `close`."""
         items: list[T] = []
         with self._nested():
             if not self._at(close):

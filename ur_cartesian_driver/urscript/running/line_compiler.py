@@ -4,8 +4,8 @@
 Compiles lines for a running program, as in interpreter mode.
 
 A line is any number of statements or function definitions. It sees the global variables and
-functions of the program and of earlier lines. New variables and functions belong to the lines; all
-of them can be forgotten at once.
+functions of the program and of earlier lines. The variables and functions that lines define can be
+forgotten, all of them at once.
 """
 
 from __future__ import annotations
@@ -68,9 +68,10 @@ class LineCompiler:
 
     def compile(self, text: str) -> CompiledLine:
         """
-        Compile a line without running it; its functions are known from now on.
+        Compile a line without running it; later lines know its functions from now on.
 
-        :raises CompileError: the text is not a line, or contains an unknown name.
+        :raises CompileError: the text is not a line, has an unknown name, or has a call with wrong
+            arguments.
         """
         program = parse_line(text)
         try:

@@ -3,17 +3,17 @@
 """
 Runs one program, a controller cycle (frame) at a time.
 
-In each frame all live threads run, in the order in which they were started. Each runs until it
-takes time: it calls a builtin that yields, waits in `join`, or ends. A new thread runs in the same
-frame, after the earlier ones. Nothing else switches threads. A thread that evaluates more nodes
-than its budget in one frame ends the program.
+In each frame all live threads run, in the order in which they were started. Each thread runs until
+it ends or takes time: in a builtin that yields, in `join`, or in `pause`. A new thread runs in the
+same frame, after the threads that were started before it. Nothing else switches threads. A thread
+that evaluates more nodes than its budget in one frame ends the program with an error.
 
 The manual guarantees less than this, so two settings make the order of threads less certain. With
 `thread_delay` a new thread begins some frames later. With `interleaving` threads take turns at
 random: in a random order, between any two statements, and before an assignment stores its value in
 a global variable, except in a critical section. If a thread takes time in a critical section, the
-others run, even in critical sections of their own. A killed thread holds nothing that must be
-released.
+other threads run, even in critical sections of their own. So a thread that is killed in a critical
+section blocks no other thread.
 
 The program ends when its main thread ends, and all other threads end with it. When a thread ends
 by itself, the threads that it started continue; when it is killed, they are killed, too.
@@ -68,7 +68,7 @@ class _Thread:
     in_critical_section: bool = False
     #: Frames until the thread begins.
     delay: int = 0
-    #: Nodes that the thread may still evaluate in this frame, and whether it took time in it.
+    #: Nodes that the thread may still evaluate in this frame; whether it took time in this frame.
     fuel: int = 0
     took_time: bool = False
 
@@ -95,7 +95,8 @@ class ScriptInterpreter:
         are switched only when one takes time.
     :param lazily: compile each function when it is called for the first time: the interpreter is
         ready much sooner, but a frame with such a call takes longer.
-    :param scope: the `scope` of an earlier interpreter of the same program and builtins.
+    :param scope: the `scope` of an earlier interpreter of the same program and builtins; None =
+        resolve the names of the program.
     :raises CompileError: the program cannot run; nothing of it has run.
     """
 
@@ -111,18 +112,18 @@ class ScriptInterpreter:
         lazily: bool = False,
         scope: Scope | None = None,
     ) -> None:
-        #: Called with the id of each thread that ends, for any reason.
+        #: This function is called with the number of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
         #: Set by `pause`; a step does nothing until `resume`.
         self.paused = False
-        #: The runtime exception that ended the program.
+        #: The runtime exception that ended the program; None = no exception has.
         self.error: RuntimeException | None = None
         self.fuel = 0
         self.interleaves = interleaving is not None
         self._random = interleaving
         self._thread_delay = thread_delay
         self._budget = instruction_budget
-        #: The rest of the total budget; None = there is no bound.
+        #: The nodes left of the total budget; None = there is no total budget.
         self.fuel_left = total_budget
         self._is_secondary = program.kind == 'sec'
         self._current: _Thread | None = None
@@ -146,7 +147,7 @@ class ScriptInterpreter:
 
     @property
     def running(self) -> bool:
-        """Whether the program has not ended; True even before its first step."""
+        """Whether the program has not ended yet; True even before its first step."""
         return bool(self._threads)
 
     @property
@@ -157,7 +158,7 @@ class ScriptInterpreter:
 
     @property
     def current_thread(self) -> Hashable:
-        """Id of the thread whose builtin is running; None between steps."""
+        """The number of the running thread; None between steps."""
         return None if self._current is None else self._current.number
 
     @property
@@ -265,7 +266,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """Close a thread as the current one, so that builtins clean up for the right thread."""
+        """End a thread; it is the current one, so that builtins clean up for the right thread."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:

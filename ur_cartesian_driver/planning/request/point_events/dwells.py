@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Dwells: the arm rests at a point for a time that the segment gives."""
+"""Dwells: the arm rests at the end of a segment for a time that the segment gives."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ur_cartesian_driver.planning.request.point_events.point_event import Placed
 
 
 class Dwells(PointEvent[Segment]):
-    """Segments at whose point the arm rests for a time."""
+    """Segments with a dwell: the arm rests at their end."""
 
     field = 'segments'
 
     def places(self, goal: GoalTable) -> Iterator[tuple[str, int]]:
-        """Yield the points at which the arm rests."""
+        """Yield the name and the point of each dwell."""
         for i in rows_where(goal.motions.dwells > 0.0):
             yield segment_field(i, 'dwell'), i
 
@@ -44,7 +44,7 @@ class Dwells(PointEvent[Segment]):
                 )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the rests."""
+        """Yield the dwells as stops of the robot program."""
         for _, i in self.places(goal):
             rest = Wait(duration=float(goal.motions.dwells[i]))
             yield PlacedStop(i, rest, f'rests there for {rest.duration:g} s', order=1)
@@ -56,7 +56,7 @@ def refuse_dwells_of_open_goals(
     """
     Refuse dwells in a goal to which points can be appended.
 
-    :param first: the number of the first segment.
+    :param first: the number that the first of ``segments`` has in the goal.
     """
     rows = rows_where(SegmentRows.of(segments).dwells > 0.0) if keep_open else []
     if rows:

@@ -19,23 +19,24 @@ NO_FRACTION = 1e-6
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalRest:
     """
-    The points of a resumed goal on the path of the goal that was stopped.
+    The points of a resumed goal, as places on the path of the goal that was stopped.
 
-    A place on that path is a number ``k + u``: at the fraction u of the segment to point k.
+    A place on that path is a number ``k + u``: the fraction u of the segment to point k.
     """
 
-    #: Places where the path is resumed, and where the arm was stopped, somewhat farther on.
+    #: Place where the path is resumed.
     begin: float
+    #: Place where the arm was stopped, somewhat after ``begin``.
     stopped: float
     #: Places of the points of the resumed goal.
     places: Sequence[float]
-    #: Returns how long before ``begin`` the tool passed a waypoint [s]. The other arguments are
-    #: name and value of the offset from that waypoint; only offsets above 0 need the time.
+    #: Function that returns the time from a waypoint to ``begin`` [s]. Its other arguments are the
+    #: name and value of the time offset of an event at that waypoint; offsets <= 0 need no time.
     time_since: Callable[[int, str, float], float]
 
     @property
     def first(self) -> int:
-        """The number of the last point at or before the place of resumption; 0 if none is."""
+        """The number of the last resumed point at or before ``begin``; 0 if there is none."""
         return max(sum(place <= self.begin + NO_FRACTION for place in self.places) - 1, 0)
 
     def is_passed(self, waypoint: int) -> bool:
@@ -48,7 +49,7 @@ class GoalRest:
         return min(range(len(places)), key=lambda i: abs(places[i] - waypoint - 1.0))
 
     def ahead(self, events: Sequence[E]) -> list[E]:
-        """Return the events whose points are all still ahead, with their new numbers."""
+        """Return the events whose points are all ahead, with the points' new numbers."""
         return [
             renumbered(event, self.index)
             for event in events
@@ -56,10 +57,10 @@ class GoalRest:
         ]
 
     def with_last(self, events: Sequence[E]) -> list[E]:
-        """Return the events ahead, and first those of the last passed point, at the new start."""
+        """Return the events of the last passed point, moved to the new start, and those ahead."""
         first, left = self.first, self.ahead(events)
         passed = [event for event in events if self.is_passed(*points_of(event).values())]
-        if not passed or self.places[first] > self.begin + NO_FRACTION:  # no need to stop there
+        if not passed or self.places[first] > self.begin + NO_FRACTION:  # no point there
             return left
         last = max(point for event in passed for point in points_of(event).values())
         again = [event for event in passed if last in points_of(event).values()]

@@ -23,7 +23,7 @@ INPUTS = {
     InputKind.STANDARD_ANALOG: 2,
     InputKind.TOOL_ANALOG: 2,
 }
-#: The highest level of an analog input [V].
+#: The highest level that a wait for an analog input accepts [V], or [A] for a current.
 MAX_LEVEL = 10.0
 
 
@@ -45,7 +45,7 @@ class InputWaits(PointEvent[InputWait]):
         super().check(goal, options)
 
     def check_event(self, where: str, wait: InputWait) -> None:
-        """Refuse inputs that the robot does not have, and values that they cannot have."""
+        """Refuse inputs that the robot does not have, and values that an input cannot have."""
         name = f'{wait.input.name.lower().replace("_", " ")} input'
         if not 0 <= wait.pin < INPUTS[wait.input]:
             raise InvalidGoal(
@@ -65,7 +65,7 @@ class InputWaits(PointEvent[InputWait]):
             )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the waits."""
+        """Yield the waits as stops of the robot program."""
         for wait in goal.input_waits:
             is_analog = wait.input.is_analog
             stop = AwaitInput(
@@ -81,5 +81,5 @@ class InputWaits(PointEvent[InputWait]):
             yield PlacedStop(wait.waypoint, stop, note)
 
     def left(self, events: Sequence[InputWait], rest: GoalRest) -> Sequence[InputWait]:
-        """Return the waits ahead, and the last passed one: its input must be checked again."""
+        """Return the last passed wait, whose input must be checked again, and the waits ahead."""
         return rest.with_last(events)

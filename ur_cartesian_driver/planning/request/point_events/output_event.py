@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of outputs that are switched while the arm moves."""
+"""The interface of events that switch outputs while the arm moves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class OutputEvent(PointEvent[E]):
 
     def place(self, event: E, field: str, path: TimedPath) -> list[PlacedOutput]:
         """
-        Return the records of an event, with their places on the path.
+        Return the records of an event, each with its place on the path.
 
         :param field: name of the event in a refusal.
         :raises InvalidGoal: no motion leads to the event's point.

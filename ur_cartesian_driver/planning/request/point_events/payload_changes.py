@@ -16,12 +16,12 @@ from ur_cartesian_driver.planning.request.mode_rules import only_rests
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
-#: Largest coordinate of a centre of gravity in the flange frame that is believed [m].
+#: Largest plausible coordinate of a centre of gravity in the flange frame [m].
 MAX_OFFSET = 5.0
 
 
 class PayloadChanges(PointEvent[PayloadChange]):
-    """Payloads that the robot program sets."""
+    """Payloads that the robot program sets at points."""
 
     field = 'payload_changes'
     mode_rule = only_rests('payload_changes')
@@ -36,11 +36,11 @@ class PayloadChanges(PointEvent[PayloadChange]):
             )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the changes."""
+        """Yield the changes as stops of the robot program."""
         for change in goal.payload_changes:
             stop = ChangePayload(mass=change.mass, center_of_gravity=change.center_of_gravity)
             yield PlacedStop(change.waypoint, stop, f'sets a payload of {change.mass:g} kg there')
 
     def left(self, events: Sequence[PayloadChange], rest: GoalRest) -> Sequence[PayloadChange]:
-        """Return the changes ahead, and the one in effect where the path is resumed."""
+        """Return the change in effect where the path is resumed, and the changes ahead."""
         return rest.with_last(events)

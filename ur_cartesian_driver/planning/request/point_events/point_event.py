@@ -4,8 +4,8 @@
 The interface of events at the points of a goal.
 
 A kind of event is a subclass of :class:`PointEvent` with an instance in the registry. A dataclass
-in the table of the goal (:mod:`~ur_cartesian_driver.motion.goal.goal`) declares the fields of the
-event in goals, messages and files; their ranges are checked before the checks here.
+in :mod:`~ur_cartesian_driver.motion.goal.goal` declares the fields of the event in goals, messages
+and files; the ranges of these fields are checked before the checks here run.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ class PlacedStop:
     waypoint: int
     stop: Stop
     note: str = ''
-    #: The order among stops at one waypoint; stops of equal order keep that of the registry.
+    #: The order among stops at one waypoint; stops of equal order follow the registry's order.
     order: int = 0
 
 
 def check_point(field: str, waypoint: int, goal: GoalTable) -> None:
     """
-    Refuse the number of a point that does not exist.
+    Refuse the number of a point that the goal does not have.
 
-    :raises InvalidGoal: names the field, and the numbers that exist.
+    :raises InvalidGoal: there is no such point; the text names the numbers that exist.
     """
     if not 0 <= waypoint < len(goal.waypoints):
         raise InvalidGoal(
@@ -74,9 +74,9 @@ class PointEvent(Generic[E]):
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
         """
-        Check the events of a goal, beyond the range of each number.
+        Check the events of a goal, in addition to the ranges of their fields.
 
-        :raises GoalRefused: a subclass; its text names field, value and bound.
+        :raises GoalRefused: an event is wrong; the text names field, value and bound.
         """
         for i, event in enumerate(self.of(goal)):
             self.check_event(f'{self.field}[{i}]', event)
@@ -85,7 +85,7 @@ class PointEvent(Generic[E]):
         """
         Check an event on its own; ``where`` is its name in refusals.
 
-        :raises InvalidGoal: names field, value and bound.
+        :raises InvalidGoal: the event is wrong; the text names field, value and bound.
         """
 
     def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
@@ -93,11 +93,11 @@ class PointEvent(Generic[E]):
         Refuse events that the robot of the goal cannot carry out.
 
         :param T_tcp_controlled: pose of the controlled frame in the TCP of the motion.
-        :raises NotAvailable: names the field and the reason.
+        :raises NotAvailable: the robot cannot carry out an event; the text names field and reason.
         """
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the stops of the robot program for the events."""
+        """Yield the stops of the robot program that carry out the events."""
         yield from ()
 
     def left(self, events: Sequence[E], rest: GoalRest) -> Sequence[E]:

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Presses: the controller's force mode from one point to another, at both of which the arm stops.
+Presses: the controller's force mode from one point to another; the arm stops at both points.
 
-The path is planned as if the tool did not give way. During execution, the monitor allows for the
-yield of the tool (``execution.monitoring.press_window``).
+The path is planned as if the tool did not give way. During execution, the monitor allows the tool
+to give way (``execution.monitoring.press_window``).
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ from ur_cartesian_driver.planning.request.mode_rules import ModeRule
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest
 from ur_cartesian_driver.planning.request.point_events.point_event import PlacedStop, PointEvent
 
-#: Along axes, and about them: the largest force [N] and torque [Nm], and the largest speeds of
-#: compliant axes [m/s], [rad/s]. Larger values must be mistakes.
+#: Largest force [N] and torque [Nm], and largest speeds along [m/s] and about [rad/s] compliant
+#: axes. Larger values must be mistakes.
 MAX_FORCES, MAX_SPEEDS = (200.0, 30.0), (0.25, 1.0)
-#: Default speeds of compliant axes [m/s], [rad/s], and deviations of the other axes [m], [rad].
+#: Default speeds along [m/s] and about [rad/s] compliant axes; default deviations along [m] and
+#: about [rad] the other axes.
 DEFAULT_SPEEDS, DEFAULT_DEVIATIONS = (0.05, 0.2), (0.005, 0.05)
 _UNITS = (('N', 'm/s'), ('Nm', 'rad/s'))
 
 
 def is_turn(axis: str) -> bool:
-    """Return whether an axis of a press is one about which the tool turns."""
+    """Return whether an axis of a press stands for turns (rx, ry, rz)."""
     return axis.startswith('r')
 
 
@@ -55,7 +56,7 @@ class Presses(PointEvent[Press]):
     )
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse presses that overlap, and arcs that begin where a press has moved the tool."""
+        """Refuse presses that overlap, and arcs whose start a press may have displaced."""
         super().check(goal, options)
         for i, press in enumerate(goal.presses):
             field = f'presses[{i}]'
@@ -79,7 +80,7 @@ class Presses(PointEvent[Press]):
                 )
 
     def check_event(self, where: str, press: Press) -> None:
-        """Refuse what force mode cannot do."""
+        """Refuse a press that force mode cannot carry out."""
         if not press.first_waypoint < press.last_waypoint:
             raise InvalidGoal(
                 f'{where}.last_point',
@@ -124,7 +125,7 @@ class Presses(PointEvent[Press]):
                 )
 
     def check_robot(self, goal: GoalTable, model: RobotModel, T_tcp_controlled: Pose) -> None:
-        """Refuse what a CB3 cannot do, and tool axes if the tool is not the robot's TCP."""
+        """Refuse what a CB3 cannot do, and TOOL if the controlled frame is not the TCP."""
         for i, press in enumerate(goal.presses):
             for name, is_set in (
                 ('zero_sensor', press.zero_sensor),
@@ -146,14 +147,14 @@ class Presses(PointEvent[Press]):
                 )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the ends and beginnings of force mode; at the same point, the end comes first."""
+        """Yield the ends and beginnings of presses; at the same point, the end comes first."""
         for press in goal.presses:
             yield PlacedStop(press.last_waypoint, EndPress(), 'ends to press there', order=-1)
             for record, note in press_records(press, goal.T_base_frame):
                 yield PlacedStop(press.first_waypoint, record, note, order=2)
 
     def left(self, events: Sequence[Press], rest: GoalRest) -> Sequence[Press]:
-        """Return the presses ahead, and the begun one: its sensor is not zeroed again."""
+        """Return the presses ahead, and the rest of one that has begun, without zeroing again."""
         return rest.stretches(
             events,
             begun=lambda press: replace(press, zero_sensor=False) if press.zero_sensor else press,
@@ -161,7 +162,7 @@ class Presses(PointEvent[Press]):
 
 
 def press_records(press: Press, T_base_frame: Pose) -> Iterator[tuple[PressLaw | BeginPress, str]]:
-    """Yield the records with which a press begins, with notes for the report."""
+    """Yield the records with which a press begins, each with its note for the report."""
     wrench, limits = [0.0] * 6, []
     for k, axis in enumerate(PRESS_AXES):
         if axis in press.axes:

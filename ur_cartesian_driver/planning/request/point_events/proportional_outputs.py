@@ -29,7 +29,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     mode_rule = switches_nothing('proportional_outputs')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse entries that drive one output at the same time, and commands to it meanwhile."""
+        """Refuse entries, or an entry and a command, that drive one output at the same time."""
         super().check(goal, options)
         if goal.proportional_outputs and goal.keep_open:
             raise NotAvailable(
@@ -77,11 +77,11 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
     def left(
         self, events: Sequence[ProportionalOutput], rest: GoalRest
     ) -> Sequence[ProportionalOutput]:
-        """Return the entries ahead, and those already begun, which begin at once."""
+        """Return the entries ahead, and those that have begun, with a begin lead of 0."""
         return rest.stretches(events, begun=lambda output: replace(output, begin_lead=0.0))
 
     def place(self, output: ProportionalOutput, field: str, path: TimedPath) -> list[PlacedOutput]:
-        """Return the records with which the output begins and ends to follow the speed."""
+        """Return the records with which the output begins and stops following the speed."""
         switch = SwitchOutput(
             output=OutputKind.STANDARD_ANALOG,
             pin=output.pin,
@@ -97,7 +97,7 @@ class ProportionalOutputs(OutputEvent[ProportionalOutput]):
         )
         name = f'standard analog output {output.pin}'
         begin = _ahead(
-            # The value is not 0, so that a stop does not carry the record out.
+            # With the value 0, a stop would carry out the record.
             replace(switch, value=1.0, follows_speed=True),
             (output.first_waypoint, output.begin_lead, f'{field}.begin_lead'),
             path,

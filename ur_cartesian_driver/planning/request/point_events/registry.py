@@ -3,7 +3,7 @@
 """
 The registry of events at points: a row for each kind, and the checks of all kinds.
 
-A new kind needs a dataclass in the table of the goal, a module here, and a row.
+A new kind needs a dataclass in ``motion.goal.goal``, a module here, and a row.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ STOP_EVENTS: tuple[PointEvent[Any], ...] = (
     PayloadChanges(),
     Presses(),
 )
-#: Events while the arm moves.
+#: Events that happen while the arm moves.
 OUTPUT_EVENTS: tuple[OutputEvent[Any], ...] = (SwitchedOutputs(), ProportionalOutputs())
 POINT_EVENTS: tuple[PointEvent[Any], ...] = (*OUTPUT_EVENTS, *STOP_EVENTS)
-#: The kinds of events that have a dataclass of their own, by dataclass.
+#: By dataclass: the kinds of events that have a dataclass of their own.
 EVENT_KINDS: Mapping[type, PointEvent[Any]] = {
     each.type: kind
     for kind in POINT_EVENTS
@@ -59,10 +59,10 @@ EVENT_KINDS: Mapping[type, PointEvent[Any]] = {
 
 def check_event(where: str, event: Any) -> None:
     """
-    Check an event on its own, while its goal is not complete.
+    Check an event on its own, before its goal is complete.
 
     :param where: name of the event in the refusal.
-    :raises InvalidGoal: names field, value and bound.
+    :raises InvalidGoal: the event is wrong; the text names field, value and bound.
     """
     check_record(where, event)
     EVENT_KINDS[type(event)].check_event(where, event)
@@ -72,7 +72,7 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
     """
     Refuse outputs that cannot be switched while the arm moves.
 
-    :raises InvalidGoal: names the field, the value and the bound.
+    :raises InvalidGoal: an output is wrong; the text names field, value and bound.
     :raises NotAvailable: the execution mode cannot switch outputs.
     """
     for kind in OUTPUT_EVENTS:
@@ -84,10 +84,10 @@ def check_outputs(goal: GoalTable, options: PlanningOptions) -> None:
 
 def check_stops(goal: GoalTable, options: PlanningOptions) -> None:
     """
-    Refuse events that the robot cannot carry out, and events where the arm does not stop.
+    Refuse events that the robot cannot carry out, and events at points that the arm passes.
 
-    :raises InvalidGoal: names the field, the value and the bound.
-    :raises NotAvailable: the execution mode does not support an event, or the goal is kept open.
+    :raises InvalidGoal: an event is wrong; the text names field, value and bound.
+    :raises NotAvailable: the execution mode does not support an event, or the goal has keep_open.
     """
     for kind in STOP_EVENTS:
         check_mode(goal, kind.mode_rule)

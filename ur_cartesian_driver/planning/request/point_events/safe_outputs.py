@@ -22,7 +22,7 @@ def check_safe_outputs(goal: GoalTable) -> None:
     """
     Check the safe outputs of a goal.
 
-    :raises InvalidGoal: names field, value and bound.
+    :raises InvalidGoal: an output is wrong or repeated; the text names the field.
     """
     for i, output in enumerate(goal.safe_outputs):
         check_output(f'safe_outputs[{i}]', output)
@@ -36,11 +36,11 @@ def check_safe_outputs(goal: GoalTable) -> None:
 
 
 def add_safe_outputs(goal: GoalTable, options: PlanningOptions) -> GoalTable:
-    """Return a goal, with the parameter's safe outputs added to those that it names itself."""
+    """Return a goal with safe outputs added: the parameter's, and proportional outputs."""
     outputs = {(output.output, output.pin): output for output in goal.safe_outputs}
     for output in parse_safe_outputs(options.safe_outputs):
         outputs.setdefault((output.output, output.pin), output)
-    # Outputs that follow the speed do so again after a pause: they are restored.
+    # Outputs that follow the speed are restored: they follow it again after a pause.
     for pin, following in {each.pin: each for each in goal.proportional_outputs}.items():
         outputs.setdefault(
             (OutputKind.STANDARD_ANALOG, pin),

@@ -20,19 +20,19 @@ from ur_cartesian_driver.program.prelude import MAX_ARGUMENTS, Prelude
 
 
 class ScriptCalls(PointEvent[ScriptCall]):
-    """Calls that the robot program makes."""
+    """Calls that the robot program makes at points."""
 
     field = 'script_calls'
     mode_rule = only_rests('script_calls')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse functions that the prelude does not have, or has with other parameters."""
+        """Refuse calls that do not match a function of the prelude in name and arguments."""
         for i, call in enumerate(goal.script_calls):
             self.check_event(f'script_calls[{i}]', call)
             _check_function(f'script_calls[{i}]', call, options.prelude)
 
     def check_event(self, where: str, call: ScriptCall) -> None:
-        """Refuse more arguments than the wire carries."""
+        """Refuse a call with more arguments than the wire carries."""
         if len(call.arguments) > MAX_ARGUMENTS:
             raise InvalidGoal(
                 f'{where}.arguments',
@@ -40,7 +40,7 @@ class ScriptCalls(PointEvent[ScriptCall]):
             )
 
     def stops(self, goal: GoalTable, options: PlanningOptions) -> Iterator[PlacedStop]:
-        """Yield the calls."""
+        """Yield the calls as stops of the robot program."""
         for call in goal.script_calls:
             written = ', '.join(f'{argument:g}' for argument in call.arguments)
             stop = CallFunction(

@@ -3,8 +3,8 @@
 """
 The stops of a plan, at points where the arm rests.
 
-A goal is planned as if the arm did not rest, with the times of the motion only; the stops are
-inserted into the plan afterwards. So stops do not change the motions before and after them, and
+A goal is planned as if the arm did not rest, with the times of the motion only; afterwards, the
+stops are inserted into the plan. So stops do not change the motions before and after them, and
 are not stretched if the motions are slowed.
 """
 
@@ -63,7 +63,7 @@ class Stops:
         self, goal: GoalTable, segments: PlannedRows, reference: ReferencePath
     ) -> tuple[GoalTable, PlannedRows, ReferencePath]:
         """
-        Return goal, segments and path of a plan with the stops inserted.
+        Return the goal, segments and path of a plan with the stops inserted.
 
         :param goal: the planned goal, with the times of the motion only.
         :param segments: the planned segments, without outputs.
@@ -122,7 +122,7 @@ class Stops:
 
 
 def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
-    """Return a spline that keeps the servo at rest after a motion."""
+    """Return a spline that keeps the servo at rest for a wait after a motion."""
     assert isinstance(stop, Wait)
     is_quintic = isinstance(before, Spline) and before.accelerations is not None
     return Spline(
@@ -134,7 +134,7 @@ def _still_spline(stop: Stop, before: Primitive, joints: Floats) -> Spline:
 
 
 def _resting_path(path: ReferencePath, points: Any, durations: Floats) -> ReferencePath:
-    """Return a path with a second row at each point where the arm rests."""
+    """Return a path with a second row, later by the rest, at each point where the arm rests."""
     points, durations = points[durations > 0.0], durations[durations > 0.0]
     at = np.searchsorted(path.point, points, side='right')
     columns = {

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs that are switched when the tool passes a point, or some time later."""
+"""Outputs that are switched when the tool passes a point, or some time after that."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ur_cartesian_driver.planning.request.point_events.timed_path import (
     TimedPath,
 )
 
-#: Digits to which the remaining time of a command is rounded [s].
+#: Decimal places to which the remaining time of a command [s] is rounded.
 _DIGITS = 9
 
 
@@ -34,17 +34,17 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
     mode_rule = switches_nothing('io_commands')
 
     def check(self, goal: GoalTable, options: PlanningOptions) -> None:
-        """Refuse points and outputs that do not exist."""
+        """Refuse commands whose point or output does not exist."""
         super().check(goal, options)
         for field, waypoint in self.places(goal):
             check_point(field, waypoint, goal)
 
     def check_event(self, where: str, command: IOCommand) -> None:
-        """Refuse outputs that the robot does not have, and values that they do not accept."""
+        """Refuse an output that the robot does not have, or a value that it does not accept."""
         check_output(where, command)
 
     def left(self, events: Sequence[IOCommand], rest: GoalRest) -> Sequence[IOCommand]:
-        """Return commands for the outputs' states at the resumption, and the commands ahead."""
+        """Return commands that restore the outputs at the resumption, and the commands ahead."""
         state: dict[tuple[int, int], IOCommand] = {}
         left = []
         for i, command in sorted(
@@ -107,7 +107,7 @@ def check_output(where: str, named: IOCommand | SafeOutput) -> None:
     """
     Refuse an output that the robot does not have, or a value that the output does not accept.
 
-    :raises InvalidGoal: names field, value and bound.
+    :raises InvalidGoal: output or value is wrong; the text names field, value and bound.
     """
     if (fault := output_fault(named.output, named.pin, named.value)) is not None:
         name, wrong, remedy = fault
@@ -115,7 +115,7 @@ def check_output(where: str, named: IOCommand | SafeOutput) -> None:
 
 
 def describe_command(command: IOCommand | SwitchOutput) -> str:
-    """Return a command, or the record that carries it out, in words."""
+    """Return a description of a command, or of the record that carries it out."""
     name = output_name(command.output, command.pin)
     if isinstance(command, SwitchOutput) and command.follows_speed:
         return f'{name} to follow the speed'

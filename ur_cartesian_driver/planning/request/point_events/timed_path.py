@@ -1,12 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The planned motions over time, for outputs that are switched during them.
+The planned motions over time, for outputs that are switched during these motions.
 
-The robot program reads a record when the previous motion returns, at its stop or where its blend
-begins, and switches the output when the tool reaches the trigger pose. So the time of a command
-(the time of its point plus its offset) becomes a trigger pose on the planned path, and the record
-is sent after the last motion that has returned by then. A slower robot switches at the same poses.
+The robot program reads the record of an output when the motion before the record returns (at that
+motion's stop, or where its blend begins), and switches the output when the tool reaches the
+trigger pose. So the time of a command (the time of its point plus its offset) becomes a trigger
+pose on the planned path, and the record is sent after the last motion that has returned by then. A
+robot that runs slower than planned switches at the same poses.
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ from ur_cartesian_driver.motion.plan.primitive import (
     Wait,
 )
 
-#: Times that differ by less than this are the same [s].
+#: Times that differ by at most this [s] are the same.
 SAME_TIME = 1e-6
-# Half of the time over which the trigger direction is measured [s]: initial and largest value.
+# The trigger direction is measured over twice this time [s]: initial and largest value.
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
-# A motion shorter than this has no direction [m], [rad]; with less distance per turn than the
-# second number [m/rad], the direction of the turn is used.
+# A motion shorter than this [m], [rad] has no direction.
 _MIN_MOTION = 1e-7
+# A motion with less distance per turn than this [m/rad] has the direction of its turn.
 _TURNING = 0.01
-# The tool turns back if its displacement is less than this fraction of its way.
+# The tool turns back if its displacement is less than this fraction of the distance travelled.
 _TURNS_BACK = 0.1
-# If the tool is beyond the trigger pose by more than this when the record is read [m], [rad], it
-# must come round to the pose again.
+# If the tool is beyond the trigger pose by more than this [m], [rad] when the record is read, the
+# tool must come back to that pose before the output is switched.
 _BEYOND = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedOutput:
-    """One output: its time, the segment that it follows, and the segment that reports it."""
+    """One output: its time [s], the segment that it follows, and the segment that reports it."""
 
     time: float
     after_index: int
@@ -81,7 +82,7 @@ class TimedPath:
             for k in np.flatnonzero(still).tolist()
             if isinstance(segments.primitives[k], Stop)
         }
-        #: Rows of the rests, by waypoint.
+        #: Rows of the waits, by waypoint.
         self.rests = {
             int(segments.waypoints[k]): k for k, stop in stops.items() if isinstance(stop, Wait)
         }
@@ -90,12 +91,12 @@ class TimedPath:
         }
 
     def row(self, waypoint: int) -> int | None:
-        """Return the row whose motion leads to a point; None if none does."""
+        """Return the row of the motion to a point; None if no motion leads there."""
         return self._rows.get(waypoint)
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
         """
-        Return a record with the tool pose at a time as its trigger; None = without a trigger.
+        Return a record that is triggered at the tool pose of a time; None = without a trigger.
 
         :param after: the row of the motion after which the record is read.
         """
@@ -112,11 +113,11 @@ class TimedPath:
         )
 
     def last_returned(self, time: float) -> int:
-        """Return the index of the last motion that has returned at a time [s]."""
+        """Return the index of the last motion that has returned by a time [s]."""
         return int(np.searchsorted(self._returns, time + SAME_TIME, side='right')) - 1
 
     def _passes(self, k: int) -> bool:
-        """Return whether the arm moves at the end of a motion."""
+        """Return whether the arm still moves at the end of a motion."""
         piece = self._primitives[k]
         return self._blend_halves[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
@@ -127,7 +128,7 @@ class TimedPath:
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def at_point(self, k: int) -> float | None:
-        """Return the time when the tool is closest to a motion's end [s], None if it stops."""
+        """Return the time [s] when the tool is closest to a motion's end; None = a stop there."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
@@ -137,7 +138,7 @@ class TimedPath:
         return self._nearest(np.array(target.position), end - half, end + half, end)
 
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
-        """Return the time when the path is closest to a position; ``middle`` if the tool rests."""
+        """Return when in a period the path is nearest a position; ``middle`` if the tool rests."""
         times, rows = self._reference.time, self._reference.poses
         own = slice(
             max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
@@ -161,7 +162,7 @@ class TimedPath:
         return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
 
     def _trigger_direction(self, time: float) -> Vector6 | None:
-        """Return the direction of the path at a time, None if the tool rests or turns back."""
+        """Return the path's direction at a time; None if the tool rests or turns back there."""
         pose, half = self._pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
             a, b = self._pose(time - half), self._pose(time + half)

@@ -18,9 +18,9 @@ from ur_cartesian_driver.motion.geometry.vectors import (
     ZERO3,
 )
 
-#: Below this speed along a surface, friction is proportional to the speed [m/s].
+#: Below this speed [m/s] along a surface, friction is proportional to the speed.
 STICKING_SPEED = 1e-3
-#: Bodies of higher stiffness [N/m] or damping [N s/m] would be unstable at the controller's cycle.
+#: Higher stiffness [N/m] or damping [N s/m] would be unstable at the cycle of the controller.
 MAX_STIFFNESS, MAX_DAMPING = 1e5, 500.0
 _SHAPES = {'plane': 'x y z nx ny nz', 'box': 'x y z dx dy dz'}
 _PROPERTIES = ('stiffness', 'damping', 'friction')
@@ -29,11 +29,11 @@ _PROPERTIES = ('stiffness', 'damping', 'friction')
 @dataclass(frozen=True, slots=True)
 class ContactBody:
     """
-    A body that stands still in the robot's base.
+    A body that is fixed in the robot's base.
 
-    :param shape: 'plane': the space behind it is solid; 'box': edges along the axes of the base.
+    :param shape: 'plane' = the space behind a plane; 'box' = a box along the axes of the base.
     :param place: a point on the plane, or the centre of the box [m].
-    :param extent: the normal of the plane, away from the solid; or the edges of the box [m].
+    :param extent: the normal of the plane, away from the body; or the edge lengths of the box [m].
     :param stiffness: force per depth [N/m].
     :param damping: force per speed along the normal [N s/m].
     :param friction: force along the surface per force along the normal.
@@ -49,9 +49,9 @@ class ContactBody:
     @classmethod
     def parse(cls, text: str) -> ContactBody:
         """
-        Read ``plane x y z nx ny nz`` or ``box x y z dx dy dz``, and properties: ``friction=0.1``.
+        Read ``plane x y z nx ny nz`` or ``box x y z dx dy dz`` with properties like ``damping=9``.
 
-        :raises ValueError: the text has another form, or a number is not possible.
+        :raises ValueError: the text has another form, or a number is out of range.
         """
         shape, *words = text.split() or ['']
         try:

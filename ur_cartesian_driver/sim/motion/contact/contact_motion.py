@@ -5,9 +5,9 @@ The compliance of an arm, in contact with bodies and in force mode.
 
 The laws of the robot are not published; these simple ones are ours. Along axes that are not
 compliant, the arm is a spring between its target and the tool. In force mode the tool moves along
-each compliant axis at a speed proportional to the missing force, up to the limit. The controller
-adds this motion to the target of the program. When force mode has ended and the arm stands still,
-the program continues from the displaced target.
+each compliant axis at a speed proportional to the missing force, up to the axis's limit. The
+controller adds this motion to the target of the program. When force mode has ended and the arm
+stands still, the program continues from the displaced target.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ from ur_cartesian_driver.sim.motion.contact.contact_bodies import ContactBody
 from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 
-#: Stiffness of an arm at its tool [N/m, Nm/rad], and time constant of its bending [s]. Assumed.
+#: Stiffness of an arm at its tool [N/m, Nm/rad]; time constant of its bending [s]. Both assumed.
 ARM_STIFFNESS: Vector6 = (20e3, 20e3, 20e3, 2e3, 2e3, 2e3)
 BENDING_TIME = 0.02
 #: Speed along a compliant axis per missing force [m/s per N, rad/s per Nm]. Assumed.
 COMPLIANCE: Vector6 = (1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1)
-#: A greater force on the tool stops the arm [N]; it is the default force limit of a robot.
+#: Force on the tool above which the arm stops [N]: the default force limit of a robot.
 MAX_FORCE = 150.0
 #: Smallest force on the tool that the controller reports as contact [N]. Assumed.
 CONTACT_FORCE = 5.0
@@ -62,7 +62,7 @@ class ForceMode:
     compliant: tuple[bool, ...]
     #: Forces that the tool has to apply along compliant axes [N, Nm].
     wrench: Vector6
-    #: Bounds: speed on compliant axes [m/s, rad/s], deviation on the others [m, rad].
+    #: Bounds of the speed on compliant axes [m/s, rad/s]; of the deviation on others [m, rad].
     limits: Vector6
 
 
@@ -77,7 +77,7 @@ class ArmState(NamedTuple):
 
 class ContactMotion:
     """
-    The deviation of the tool from its target, and the force on it; call `step` once per cycle.
+    The deviation of a tool from its target, and the force on the tool; call `step` once per cycle.
 
     :param bodies: the bodies that the tool can touch.
     """
@@ -85,23 +85,23 @@ class ContactMotion:
     def __init__(self, motion: MotionGenerator, bodies: Sequence[ContactBody]) -> None:
         """Begin without contact and without force mode."""
         self._motion, self.bodies = motion, tuple(bodies)
-        #: Share of the remaining bend that happens in a cycle.
+        #: Fraction of the remaining bend that happens in a cycle.
         self._share = motion.cycle / (motion.cycle + BENDING_TIME)
         self.force_mode: ForceMode | None = None
-        #: Scale of the compliance, set by programs.
+        #: Factor of the compliance, set by programs.
         self.gain_scaling = 1.0
-        #: Forces of the environment on the TCP, in base axes [N, Nm].
+        #: Wrench of the bodies on the TCP, in base axes [N, Nm].
         self.wrench: Vector6 = ZERO6
-        #: Deviation from the target and its rate, in base axes [m, rad]; None = none.
+        #: Deviation of the tool from its target, in base axes [m, rad]; None = no deviation.
         self.deviation: Vector6 | None = None
+        #: Rate of the deviation, in base axes [m/s, rad/s]; None = no deviation.
         self.twist: Vector6 | None = None
-        #: The target displaced by force mode: joints [rad], their speeds [rad/s], the TCP and its
-        #: twist; None = the target of the program.
+        #: The target of the program, displaced by force mode; None = not displaced.
         self.target: ArmState | None = None
-        #: Why the arm has to stop.
+        #: The reason why the arm has to stop; None = no reason.
         self.fault: MotionFault | None = None
         self._zero: Vector6 = ZERO6
-        #: Displacement by force mode and its rate, and the bend of the arm, in base axes.
+        #: Displacement by force mode; rate of this displacement; bend of the arm; in base axes.
         self._yielded: Vector6 = ZERO6
         self._yield_rate: Vector6 = ZERO6
         self._bent: Vector6 = ZERO6
@@ -109,7 +109,7 @@ class ContactMotion:
 
     @property
     def measured(self) -> Vector6:
-        """The wrench that the sensor measures, relative to the wrench at its last zeroing."""
+        """The wrench that the sensor measures, relative to the wrench when it was zeroed."""
         return subtract6(self.wrench, self._zero)
 
     def zero(self) -> None:
@@ -129,9 +129,9 @@ class ContactMotion:
 
     def step(self, *, may_move: bool) -> None:
         """
-        Do one cycle.
+        Compute one cycle.
 
-        :param may_move: force mode can move the arm: it has power, and no pause or stop holds it.
+        :param may_move: whether force mode can move the arm: with power, without pause or stop.
         """
         self.fault = None
         mode = self.force_mode
@@ -162,7 +162,7 @@ class ContactMotion:
             )
 
     def _contact(self, deviation: Vector6) -> Vector6:
-        """Return the force of the bodies on the TCP."""
+        """Return the wrench of the bodies on the TCP; its torque is 0."""
         force: Vector3 = (0.0, 0.0, 0.0)
         if self.bodies:
             dx, dy, dz, *_ = deviation
@@ -174,7 +174,7 @@ class ContactMotion:
         return (*force, 0.0, 0.0, 0.0)
 
     def _bend(self, wrench: Vector6, free: Sequence[bool] = (False,) * 6) -> None:
-        """Bend the arm along all axes of a frame but the free ones; all values in that frame."""
+        """Bend the arm along the axes of a frame that are not free; values are in that frame."""
         self._bent = vector6(
             0.0 if is_free else bent + self._share * (force / stiffness - bent)
             for is_free, bent, force, stiffness in zip(
@@ -186,8 +186,8 @@ class ContactMotion:
         to_task, to_base = conjugate(mode.q_base_task), mode.q_base_task
         yielded, bent = turned(to_task, self._yielded), turned(to_task, self._bent)
         applied = turned(to_task, self.measured)
-        # A bend along a compliant axis at the start of force mode stays as a displacement.
-        # Along the other axes the displacement decays: the tool returns if the frame has turned.
+        # A bend along a compliant axis at the start of force mode remains as a displacement.
+        # Along the other axes, a displacement (left from before the frame has turned) decays.
         kept = 1.0 - self._share
         yielded = vector6(
             y + b if free else kept * y
@@ -217,7 +217,7 @@ class ContactMotion:
         self._yielded, self._bent = turned(to_base, yielded), turned(to_base, self._bent)
 
     def _yielding_target(self, rate: float) -> ArmState | None:
-        """Return the target displaced by compliance; the last one if the arm cannot reach it."""
+        """Return the target displaced by force mode, or the previous one if out of reach."""
         motion, before = self._motion, self.target
         target, (x, y, z, *turn) = motion.T_base_tcp, self._yielded
         pose = Pose(
@@ -243,5 +243,5 @@ class ContactMotion:
 
 
 def turned(q: Quaternion, vector: Vector6) -> Vector6:
-    """Return a vector with both halves rotated."""
+    """Return a six-vector with both halves rotated."""
     return (*rotate(q, vector[:3]), *rotate(q, vector[3:]))

@@ -3,8 +3,8 @@
 """
 Select the IK branch that is reached continuously from the current joints.
 
-Near a singularity, the solution on the other branch is the nearer one after a long step, while an
-arm that passes the singularity swings round and stays on its branch. A step that changes the
+After a long step near a singularity, the solution on the other branch can be the nearest one, but
+an arm that passes the singularity swings round and stays on its branch. A step that changes the
 branch is therefore solved in shorter steps.
 """
 
@@ -22,18 +22,18 @@ from ur_cartesian_driver.sim.motion.kinematics.joint_kinematics import (
 )
 from ur_cartesian_driver.sim.motion.paths.move_paths import JointMovePath, MovePath, Setpoint
 
-# The rest of a path is solved in this many steps, or in shorter ones down to this fraction of the
-# rest, so that no step turns a joint by more than this angle [rad].
+# The remainder of a path is solved in this many steps; or in shorter steps, down to this fraction
+# of the remainder; so that no step turns a joint by more than this angle [rad].
 _WALK_STEPS = 8
 _MIN_WALK_STEP = 1e-4
 _MAX_JOINT_STEP = 0.3
-# Steps that change the branch are cut to this length [m, rad].
+# A step that changes the branch is halved until it is about this long [m, rad].
 _FINE = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
 class IkBranchTracker:
-    """The joints of an arm, and the joints that it reaches from them."""
+    """Finds the joint positions that an arm reaches from its present joint positions."""
 
     kinematics: JointKinematics
     q: Vector6
@@ -41,7 +41,7 @@ class IkBranchTracker:
     T_tcp_flange: Pose
 
     def joints(self, setpoint: Setpoint) -> Vector6 | None:
-        """Return the nearest joints at a set-point; None = no solution."""
+        """Return the joints at a set-point that are nearest to the present; None = no solution."""
         return self._nearest(setpoint, self.q)
 
     def after(
@@ -63,7 +63,7 @@ class IkBranchTracker:
         return self._joints_after_steps(step, self.q, 0.0, h, ceil(log2(max(travel / _FINE, 1.0))))
 
     def joints_at_end_of(self, move_path: MovePath) -> Vector6 | None:
-        """Return the joints of the arm at the end of a path; None = they would have to jump."""
+        """Return the joints at the end of a path; None = the joints would have to jump."""
         if isinstance(move_path, JointMovePath):
             return move_path.end
         here, there = self.T_base_tcp, move_path.pose(move_path.length)

@@ -29,9 +29,10 @@ from ur_cartesian_driver.sim.motion.motion_values import MotionFault
 from ur_cartesian_driver.sim.motion.paths.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.paths.path_motion import ProfileParameters
 
-# Assumptions, because the robot's numbers are not published:
-#: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.
+# The following numbers are assumed, because the robot's are not published.
+#: Full joint acceleration of optimove, which also bounds servoj and path offsets [rad/s^2].
 MAX_JOINT_ACCELERATION = 40.0
+#: Joint jerk of optimove [rad/s^3].
 MAX_JOINT_JERK = 400.0
 #: The highest limit of the tool speed in the safety settings [m/s].
 MAX_TOOL_SPEED = 5.0
@@ -42,9 +43,9 @@ SINGULAR_RATE = 1000.0
 
 #: The speed of an arm at rest.
 STILL = ZERO6
-#: Joint changes below this are rounding [rad].
+#: Joint changes below this are treated as rounding [rad].
 NO_CHANGE = 1e-9
-# A joint this close to its limit is reported as the reason for a missing solution [rad].
+# A joint this close to its limit [rad] is reported as the cause of an impossible step.
 _AT_LIMIT = 0.02
 _SAMPLES = 8
 
@@ -54,7 +55,7 @@ _MAX_DISTANCE = 1e3
 
 class JointKinematics:
     """
-    The joints of one arm, and their limits in one cycle.
+    The inverse kinematics of one arm, and the limits of its joints in one cycle.
 
     :param cycle: duration of a cycle [s].
     """
@@ -67,9 +68,9 @@ class JointKinematics:
         self._lengths = nominal.a[1], nominal.a[2], nominal.d[4]
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
-        """Return the nearest solution within the limits."""
+        """Return the solution within the limits that is nearest to ``q_near``, or None."""
         if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
-            return None  # absurd speeds lead to such numbers, whose squares overflow
+            return None  # absurd speeds lead to such positions, whose squares overflow
         return nearest(self._arm, T_base_flange, q_near)
 
     def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
@@ -83,8 +84,8 @@ class JointKinematics:
         """
         Return three numbers whose signs name the branch.
 
-        They are the distance of the wrist centre in front of the shoulder [m], for the nominal arm
-        (a calibrated arm has the same sign), and the sines of elbow and wrist 2.
+        The first is the distance [m] of the wrist centre in front of the shoulder, for the nominal
+        arm (a calibrated arm has the same sign); the others are the sines of elbow and wrist 2.
         """
         upper_arm, forearm, wrist = self._lengths
         angle = q[1] + q[2]
@@ -121,7 +122,7 @@ class JointKinematics:
 
     def kept_rows(self, q: Floats, on_branch: bool) -> Flags:
         """
-        Return for each step between rows whether the arm can make it in one cycle (n,).
+        Return whether the arm can make each step between two rows in one cycle (n,).
 
         This is :meth:`overspeed_factor` for many steps.
 
@@ -184,9 +185,9 @@ class JointKinematics:
         self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
     ) -> ProfileParameters:
         """
-        Return fractions ``a``, ``v`` of the fastest parameters of a path within the joint limits.
+        Return the highest acceleration and speed within the joint limits, times ``a`` and ``v``.
 
-        The joint travel per path length is found at a few samples, starting from ``q``.
+        The joint travel per path length is computed at a few samples of the path, from ``q`` on.
         """
         step = move_path.length / _SAMPLES or 1.0
         speed = acceleration = inf
@@ -209,7 +210,7 @@ class JointKinematics:
 
 
 def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool:
-    """Return whether the joints turn too far for the travel of the tool."""
+    """Return whether the joints turn farther than ``SINGULAR_RATE`` times the tool's travel."""
     travel = before.distance_to(pose) + before.angle_to(pose)
     return max_joint_difference(q, q_before) > SINGULAR_RATE * travel
 
@@ -220,12 +221,12 @@ def max_joint_difference(a: Vector6, b: Vector6) -> float:
 
 
 def difference_rate(after: Vector6, before: Vector6, rate: float) -> Vector6:
-    """Return the difference times the rate [1/s]."""
+    """Return the difference times ``rate`` [1/s]."""
     return scale6(subtract6(after, before), rate)
 
 
 def twist_between(before: Pose, after: Pose, rate: float) -> Vector6:
-    """Return the mean twist between two poses, in base axes."""
+    """Return the mean twist from one pose to the next, in base axes; ``rate`` = 1 / time."""
     rotation = rotation_vector_from_quaternion(
         multiply(after.quaternion, conjugate(before.quaternion))
     )

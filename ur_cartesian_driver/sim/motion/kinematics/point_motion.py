@@ -3,7 +3,7 @@
 """
 The motion of points of the arm, from joint speeds and accelerations.
 
-The controller reports values of some points (elbow, tool accelerometer, moments), which have to
+The controller reports the motion of some points (elbow, accelerometer, payload), which has to
 agree with the reported joints. All vectors are in base axes, in [m], [rad] and [s].
 """
 
@@ -41,7 +41,7 @@ def point_motion(
     """
     Return the motion of a point on the link after the first ``joints`` joints.
 
-    Computed from link to link, as in the outward half of the Newton-Euler recursion (Craig,
+    It is computed from link to link, as in the outward half of the Newton-Euler recursion (Craig,
     Introduction to Robotics, section 6.5).
 
     :param point: the position of the point [m].
@@ -73,7 +73,7 @@ def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
     """
     Return the joint moments [Nm] that produce a force [N] at a point of the last link.
 
-    By the principle of virtual work, joint moments times joint speeds are force times velocity.
+    By the principle of virtual work, joint moments times joint speeds equal force times velocity.
     """
     return vector6(
         dot(axis, cross(subtract(point, origin), force))
@@ -82,7 +82,7 @@ def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
 
 
 def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
-    """Return the position of a point given in flange coordinates [m]."""
+    """Return the base coordinates [m] of a point given in flange coordinates [m]."""
     x, y, z = offset
     in_plane = add(add(frames.position, scale(frames.x, x)), scale(frames.y, y))
     return add(in_plane, scale(frames.z, z))
@@ -91,7 +91,7 @@ def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
 def _shifted_motion(
     velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, lever_arm: Vector3
 ) -> tuple[Vector3, Vector3]:
-    """Return velocity and acceleration of the point of the link at the end of a lever arm."""
+    """Return velocity and acceleration of the point that is ``lever_arm`` away on the link."""
     round_ = cross(omega, lever_arm)
     return (
         add(velocity, round_),

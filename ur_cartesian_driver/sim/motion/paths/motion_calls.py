@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of path moves before their path is known, and checks of their arguments."""
+"""Calls of path moves whose paths are not known yet, and checks of their arguments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters
 
 
 class MotionCall(NamedTuple):
-    """A call of a path move; its path is resolved when the move begins."""
+    """A call of a path move; ``move_path`` returns the path when the move begins."""
 
     name: str
     move_path: Callable[[PathStart], MovePath]
@@ -35,13 +35,13 @@ class MotionCall(NamedTuple):
     move: Move
 
     def parameters_of(self, move_path: MovePath, start: PathStart) -> ProfileParameters:
-        """Return the profile parameters of the path that the call has been resolved to."""
+        """Return the profile parameters of this call for its path."""
         given = self.parameters
         return given if isinstance(given, ProfileParameters) else given(move_path, start)
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
-    """Return the parameters of movep, which can brake within its blend radius: v^2 = 2 b r."""
+    """Return the parameters of movep; it can brake at b within the blend radius: v^2 = 2 b r."""
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
     return ProfileParameters(acceleration=a, speed=v, braking=braking)
 

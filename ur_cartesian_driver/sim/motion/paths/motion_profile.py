@@ -3,9 +3,9 @@
 """
 Path parameter over time: trapezoids, timed moves, ramps and S-curves.
 
-A profile is a chain of phases of constant jerk (zero except in the S-curve). Its path parameter is
-in the unit of the path: metres, radians of the leading axis, or none. All profiles end at rest,
-except :func:`ramp`.
+A profile is a chain of phases of constant jerk (zero except in the S-curve). The path parameter is
+in the unit of the path: metres, radians of the leading axis, or without unit. All profiles end at
+rest, except :func:`ramp`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 
 _BISECTIONS = 80
-#: A timed move without speed and acceleration accelerates for this fraction of its time; it brakes
-#: for the same fraction.
+#: A timed move without speed and acceleration accelerates for this fraction of its time, and
+#: brakes for the same fraction.
 TIMED_RAMP = 1.0 / 3.0
 
 
@@ -56,7 +56,7 @@ class MotionProfile:
     phases: tuple[_Phase, ...]
 
     def at(self, time: float) -> float:
-        """Return the progress; 0 before the beginning, ``length`` from the end on."""
+        """Return the progress at a time; 0 before the beginning, ``length`` from the end on."""
         if time >= self.duration:
             return self.length
         phase = self._phase_at(max(time, 0.0))
@@ -77,13 +77,13 @@ class MotionProfile:
         return rows
 
     def speed(self, time: float) -> float:
-        """Return ds/dt within [0, duration]; never negative."""
+        """Return ds/dt at a time, which is limited to [0, duration]; never negative."""
         time = min(max(time, 0.0), self.duration)
         phase = self._phase_at(time)
         return max(phase.speed_after(time - phase.time), 0.0)
 
     def time_at(self, progress: float) -> float:
-        """Return the (first) time at which the progress is reached; bisection of ``s(t)``."""
+        """Return the first time at which a progress is reached, by bisection of ``s(t)``."""
         if progress <= 0.0:
             return 0.0
         if progress >= self.length:
@@ -131,13 +131,13 @@ def trapezoid(
     braking: float | None = None,
 ) -> MotionProfile:
     """
-    Accelerate, cruise, brake to rest.
+    Return the profile that accelerates, cruises and brakes to rest.
 
-    From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). In general the
-    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. If the start is too fast to stop within the
-    length, the profile brakes as hard as necessary.
+    From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). From a start speed
+    v0, the peak speed u follows from (u^2 - v0^2)/2a + u^2/2b = d. If v0 is too high to stop
+    within the length, the profile brakes as hard as necessary.
 
-    :param braking: b, if it differs from the acceleration.
+    :param braking: deceleration b; None = as the acceleration a.
     """
     b = braking or acceleration
     if length <= 0.0:
@@ -162,9 +162,9 @@ def trapezoid(
 
 def timed_ramp(length: float, acceleration: float, speed: float) -> float:
     """
-    Return the fraction of the time of a trapezoid in which it speeds up, and in which it brakes.
+    Return the fraction of a trapezoid's time that each of its two ramps takes.
 
-    From rest to rest T = d/v + v/a, so this is v/aT = 1 / (1 + d a/v^2); for a triangle, a half.
+    From rest to rest T = d/v + v/a, so a ramp takes v/aT = 1 / (1 + d a/v^2); in a triangle, 1/2.
     """
     if min(acceleration, speed) <= 0.0:
         return TIMED_RAMP
@@ -175,16 +175,16 @@ def timed(
     length: float, duration: float, start_speed: float = 0.0, part: float = TIMED_RAMP
 ) -> MotionProfile:
     """
-    Arrive at rest after exactly ``duration`` [s].
+    Return the profile that is at rest after exactly ``duration`` [s].
 
-    From rest this is the trapezoid of speed and acceleration, stretched evenly to the duration, as
-    five recordings of a UR3 (3.5) show: only the shape of that trapezoid remains.
+    From rest, this is the trapezoid for the speed and acceleration of the call, but stretched
+    evenly in time to the duration, as in five recordings of a UR3 (software 3.5).
 
     With ramps of x and y seconds and a cruising speed c, d = v0 x/2 + c (T - x/2 - y/2). y is
-    ``part`` of T; so is x, or less if a fast start would otherwise use up the length.
+    ``part`` times T; x is the same, or less if a fast start would otherwise use up the length.
 
-    :param part: fraction of the time for speeding up, and for braking, see :func:`timed_ramp`. If
-        it is a third, c = 1.5 d/T, a = 4.5 d/T^2.
+    :param part: fraction of the time that each ramp takes, see :func:`timed_ramp`. With a third,
+        and from rest, c = 1.5 d/T and a = 4.5 d/T^2.
     """
     if length <= 0.0:
         return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
@@ -207,7 +207,7 @@ def _timed_ramps(
 
 
 def ramp(length: float, start_speed: float, end_speed: float) -> MotionProfile:
-    """Change the speed evenly over the length: T = 2 d / (v0 + v1)."""
+    """Return the profile that changes the speed evenly over the length: T = 2 d / (v0 + v1)."""
     duration = 2.0 * length / (start_speed + end_speed)
     return _chain(length, start_speed, [(duration, (end_speed - start_speed) / duration, 0.0)])
 
@@ -216,10 +216,11 @@ def s_curve(
     length: float, acceleration: float, speed: float, jerk: float, start_speed: float = 0.0
 ) -> MotionProfile:
     """
-    Accelerate, cruise, brake to rest with limited jerk.
+    Return the profile that accelerates, cruises and brakes to rest with limited jerk.
 
     A change of speed by w takes T = w/a + a/j when w >= a^2/j, else 2 sqrt(w/j), and covers the
-    mean speed times T. The highest cruising speed that fits is found by bisection.
+    mean speed times T. The highest cruising speed for which the length suffices is found by
+    bisection.
     """
     if length <= 0.0:
         return trapezoid(length, acceleration, speed)
@@ -251,7 +252,7 @@ def s_curve(
 
 
 def _s_curve_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
-    """Return the times of rising (and of falling) acceleration, and of constant acceleration."""
+    """Return the time of rising (or falling) acceleration, and of constant acceleration."""
     if change >= acceleration * acceleration / jerk:
         rise = acceleration / jerk
         return rise, change / acceleration - rise

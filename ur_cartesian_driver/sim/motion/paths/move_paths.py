@@ -3,11 +3,11 @@
 """
 The geometry of motion: the set-point at a path parameter, without time.
 
-A move path runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and
-arcs of the tool in metres (or by their rotation if that takes longer). A blend path runs from 0
-to 1 and replaces the end of one move path and the beginning of the next. A set-point is six joint
-positions or a pose of the TCP in the base. Rows of set-points are (n, 6), or (n, 7) with x y z [m]
-and the unit quaternion x y z w.
+The parameter of a move path runs from 0 to its ``length``: for joint lines in radians of the
+leading axis, for lines and arcs of the tool in metres (or by the rotation if that takes longer).
+The parameter of a blend path runs from 0 to 1; such a path replaces the end of one move path and
+the beginning of the next. A set-point is six joint positions or a pose of the TCP in the base.
+Rows of set-points are (n, 6), or (n, 7) with x y z [m] and the unit quaternion x y z w.
 """
 
 from __future__ import annotations
@@ -51,17 +51,18 @@ from ur_cartesian_driver.sim.motion.motion_values import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose
 
-# Shorter paths are treated as empty, because their ends differ only by rounding [m, rad].
+# Shorter paths [m, rad] are treated as empty, because their ends differ only by rounding.
 _MIN_LENGTH = 1e-9
-# Three points that are nearer together than this [m], or in line within this sine, have no circle.
+# Three points have no circle if two of them are nearer than this [m]; or if the sine of the angle
+# between the lines to the second and the third point is less than this.
 _COINCIDENT = 1e-6
 _COLLINEAR = 1e-6
-# To find the point at which a path leaves a sphere: samples until the path is outside, then
-# refinements, until the distance to the border is this small [m].
+# The point at which a path leaves a sphere is searched in this many samples; then in at most this
+# many refinements; until its distance to the sphere is below this [m].
 _SAMPLES = 24
 _REFINEMENTS = 50
 _ON_BORDER = 1e-12
-# Two lines that go straight on, or straight back, within this angle have no circular fillet [rad].
+# Two lines that go straight on, or straight back, within this angle [rad] have no fillet.
 _STRAIGHT = 1e-6
 
 
@@ -86,7 +87,7 @@ class MovePath(Protocol):
         ...
 
     def at(self, s: float) -> Setpoint:
-        """Return the set-point, the exact waypoint from ``length`` on."""
+        """Return the set-point at the path parameter; from ``length`` on, exactly the waypoint."""
         ...
 
     def pose(self, s: float) -> Pose:
@@ -132,10 +133,10 @@ class LinearMovePath:
     """
     A straight line of the tool with the shortest rotation.
 
-    Its length is the distance [m] or the angle [rad] divided by the turn ratio, whichever number
-    is larger, because the robot has one speed for both.
+    Its length is the larger of two numbers: the distance [m], and the angle [rad] divided by the
+    turn ratio. (The robot has one speed for both.)
 
-    :param turn_ratio: rotation that is equivalent to a metre [rad].
+    :param turn_ratio: rotation [rad] that takes as long as a metre.
     """
 
     def __init__(self, start: Pose, end: Pose, turn_ratio: float = 1.0) -> None:
@@ -159,11 +160,11 @@ class LinearMovePath:
 
 class CircularMovePath:
     """
-    A circle through three points.
+    A circular arc from a start pose through a point to an end pose.
 
-    An unconstrained orientation takes the shortest rotation from start to end (that of ``via`` is
-    ignored), and a long rotation determines the length, as on a line. A fixed orientation is
-    constant relative to the tangent (that of the end is ignored), and the length is the arc's.
+    An unconstrained orientation takes the shortest rotation from start to end, and a long rotation
+    determines the length, as on a line. A fixed orientation is constant relative to the tangent;
+    the orientation of the end pose is then ignored, and the length is that of the arc.
 
     :raises MotionError: the three points do not lie on a circle.
     """
@@ -221,10 +222,10 @@ class CircularMovePath:
 
 class JointBlendPath:
     """
-    Two joint lines at once: one brakes to the waypoint while the next one starts.
+    Two joint lines at once: the first brakes to the waypoint while the second starts.
 
     q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: a
-    parabola that is tangent to both lines.
+    parabola that is tangent to both lines (r1 = ``tail``, r2 = ``head``).
     """
 
     def __init__(
@@ -293,7 +294,7 @@ class FilletBlendPath:
     A circular arc tangent to two lines at equal distances d from the waypoint.
 
     If the direction turns by phi, the radius is d / tan(phi/2), which is d for a right angle.
-    The orientation changes as in :class:`ToolBlendPath`, the position has a constant speed.
+    The orientation changes as in :class:`ToolBlendPath`, but the position has a constant speed.
     """
 
     def __init__(
@@ -343,9 +344,9 @@ def make_blend(
     before: MovePath, tail: float, after: MovePath, head: float, circular: bool
 ) -> BlendPath:
     """
-    Blend two paths: two joint lines in joint space, all others in the tool's space.
+    Return the blend of two paths: for two joint lines in joint space, else in tool space.
 
-    :param circular: whether to blend two lines that meet at an angle by an arc.
+    :param circular: whether to blend two tool lines that meet at an angle by an arc.
     :raises MotionError: the blend is to be an arc, but the second line leads straight back.
     """
     if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
@@ -363,7 +364,7 @@ def make_blend(
 
 
 def start_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the parameter at which the tool is ``radius`` [m] from the start; None = nowhere."""
+    """Return the parameter at which the tool is ``radius`` [m] from the start; None = never."""
     if isinstance(move_path, LinearMovePath):
         return (
             move_path.length * radius / move_path.distance if move_path.distance > radius else None
@@ -372,7 +373,7 @@ def start_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def end_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the parameter left to the end when the tool is ``radius`` [m] from it, or None."""
+    """Return the length that remains when the tool is ``radius`` [m] from the end, or None."""
     if isinstance(move_path, LinearMovePath):
         return start_within_radius(move_path, radius)
     return _exit_parameter(
@@ -381,7 +382,7 @@ def end_within_radius(move_path: MovePath, radius: float) -> float | None:
 
 
 def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
-    """Return the first parameter at which the pose is ``radius`` [m] from its start, or None."""
+    """Return the first parameter at which ``pose`` is ``radius`` [m] from ``pose(0)``, or None."""
     origin = pose(0.0).position
     low, f_low = 0.0, -radius
     for i in range(1, _SAMPLES + 1):

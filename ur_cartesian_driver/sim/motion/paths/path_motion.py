@@ -33,20 +33,21 @@ from ur_cartesian_driver.sim.motion.paths.move_paths import (
     start_within_radius,
 )
 
-# A section is over when less than this is left [s]: sums of cycles are rounded.
+# A section is over when less than this time is left [s], because sums of cycles are rounded.
 _ROUNDING = 1e-9
 # Speeds and lengths below this are treated as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# To keep its time, a move after a blend runs at most this many times faster than the mean speed.
+# To end in time, a timed move after a blend runs at most this many times faster than on average.
 _MAX_CATCH_UP = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileParameters:
     """
-    Speed and acceleration along a path, in its unit (rad or m) per second.
+    Acceleration and speed along a path, in its unit (rad or m) per s^2 and per s.
 
-    :param time: [s]; unless it is 0, speed and acceleration only determine the share of the ramps.
+    :param time: time of the move [s]; 0 = none. With a time, acceleration and speed only determine
+        the fraction of the time for the ramps.
     :param jerk: bound on the jerk, for an S-curve; None = trapezoid.
     :param braking: deceleration at the end, if it differs from the acceleration.
     """
@@ -66,11 +67,11 @@ class ProfileParameters:
         return trapezoid(length, self.acceleration, self.speed, start_speed, self.braking)
 
     def ramp_part(self, length: float) -> float:
-        """Return the fraction of the time of a timed move for speeding up, and for braking."""
+        """Return the fraction of a timed move's time that each of its two ramps takes."""
         return timed_ramp(length, self.acceleration, self.speed)
 
     def strongest(self, length: float) -> float:
-        """Return the highest acceleration over a length; of a timed move, from rest to rest."""
+        """Return the highest acceleration over a length (of a timed move, from rest to rest)."""
         if self.time > 0.0:
             part = self.ramp_part(length)
             return length / (part * (1.0 - part) * self.time**2)
@@ -92,7 +93,7 @@ class PathSection:
     stop: float
 
     def at(self, time: float) -> Setpoint:
-        """Return the set-point; the exact end of the path at the end of the profile."""
+        """Return the set-point; from the end of the profile on, exactly the end of the path."""
         if time >= self.profile.duration:
             return self.path.at(inf)
         return self.path.at(self.offset + self.profile.at(time))
@@ -103,7 +104,7 @@ class LastMove:
     """
     The last move, and the values needed to blend the next one into it.
 
-    :param entry: time in the move's profile at which its blend begins; without a blend, the end.
+    :param entry: time in the profile at which the blend begins; the duration if there is no blend.
     """
 
     move_path: MovePath
@@ -116,10 +117,10 @@ class LastMove:
 @dataclass(slots=True)
 class PathMotion:
     """
-    Sections to follow and the progress of the arm: time [s] in the profile of section ``index``.
+    The sections to follow; the arm is at ``time`` [s] in the profile of section ``index``.
 
-    The last section always belongs to ``last_move``. ``spare`` is the time of the last cycle that
-    was left when that section ended [s].
+    The last section always belongs to ``last_move``. ``spare`` is the part of a cycle [s] that was
+    left when the last section ended.
     """
 
     sections: tuple[PathSection, ...]
@@ -156,7 +157,7 @@ class PathMotion:
 
     @property
     def next_change(self) -> float:
-        """The time in the present section up to which no other section can replace it [s]."""
+        """The time [s] up to which the present section cannot be cut by a blend."""
         entry = self.last_move.entry
         in_last = self.index + 1 == len(self.sections)
         if in_last and self.last_move.radius > 0.0 and self.time < entry:
@@ -164,7 +165,7 @@ class PathMotion:
         return self.sections[self.index].stop
 
     def may_return(self, cycle: float) -> bool:
-        """Return whether one more cycle enters the blend, or the waypoint is reached."""
+        """Return whether the next cycle enters the blend or, without one, the end is reached."""
         if self.index + 1 < len(self.sections):
             return False
         if self.last_move.radius > 0.0:
@@ -182,7 +183,7 @@ def start_from_rest(
     """
     Return the motion along one path, from rest to rest.
 
-    :param spare: time of the last cycle that the previous move did not use [s].
+    :param spare: the part of the last cycle that the previous move did not use [s].
     """
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
@@ -199,12 +200,12 @@ def append_move_path(
     circular: bool,
 ) -> tuple[PathMotion, bool]:
     """
-    Return the motion with one more path, and whether it is blended.
+    Return the motion with one more path, and whether the path is blended.
 
     The blend begins at the blend radius, or at the arm's position if the call comes late, and ends
     at the same distance after the waypoint. If the arm already stands still, or the new path does
-    not leave the blend radius, there is no blend and the arm stops at the waypoint. (Both moves
-    share the speed in the blend, and a short move would be driven at the speed of the other.)
+    not leave the blend radius, there is no blend and the arm stops at the waypoint. (In a blend,
+    both moves would have one speed, so a short move would be driven at the speed of the other.)
     """
     last, last_move = path_motion.sections[-1], path_motion.last_move
     ahead = path_motion.sections[path_motion.index : -1]
@@ -240,8 +241,8 @@ def _blend_head(
     """
     Return the length of the new path that the blend covers; None = no blend.
 
-    :param tail: the rest of the last path at the entry of the blend.
-    :param speed: the speed at this entry.
+    :param tail: length of the last path from the entry of the blend to the waypoint.
+    :param speed: speed at the entry of the blend.
     """
     if speed <= _MIN_SPEED or tail <= _MIN_SPEED:
         return None
@@ -270,17 +271,17 @@ def _blend_profiles(
     rest: float,
 ) -> tuple[MotionProfile, MotionProfile]:
     """
-    Return the profiles of the blend (0 to 1) and of the rest of the new path.
+    Return the profiles of the blend (0 to 1) and of the remainder of the new path.
 
-    The rate of the blend changes evenly from its value at the entry to the value for the next
-    cruising speed, within three bounds: it does not grow so far that one of the two moves exceeds
-    its acceleration (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must be
-    long enough to brake. A trapezoid enters with v <= sqrt(2 a r), so it keeps the first bound
-    anyway. A timed move has no acceleration of its own: in its blend the bound is its acceleration
-    from rest to rest or, if greater, that of the next move in proportion to their lengths.
+    The rate u' of the blend changes evenly from its value at the entry to the value for the next
+    cruising speed, within three bounds: u' does not grow so far that one of the two moves exceeds
+    its acceleration (s'' = 2 r u'^2 <= a, so u'^2 <= a / 2r), and the remainder of the new path
+    must be long enough to brake. A trapezoid enters with v <= sqrt(2 a r), which is within the
+    bound of the first move. For a first move with a time, the bound is its acceleration from rest
+    to rest or, if greater, that of the next move in proportion to their lengths.
 
-    The sum of times is kept: the time that the previous move had left until its waypoint is added
-    to the time of the next move.
+    If the next move has a time, the sum of both times is kept: the time that the previous move had
+    left until its waypoint is added to the time of the next move.
 
     :param rates: path units per unit of the blend's parameter, at entry and exit.
     :param speed: speed at the entry.

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Path moves: they begin from rest, in the blend of the previous move, or after the arm has braked.
+Path moves, which begin from rest, in the blend of the previous move, or after the arm has braked.
 
 A move that a program calls when the blend of the previous move is about to begin is blended with
 that move. A move that cannot begin yet waits until the arm stands still.
@@ -43,7 +43,7 @@ class _Overlap(NamedTuple):
 
 
 class PathQueue:
-    """The path moves of one arm: the running move, and the move that waits until the arm rests."""
+    """The path moves of one arm: the running move, and the move that waits for standstill."""
 
     def __init__(self, target: ArmTarget, active: RunningMotion, reports: MotionReports) -> None:
         """Begin without moves."""
@@ -53,8 +53,8 @@ class PathQueue:
         #: Whether the last path move is a movep.
         self._after_movep = False
         self._overlap: _Overlap | None = None
-        #: Time of its last cycle that the last move did not use [s]: a move that follows at once
-        #: begins this much earlier, so that moves are not rounded to cycles.
+        #: Part of a cycle that the last move did not use [s]. A move that follows at once begins
+        #: this much earlier, so that the times of moves are not rounded to cycles.
         self._spare = 0.0
 
     def clear(self) -> None:
@@ -62,14 +62,14 @@ class PathQueue:
         self._waiting = self._overlap = None
 
     def end_of_frame(self) -> None:
-        """Keep an overlapping waypoint, but no spare time: no other move has followed at once."""
+        """Keep an overlapping waypoint and drop the spare time: no move has followed at once."""
         self._overlap, self._spare = None, 0.0
 
     def begin(self, call: MotionCall) -> None:
         """
         Begin a move, or keep it waiting until the arm stands still.
 
-        :raises MotionError: there is no such path from the start of the move.
+        :raises MotionError: the path is not possible from the start of the move.
         """
         self._skip_overlapping()
         active = self._active
@@ -78,7 +78,7 @@ class PathQueue:
             if self._target.tcp_is_active:
                 self._begin_in_blend(motion, call)
             else:
-                # A blend joins two moves of the same TCP: first finish the running one.
+                # A blend joins two moves of the same TCP: first finish the running move.
                 self._wait(call)
         elif motion is None:
             self._begin_from_rest(call)
@@ -132,7 +132,7 @@ class PathQueue:
         pose = last.move_path.pose(last.move_path.length)
         q = self._target.ik_branch().joints_at_end_of(last.move_path)
         if q is None and call.name.endswith('j'):
-            # The arm cannot reach the start of the joint line: it will fail on its path there.
+            # The arm cannot reach the start of the joint line; the running move will fail before.
             self._wait(call)
             return
         start = PathStart(q or self._target.q, pose)
