@@ -228,8 +228,7 @@ class DashboardClientCodec:
 
     def feed(self, data: bytes) -> list[DashboardGreeting | DashboardReply]:
         """
-        Take bytes from the server (``b''`` = end of stream) and return the greeting and
-        the replies in them.
+        Return the greeting and the replies in bytes from the server (``b''`` = end of stream).
 
         :raises RemoteProtocolError: a line is too long or truncated, no command waits for it, or
             the stream ended while a command waited for its reply.
