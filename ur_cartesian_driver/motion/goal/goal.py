@@ -21,6 +21,8 @@ To add a number to segments, declare it in MotionSegment.msg and PackedPoints.ms
 and ``SegmentColumns``, and use it where the motion is planned. Paths accept it by name, as in
 ``Path.at(name=...)``. A number that belongs to the whole goal is declared in the action instead of
 both messages, and needs no column. ``test/ros/test_goal_files.py`` compares table and messages.
+Decide also what the number means in a spline and in a goal with times, and refuse it where it
+would have no effect: the table cannot know.
 
 There are two drawbacks. Each column is declared in addition to its field, because type checkers
 would not know it otherwise. And files list a few fields in another order than messages
