@@ -11,6 +11,7 @@ has exactly the given values.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -153,6 +154,8 @@ class ToolSplinePath:
     spline: ToolSpline
     #: (n,) the number of samples that measure the extent of each piece.
     sample_count: Indices
+    #: Returns the segments (m,) at times (m,) and the fractions of them; None = each piece is one.
+    places: Callable[[Floats], tuple[Indices, Floats]] | None = None
 
     def rows(self, number: Indices, t: Floats) -> Floats:
         """See :class:`~.blended_path.CurveSequence`."""
@@ -168,4 +171,7 @@ class ToolSplinePath:
 
     def locate(self, number: Indices, t: Floats) -> tuple[Indices, Floats]:
         """See :class:`~.blended_path.CurveSequence`."""
-        return number // 2, t
+        piece = number // 2
+        if self.places is None:
+            return piece, t
+        return self.places(self.spline.times[piece] + t * np.diff(self.spline.times)[piece])

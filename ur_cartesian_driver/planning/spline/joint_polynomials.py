@@ -55,10 +55,18 @@ class JointPolynomials:
     #: (n,) the piece of the tool spline to which each joint piece belongs.
     piece: Indices
     quintic: bool
-    #: Maximum distance of the tool from the tool spline [m].
-    distance: float
-    #: Maximum angle between the tool and the tool spline [rad].
-    angle: float
+    #: (n, 2) maximum deviation of the tool from the tool spline [m], [rad].
+    deviations: Floats
+
+    @property
+    def distance(self) -> float:
+        """Maximum deviation of the tool from the tool spline [m]."""
+        return float(self.deviations[:, 0].max())
+
+    @property
+    def angle(self) -> float:
+        """Maximum turn of the tool away from the tool spline [rad]."""
+        return float(self.deviations[:, 1].max())
 
 
 def fit_joint_polynomials(
@@ -68,6 +76,7 @@ def fit_joint_polynomials(
     quintic: bool,
     tolerance: float,
     max_time: float = inf,
+    min_time: float = 0.0,
 ) -> JointPolynomials:
     """
     Return the joint pieces for a spline path.
@@ -76,10 +85,12 @@ def fit_joint_polynomials(
     :param tolerance: maximum deviation of the tool [m]; the maximum angle [rad] is this length
         divided by ANGLE_TOLERANCE_RADIUS.
     :param max_time: longest time of a piece [s].
-    :raises TooFast: even the shortest pieces, of one controller cycle, deviate too much.
+    :param min_time: shortest time of a piece [s]; a piece that is not twice as long is kept, even
+        if it deviates more.
+    :raises TooFast: even pieces of one controller cycle deviate too much.
     """
     bounds = np.array([tolerance, tolerance / ANGLE_TOLERANCE_RADIUS])
-    refinement = _PieceRefinement(kinematics, path, start, quintic)
+    refinement = _PieceRefinement(kinematics, path, start, quintic, min_time)
     refinement.halve_longer_than(max_time)
     return refinement.refine_within(bounds)
 
@@ -88,9 +99,15 @@ class _PieceRefinement:
     """The pieces so far, in order of time, with flags for those whose deviation is not known."""
 
     def __init__(
-        self, kinematics: TcpKinematics, path: SplinePath, start: MotionRows, quintic: bool
+        self,
+        kinematics: TcpKinematics,
+        path: SplinePath,
+        start: MotionRows,
+        quintic: bool,
+        min_time: float,
     ) -> None:
         self.kinematics, self.path, self.quintic = kinematics, path, quintic
+        self._min_time = min_time
         self._sample_times = path.times
         spline = path.spline
         n = len(spline.positions)
@@ -117,17 +134,16 @@ class _PieceRefinement:
             self.deviation[rows] = self._deviations(rows)
             self.pending[rows] = False
             bad = rows[(self.deviation[rows] > bounds).any(axis=1)]
+            bad = bad[np.diff(self.times)[bad] > 2.0 * self._min_time - TICK]
             if not len(bad):
                 break
             self._halve(bad)
-        distance, angle = self.deviation.max(axis=0).tolist()
         return JointPolynomials(
             times=self.times,
             joints=self.joints,
             piece=self.piece,
             quintic=self.quintic,
-            distance=distance,
-            angle=angle,
+            deviations=self.deviation,
         )
 
     def _joints(self, piece: Indices, t: Floats, times: Floats) -> MotionRows:

@@ -127,7 +127,7 @@ def worst_excess(
     qd, qdd = joint_rates(kinematics.arm, kinematics.T_flange_tcp, path.q, twists, accelerations)
     samples = RateSamples(
         points=path.points,
-        u=path.u,
+        u=path.fractions,
         twists=twists,
         accelerations=accelerations,
         qd=qd,

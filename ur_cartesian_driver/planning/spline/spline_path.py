@@ -10,7 +10,7 @@ between samples stay within some micrometres of the curve.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import degrees, pi
 
@@ -66,13 +66,16 @@ class SplinePath:
     """A spline that the arm can follow, with its samples."""
 
     spline: ToolSpline
-    #: The number of the point at the end of the first piece.
+    #: The number of the point at the end of the first segment.
     first: int
     #: (m,) the piece of each sample; row 0 is the start.
     piece: Indices
     #: (m,) the fraction of the piece's time at each sample.
     u: Floats
-    #: (m, 7) poses of the TCP in base.
+    #: (m,) the segment of each sample, and the fraction of it.
+    points: Int32s
+    fractions: Floats
+    #: (m, 7) poses of the TCP in base; (m, 6) joint positions [rad].
     poses: Floats
     #: (m, 6) joint positions [rad].
     q: Floats
@@ -90,11 +93,6 @@ class SplinePath:
         times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
         return times
 
-    @property
-    def points(self) -> Int32s:
-        """(m,) the point to which the piece of each sample leads."""
-        return (self.first + self.piece).astype(np.int32)
-
     def stretch_times(self, factor: float) -> SplinePath:
         """Return the same path with all times multiplied by a factor."""
         return replace(self, spline=self.spline.stretch_times(factor))
@@ -109,15 +107,14 @@ def solve_spline_path(
     *,
     first: int,
     rests: bool,
+    places: Callable[[Floats], tuple[Indices, Floats]] | None = None,
 ) -> SplinePath:
     """
     Return the path of the arm along a spline.
 
-    :param postures: by number of a piece, the posture at its end.
-    :param first: the number of the point at the end of the first piece.
-    :param rests: whether the arm is at rest at the start of the spline.
-    :param q_start: the configuration at the start of the spline [rad].
-    :raises GoalRefused: the arm cannot follow the spline.
+    :param postures: the postures at the ends of pieces, by the number of the piece.
+    :param first: the number of the point at the end of the first segment.
+    :param places: the segments over time, see :class:`ToolSplinePath`.
     """
     coarse = coarse_samples(spline.times)
     _check_sizes(kinematics, spline, coarse, first)
@@ -131,7 +128,7 @@ def solve_spline_path(
     )
     n = len(count)
     pieces = CurvePieces(
-        path=ToolSplinePath(spline, count),
+        path=ToolSplinePath(spline, count, places),
         first=first,
         number=2 * np.arange(n),
         begin=np.zeros(n),
@@ -153,6 +150,8 @@ def solve_spline_path(
         q=np.concatenate([[q_start], joint_path.q]),
         piece=np.concatenate([[0], joint_path.piece]),
         u=np.concatenate([[0.0], joint_path.t]),
+        points=np.concatenate([joint_path.segments[:1], joint_path.segments]),
+        fractions=np.concatenate([[0.0], joint_path.fractions]),
         length=length,
         angle=angle,
         tightest_margins=tightest_margins(

@@ -174,7 +174,9 @@ def plan_spline(
     kind = 'quintic' if polynomials.quintic else 'cubic'
     return SplinePieces(
         segments=segments,
-        reference=ReferencePath(poses=poses, point=path.points, time=path.times, fraction=path.u),
+        reference=ReferencePath(
+            poses=poses, point=path.points, time=path.times, fraction=path.fractions
+        ),
         end=end,
         stretch=stretch,
         remarks=(
@@ -352,8 +354,8 @@ def _clearance_remarks(
     start: SplineState,
     options: PlanningOptions,
 ) -> list[str]:
-    """Return the remarks on clearance, also of the stop if the arm moves at the last point."""
-    q, points, u = path.q[1:], path.points[1:], path.u[1:]
+    """Return the remarks on clearance, including the stop after a moving end."""
+    q, points, u = path.q[1:], path.points[1:], path.fractions[1:]
     if end.is_moving:
         on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]
         q = np.concatenate([q, on])
