@@ -24,6 +24,7 @@ def place_outputs(
     *,
     blend_halves: Floats | None = None,
     start_time: float = 0.0,
+    point_times: Floats | None = None,
 ) -> PlannedRows:
     """
     Return the segments with the outputs that are switched during the motion, in order of time.
@@ -33,11 +34,13 @@ def place_outputs(
     :param blend_halves: duration of the first half of the blend after each segment [s]; None =
         no blends.
     :param start_time: when the first segment begins [s].
-    :raises InvalidGoal: no motion leads to an event, or too many outputs are pending at once.
+    :param point_times: when points are passed within a motion (n,) [s]; None = each point is at
+        the end of one.
+    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at once.
     """
     if not any(events.values()):
         return segments
-    path = TimedPath(segments, reference, blend_halves, start_time)
+    path = TimedPath(segments, reference, blend_halves, start_time, point_times)
     switches = [
         found
         for kind in OUTPUT_EVENTS

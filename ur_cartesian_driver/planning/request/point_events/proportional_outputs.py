@@ -127,16 +127,16 @@ def _ahead(
     :param at: the waypoint, the time before it [s], and the field that gives this time.
     """
     waypoint, lead, field = at
-    row = path.row(waypoint)
-    if row is None:
+    point = path.point(waypoint)
+    if point is None:
         raise InvalidGoal(
             field.rpartition('.')[0],
             f'names point {waypoint}, but no motion leads there: the robot is already there',
             'begin at the next point',
         )
-    end = float(path.ends[row])
+    end = point.time
     if lead <= SAME_TIME:
-        after, time, where = row, path.at_point(row), path.where(row)
+        after, time, where = point.after, point.trigger_time, point.where
     else:
         after, time, where = path.last_returned(end - lead), end - lead, f'{lead:.3f} s before it'
         if after < 0:
@@ -148,7 +148,7 @@ def _ahead(
     return PlacedOutput(
         time=end if time is None else time,
         after_index=after,
-        report_index=row,
+        report_index=point.row,
         records=(path.triggered(record, time, after),),
         text=f'{what}, {where}',
     )

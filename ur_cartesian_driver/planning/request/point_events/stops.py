@@ -54,6 +54,20 @@ class Stops:
             mode = resolve_execution_mode(goal)
             self.moving_goal = replace(self._shifted(goal, -1.0, **rates), execution=mode)
 
+    @property
+    def waypoints(self) -> frozenset[int]:
+        """The waypoints at which the arm stops."""
+        return frozenset(stop.waypoint for stop in self._stops)
+
+    def delayed(self, times: Floats) -> Floats:
+        """Return when points (n,) are reached [s] if their times count the motion only."""
+        rests = np.zeros(len(times))
+        for each in self._stops:
+            if isinstance(each.stop, Wait) and each.waypoint + 1 < len(rests):
+                rests[each.waypoint + 1] += each.stop.duration
+        delayed: Floats = times + np.cumsum(rests)
+        return delayed
+
     def _shifted(self, goal: GoalTable, sign: float, **rates: Any) -> GoalTable:
         points = goal.waypoints
         times = points.times + sign * self._before * is_timed(goal)

@@ -64,18 +64,18 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
 
     def place(self, command: IOCommand, field: str, path: TimedPath) -> list[PlacedOutput]:
         """Return the record that switches the output, with its time and place."""
-        row = path.row(command.waypoint)
-        if row is None:
+        point = path.point(command.waypoint)
+        if point is None:
             raise InvalidGoal(
                 f'{field}.point_index',
                 f'is {command.waypoint}, but no motion leads there: the robot is already there',
                 'switch the output before the goal',
             )
-        time, last = float(path.ends[row]) + command.offset, len(path.ends) - 1
+        time, last = point.time + command.offset, len(path.ends) - 1
         late, delay, trigger_time = time - float(path.ends[last]), 0.0, None
         rest = path.rests.get(command.waypoint)
         if command.offset <= SAME_TIME:
-            after, trigger_time, where = row, path.at_point(row), path.where(row)
+            after, trigger_time, where = point.after, point.trigger_time, point.where
         elif rest is not None and time <= path.ends[rest]:
             after, delay = rest - 1, command.offset
             where = f'{command.offset:.3f} s after stopping there'
@@ -96,7 +96,7 @@ class SwitchedOutputs(OutputEvent[IOCommand]):
             PlacedOutput(
                 time=time if trigger_time is None else trigger_time,
                 after_index=after,
-                report_index=row,
+                report_index=point.row,
                 records=(path.triggered(record, trigger_time, after),),
                 text=f'switches {describe_command(command)} {where}',
             )

@@ -54,6 +54,20 @@ class PlacedOutput:
     text: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PassedPoint:
+    """How the tool passes a point of the goal, or stops there."""
+
+    #: The row of the motion that leads there, and the row after which an output there is read.
+    row: int
+    after: int
+    #: When the point is reached [s], and when an output there is triggered; None = it stops.
+    time: float
+    trigger_time: float | None
+    #: A clause for the report.
+    where: str
+
+
 class TimedPath:
     """The planned segments over time, with their path."""
 
@@ -63,6 +77,7 @@ class TimedPath:
         reference: ReferencePath,
         blend_halves: Floats | None,
         start_time: float,
+        point_times: Floats | None = None,
     ) -> None:
         """
         Compute when each motion ends, and when it returns.
@@ -71,7 +86,10 @@ class TimedPath:
         :param blend_halves: the time in the first half of the blend after each segment [s]; None =
             no blends.
         :param start_time: when the first segment begins [s].
+        :param point_times: when points are passed within a motion (n,) [s]; None = each point is
+            at the end of one.
         """
+        self._point_times = point_times
         self._primitives, self._reference = segments.primitives, reference
         self.ends: Floats = start_time + np.cumsum(segments.durations)
         self._blend_halves = np.zeros(len(segments)) if blend_halves is None else blend_halves
@@ -90,9 +108,31 @@ class TimedPath:
             waypoint: k for k, waypoint in enumerate(segments.waypoints.tolist()) if k not in stops
         }
 
-    def row(self, waypoint: int) -> int | None:
-        """Return the row of the motion to a point; None if no motion leads there."""
-        return self._rows.get(waypoint)
+    def point(self, waypoint: int) -> PassedPoint | None:
+        """Return how the tool passes a point; None if no motion leads there."""
+        row = self._rows.get(waypoint)
+        if self._point_times is not None and (row is None or self._passes(row)):
+            return self._within(float(self._point_times[waypoint]))
+        if row is None:
+            return None
+        return PassedPoint(
+            row=row,
+            after=row,
+            time=float(self.ends[row]),
+            trigger_time=self._at_end(row),
+            where=self._where(row),
+        )
+
+    def _within(self, time: float) -> PassedPoint:
+        """Return how the tool passes a point within a motion at a time [s]."""
+        after = self.last_returned(time)
+        return PassedPoint(
+            row=min(int(np.searchsorted(self.ends, time)), len(self.ends) - 1),
+            after=max(after, 0),
+            time=time,
+            trigger_time=None if after < 0 else time,
+            where='while passing it',
+        )
 
     def triggered(self, record: SwitchOutput, time: float | None, after: int) -> SwitchOutput:
         """
@@ -121,14 +161,14 @@ class TimedPath:
         piece = self._primitives[k]
         return self._blend_halves[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
-    def where(self, k: int) -> str:
+    def _where(self, k: int) -> str:
         """Describe where an output at the end of a motion is switched."""
         if self._blend_halves[k] > 0.0:
             return 'in the middle of its blend'
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
-    def at_point(self, k: int) -> float | None:
-        """Return the time [s] when the tool is closest to a motion's end; None = a stop there."""
+    def _at_end(self, k: int) -> float | None:
+        """Return the time when the tool is closest to a motion's end [s], None if it stops."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), float(self._blend_halves[k])
