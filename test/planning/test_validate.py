@@ -110,6 +110,16 @@ FREE = {'free_axis': FreeAxis.Z}
 ARC = {'type': TYPE.CIRCULAR, 'via': VIA}
 
 REFUSALS = [
+    # rounded corners
+    (
+        replace(
+            PLAIN,
+            corner_deviation=1e-3,
+            segments=(Segment(), Segment(blend_radius=0.01), Segment()),
+        ),
+        InvalidGoal,
+        'segments[1].blend_radius is 0.01 m, but corner_deviation rounds the corners of this goal',
+    ),
     # number of things
     (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
     (

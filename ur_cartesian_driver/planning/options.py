@@ -194,7 +194,9 @@ class PlanningOptions:
     max_angular_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
     #: Largest acceleration of a joint that the times of a goal may need [rad/s^2].
     max_joint_acceleration: Annotated[float, Range(0.1, 1000.0)] = 40.0
-    # The lower bound of spline_tolerance is the resolution of the joint positions on the wire.
+    #: Largest jerk of the tool on paths with rounded corners [m/s^3].
+    max_linear_jerk: Annotated[float, Range(1.0, 10_000.0)] = 50.0
+    # The least tolerance is the resolution of the joint positions on the wire.
     #: Largest distance of the tool from the curve through the points of SPLINE and SERVO goals
     #: [m]; the orientation error [rad] times 0.1 m has the same limit. A smaller value needs more
     #: pieces on the wire.

@@ -25,6 +25,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused, NearSingularity
+from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.pose_rows import transform_rows
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -74,7 +75,11 @@ from ur_cartesian_driver.planning.request.controlled_frame import (
     tool_tips,
 )
 from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
-from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_rounded,
+    is_timed,
+    resolve_execution_mode,
+)
 from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.point_events.registry import (
     OUTPUT_EVENTS,
@@ -84,6 +89,8 @@ from ur_cartesian_driver.planning.request.point_events.safe_outputs import add_s
 from ur_cartesian_driver.planning.request.point_events.stops import Stops
 from ur_cartesian_driver.planning.request.program_features import time_remarks
 from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.planning.rounded.rounded_planner import plan_rounded_path
+from ur_cartesian_driver.planning.rounded.rounded_report import RoundedReport
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
     SplineState,
@@ -230,9 +237,44 @@ def _planned_rows(
     )
 
 
+def plan_rounded_goal(planner: GoalPlanner) -> Plan:
+    """Return the plan of a goal whose lines and arcs have rounded corners."""
+    goal, state, options = planner.goal, planner.state, planner.options
+    motion = plan_rounded_path(
+        goal,
+        planner.targets,
+        state.actual_tcp_pose,
+        state.actual_q,
+        planner.kinematics,
+        options,
+        planner.stops.waypoints,
+    )
+    report = RoundedReport(goal, motion)
+    clearance = clearance_lines(
+        planner.arm,
+        tool_tips(goal, planner.T_flange_active),
+        options,
+        motion.path.q[1:],
+        state.actual_q,
+        motion.path.points[1:],
+        motion.path.fractions[1:],
+    )
+    planned = planner.plan(
+        goal,
+        report.segments(),
+        motion.reference,
+        [*ignored_remarks(goal), *clearance, *report.remarks()],
+        cache(partial(report.slow_stretches, slower_by(goal))),
+        motion.point_times,
+    )
+    return _with_offset_band(planned, planner) if goal.path_offset else planned
+
+
 def plan_spline_goal(planner: GoalPlanner) -> Plan:
     """Return the plan of a SPLINE or SERVO goal."""
     goal, state = planner.goal, planner.state
+    if is_rounded(goal):
+        return plan_rounded_goal(planner)
     first = planner.first_target()
     found = plan_spline(
         SplineState(q=state.actual_q),
@@ -360,12 +402,14 @@ class GoalPlanner:
         motion: ReferencePath,
         remarks: Iterable[str],
         find_slow_stretches: Callable[[], tuple[SlowStretch, ...]],
+        point_times: Floats | None = None,
     ) -> Plan:
         """
         Return the plan of a motion with its stops and outputs.
 
         :param goal: the goal as planned, without stops.
         :param remarks: appended to the remarks that have been collected so far.
+        :param point_times: when points are passed within a piece (n,) [s], without stops.
         :raises GoalRefused: the tool is slower than demanded, or an output cannot be placed.
         """
         if goal.min_speed_fraction:
@@ -376,6 +420,7 @@ class GoalPlanner:
             reference,
             {kind.field: kind.of(goal) for kind in OUTPUT_EVENTS},
             blend_halves=segments.blend_entries[:, -1],
+            point_times=None if point_times is None else self.stops.delayed(point_times),
         )
         return Plan(
             goal=goal,

@@ -157,7 +157,10 @@ DEFAULT_OFFSET_MOTION = (0.02, 0.2, 0.5)
 #: time from the program's SUCCESS until the arm rests inside the goal tolerance.
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
-#: The longest dwell, and the longest timeout, at a point [s]; longer ones must be mistakes.
+#: Largest turn beside the programmed path at a rounded corner, unless the goal gives it [rad].
+DEFAULT_CORNER_ANGLE = 0.02
+
+#: The longest rest and timeout at a point [s]; longer ones must be mistakes.
 MAX_STOP_TIME = 600.0
 #: The longest time between a point and an output that it switches [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -167,6 +170,8 @@ FRACTION, SMALL_LEAD = Range(0.0, 1.0), Range(0.0, 10.0)
 #: In a spline, NaN lets the driver choose the number.
 RATE = Range(nan_in_splines=True)
 TIMEOUT = Range(0.0, MAX_STOP_TIME, 's', above=True)
+CORNER_DEVIATION = Range(2e-5, 0.1, 'm', zero='corners as they are')
+CORNER_ANGLE = Range(1e-3, 0.5, 'rad', zero=f'{DEFAULT_CORNER_ANGLE:g} rad')
 
 DURATION, ALWAYS = Sent(form=Form.DURATION), Sent(always=True)
 DOMAIN = Sent(name='analog_domain')
@@ -246,6 +251,9 @@ class Segment:
     free_axis: Annotated[FreeAxis, Mark.OF_POINT] = FreeAxis.NONE
     free_min: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
     free_max: Annotated[float, FINITE, Mark.OF_POINT] = 0.0
+    #: How far the path may be beside the corner at the waypoint; 0 = as the goal says.
+    corner_deviation: Annotated[float, CORNER_DEVIATION, Mark.OF_POINT] = 0.0
+    corner_angle: Annotated[float, CORNER_ANGLE, Mark.OF_POINT] = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -270,6 +278,8 @@ class SegmentColumns:
     free_axes: Annotated[Int64s, ColumnOf('free_axis')]
     free_minima: Annotated[Floats, ColumnOf('free_min')]
     free_maxima: Annotated[Floats, ColumnOf('free_max')]
+    corner_deviations: Annotated[Floats, ColumnOf('corner_deviation')]
+    corner_angles: Annotated[Floats, ColumnOf('corner_angle')]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -473,3 +483,6 @@ class Goal:
         float, DURATION, Range(0.0, unit='s', remedy=f'set 0 for {DEFAULT_STALL_TIMEOUT:g} s')
     ] = 0.0
     path_offset: PathOffset = PathOffset()
+    #: How far the path may be beside the corners of lines and arcs [m], [rad].
+    corner_deviation: Annotated[float, CORNER_DEVIATION] = 0.0
+    corner_angle: Annotated[float, CORNER_ANGLE] = 0.0

@@ -27,6 +27,7 @@ class SlowCause(Enum):
     STOP = 'let the tool pass: blend_radius (with PROCESS at steady speed), or a SPLINE'
     REVERSAL = 'turn round beside the seam: leave it and come back, on an arc for example'
     BLEND = 'enlarge blend_radius, raise the acceleration, or use PROCESS'
+    CORNER = 'allow a larger corner_deviation, or raise the acceleration or max_linear_jerk'
     IN_BLEND = 'enlarge blend_radius, or use a SPLINE, whose speed is known'
     SHORT = 'raise the acceleration, lengthen the segments, or put a SPLINE through the points'
     JOINT_LIMIT = (

@@ -41,13 +41,14 @@ def segment_field(index: int, field: str = '') -> str:
 
 def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
     """
-    Return the execution mode of a goal, with AUTO resolved.
+    Return the execution mode.
 
-    AUTO becomes SPLINE if the goal has times, and a twist or an acceleration at a point before its
-    last one (with keep_open: at any point); otherwise AUTO becomes PRIMITIVES.
+    AUTO is SPLINE if only that rounds corners, or meets twists or accelerations.
     """
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)
+    if is_rounded(goal):
+        return ExecutionMode.SPLINE
     points, inner = goal.waypoints, slice(len(goal.waypoints) - (not goal.keep_open))
     if is_timed(goal) and (points.twists[inner].any() or points.accelerations[inner].any()):
         return ExecutionMode.SPLINE
@@ -56,7 +57,12 @@ def resolve_execution_mode(goal: GoalTable) -> ExecutionMode:
 
 def is_spline(goal: GoalTable) -> bool:
     """Return whether a timed spline connects the points of a goal."""
-    return resolve_execution_mode(goal).traits.is_spline
+    return resolve_execution_mode(goal).traits.is_spline and not is_rounded(goal)
+
+
+def is_rounded(goal: GoalTable) -> bool:
+    """Return whether lines and arcs with rounded corners connect the points of a goal."""
+    return bool(goal.corner_deviation or goal.segments.corner_deviations.any())
 
 
 def is_timed(goal: GoalTable) -> bool:

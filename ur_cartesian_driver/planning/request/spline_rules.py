@@ -34,11 +34,11 @@ _USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and acceler
 
 
 def check_spline_mode(goal: GoalTable, options: PlanningOptions) -> None:
-    """Refuse a spline if the goal has no times, or if the robot's calibration is unknown."""
-    if not is_spline(goal):
+    """Refuse a spline without times, or without the calibration that its joints depend on."""
+    if not resolve_execution_mode(goal).traits.is_spline:
         return
     name = resolve_execution_mode(goal).name
-    if not is_timed(goal):
+    if is_spline(goal) and not is_timed(goal):
         raise InvalidGoal(
             'execution',
             f'is {name}, which needs times',

@@ -51,6 +51,7 @@ from ur_cartesian_driver.planning.request.field_rules import (
 from ur_cartesian_driver.planning.request.free_axis_rules import check_free_axes
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_optimized,
+    is_rounded,
     is_spline,
     is_timed,
     OPTIMIZED_TYPES,
@@ -62,6 +63,7 @@ from ur_cartesian_driver.planning.request.mode_rules import check_mode, GOAL_RUL
 from ur_cartesian_driver.planning.request.path_offset import check_path_offset
 from ur_cartesian_driver.planning.request.point_events.registry import check_outputs, check_stops
 from ur_cartesian_driver.planning.request.program_features import check_program
+from ur_cartesian_driver.planning.request.rounded_rules import check_rounded
 from ur_cartesian_driver.planning.request.spline_rules import check_spline, check_spline_mode
 
 #: Longest time by which a stamp may lie in the future [s].
@@ -236,7 +238,7 @@ def _motions(goal: GoalTable, options: PlanningOptions) -> None:
             via = segments.via(i)
             assert via is not None
             arc_through_via(i, start, via, end, ArcMode(segments.arc_modes[i]))
-        elif is_same_pose(start, end):
+        elif is_same_pose(start, end) and not is_rounded(goal):
             # With a posture, the segment may become a joint move: the planner decides.
             if not (i in points.postures and options.on_posture_change == 'movej'):
                 raise duplicate_point_error(goal, i)
@@ -255,6 +257,7 @@ RULES: tuple[Rule, ...] = (
     check_spline_mode,
     check_program,
     check_spline,
+    check_rounded,
     _segment_rules,
     check_free_axes,
     _postures,

@@ -1,0 +1,246 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Goals with rounded corners: what is planned, what is said of it, and what is refused."""
+
+from collections import Counter
+from dataclasses import replace
+
+from curve_distance import distances
+from forward_model import dh_forward, pose_matrix
+import numpy as np
+import pytest
+from random_cases import cases, random_of
+from rounded_goals import measure, OPTIONS, random_case
+
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    InvalidGoal,
+    JointLimitExceeded,
+    NearSingularity,
+    Unreachable,
+)
+from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal.goal import (
+    ArcMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    Segment,
+    SegmentType,
+)
+from ur_cartesian_driver.motion.plan.primitive import Wait
+from ur_cartesian_driver.planning import plan
+
+PARTS = 10
+#: What refuses a random goal rightly: the arm cannot be there.
+EXPLAINED = (Unreachable, NearSingularity, JointLimitExceeded)
+
+
+@pytest.mark.random
+@pytest.mark.parametrize('part', range(PARTS))
+def test_random_goals_keep_every_limit(part):
+    random = random_of('rounded goals', part)
+    refused = Counter()
+    count = cases(1000 // PARTS)
+    for _ in range(count):
+        case = random_case(random)
+        try:
+            found = plan(case.goal, case.state, case.arm, OPTIONS)
+        except EXPLAINED as error:
+            refused[type(error)] += 1
+            continue
+        seen = measure(case, found)
+        assert seen.deviation <= 1.0, case
+        assert seen.speed <= 1.02, case
+        assert seen.acceleration <= 1.02, case
+        assert seen.jerk <= 1.02, case
+        assert seen.joint_speed <= 1.02, case
+        assert seen.joint_acceleration <= 1.02, case
+        assert seen.shortest_piece >= 0.02 - 1e-6, case
+        assert seen.pieces_per_second <= 50.0, case
+    assert refused.total() <= 0.3 * count
+
+
+def square(cell, side=0.06, **fields):
+    points = [(side, 0, 0), (side, side, 0), (0, side, 0), (0, 0.02, 0)]
+    return Goal(waypoints=tuple(cell.point(*each) for each in points), **fields)
+
+
+def tool_rows(cell, found, step=0.002):
+    t = np.arange(0.0, found.duration, step)
+    q, _, _ = found.joint_spline.rows(t)
+    tool = pose_matrix(cell.T_flange_tcp)
+    rows = [(dh_forward(cell.arm.model.geometry, each) @ tool)[:3, 3] for each in q]
+    return t, np.array(rows)
+
+
+@pytest.mark.parametrize('deviation', [5e-5, 5e-4, 5e-3])
+def test_a_square_is_passed_beside_its_corners(cell, deviation):
+    goal = square(cell, corner_deviation=deviation)
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    assert found.execution is ExecutionMode.SPLINE
+    t, rows = tool_rows(cell, found, 0.004)
+    corners = np.array([cell.home.position, *(point.pose.position for point in goal.waypoints)])
+    off = distances(rows, [corners])
+    # A corner of 90 degrees is passed at 0.7 times the distance from it beside its lines.
+    assert 0.5 * deviation < off.max() <= 0.72 * deviation
+    apart = np.linalg.norm(rows[:, None] - corners[1:-1], axis=2)
+    assert 0.75 * deviation < apart.min(axis=0).min() <= apart.min(axis=0).max() < 1.1 * deviation
+    # Away from the corners, the lines are followed.
+    outside = apart.min(axis=1) > min(12.0 * deviation, 0.025)
+    assert outside.any()
+    assert off[outside].max() < 2e-5
+    speed = np.linalg.norm(np.gradient(rows, t, axis=0), axis=1)
+    slow = (speed < 0.09)[(t > 0.3) & (t < t[-1] - 0.3)]
+    assert slow.any()
+    assert speed[(t > 0.3) & (t < t[-1] - 0.3)].min() > 0.003  # it stops nowhere between
+    assert np.linalg.norm(rows[-1] - corners[-1]) < 1e-6
+
+
+def test_the_larger_the_deviation_the_shorter_the_time(cell):
+    times = [
+        plan(square(cell, corner_deviation=deviation), cell.state, cell.arm, OPTIONS).duration
+        for deviation in (2e-5, 2e-4, 2e-3, 2e-2)
+    ]
+    assert times == sorted(times, reverse=True)
+    assert times[0] > 1.2 * times[-1]
+
+
+def test_the_report_separates_corners_and_speed(cell):
+    goal = square(cell, corner_deviation=5e-4)
+    report = '\n'.join(plan(goal, cell.state, cell.arm, OPTIONS).report)
+    assert 'point 0: rounded, in ' in report
+    assert 'passes 0.4' in report
+    assert 'point 3: rounded, in ' in report
+    assert 'stops there' in report
+    assert '% of the length at the speed that was asked, within 1 %' in report
+    assert 'because of the acceleration across the path at the corner near point 1' in report
+    assert 'because the arm starts from rest' in report
+
+
+def test_points_without_a_deviation_are_stops(cell):
+    segments = (
+        Segment(corner_deviation=1e-3),
+        Segment(),
+        Segment(corner_deviation=1e-3),
+        Segment(),
+    )
+    found = plan(square(cell, segments=segments), cell.state, cell.arm, OPTIONS)
+    t, rows = tool_rows(cell, found)
+    speed = np.linalg.norm(np.gradient(rows, t, axis=0), axis=1)
+    corners = np.array([point.pose.position for point in found.goal.waypoints])
+    nearest = [int(np.argmin(np.linalg.norm(rows - corner, axis=1))) for corner in corners]
+    assert speed[nearest[1]] < 0.005
+    assert np.linalg.norm(rows[nearest[1]] - corners[1]) < 1e-4
+    assert min(speed[nearest[0]], speed[nearest[2]]) > 0.01
+
+
+def test_a_dwell_is_a_stop_with_a_rest(cell):
+    segments = (Segment(), Segment(dwell=0.5), Segment(), Segment())
+    goal = square(cell, segments=segments, corner_deviation=1e-3)
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    (rest,) = [row for row in found.segments if isinstance(row.primitive, Wait)]
+    assert (rest.waypoint, rest.duration) == (1, 0.5)
+    at_rest = np.array(cell.arm.forward(rest.joints).position)
+    assert np.linalg.norm(at_rest - cell.arm.forward(rest.joints).position) < 1e-6
+
+
+def test_outputs_are_placed_at_the_time_of_their_point(cell):
+    commands = tuple(
+        IOCommand(waypoint=k, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=k, value=1.0)
+        for k in range(4)
+    )
+    goal = square(cell, side=0.03, io_commands=commands, corner_deviation=1e-3)
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    records = [record for row in found.segments for record in row.outputs]
+    assert [record.pin for record in records] == [0, 1, 2, 3]
+    for record, point in zip(records[:3], goal.waypoints[:3], strict=True):
+        off = record.trigger_pose.distance_to(point.pose)
+        assert 0.5e-3 < off <= 1e-3  # where the tool passes beside the point
+    assert records[3].trigger_pose is None
+
+
+def test_points_that_repeat_are_passed_once(cell):
+    goal = square(cell, corner_deviation=1e-3)
+    twice = tuple(point for point in goal.waypoints for _ in range(2))
+    once, again = (
+        plan(each, cell.state, cell.arm, OPTIONS)
+        for each in (goal, replace(goal, waypoints=twice))
+    )
+    assert again.duration == pytest.approx(once.duration, abs=1e-6)
+
+
+def test_arcs_that_turn_with_their_tangent_and_turns_on_the_spot_are_led_through(cell):
+    goal = Goal(
+        waypoints=(
+            cell.point(0.05),
+            cell.point(0.1, 0.05),
+            cell.point(0.1, 0.05, turn=(0.0, 0.0, 0.4)),
+            cell.point(0.1, 0.09, turn=(0.0, 0.0, 0.4)),
+        ),
+        segments=(
+            Segment(),
+            Segment(
+                type=SegmentType.CIRCULAR, via=cell.pose(0.085, 0.015), arc_mode=ArcMode.FIXED
+            ),
+            Segment(velocity=0.3),
+            Segment(),
+        ),
+        corner_deviation=5e-4,
+        corner_angle=0.01,
+    )
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    end = cell.arm.forward(found.rows.joints[-1].tolist()) @ cell.T_flange_tcp
+    assert end.distance_to(goal.waypoints[-1].pose) < 1e-6
+    assert end.angle_to(goal.waypoints[-1].pose) < 1e-5
+
+
+def test_the_slowest_limit_is_demanded_away(cell):
+    goal = square(cell, corner_deviation=5e-5, min_speed_fraction=0.9)
+    with pytest.raises(InvalidGoal, match=r'min_speed_fraction is 0\.9, but at .*corner near'):
+        plan(goal, cell.state, cell.arm, OPTIONS)
+    plan(
+        replace(goal, corner_deviation=1e-2, segments=(Segment(velocity=0.02),) * 4),
+        cell.state,
+        cell.arm,
+        OPTIONS,
+    )
+
+
+@pytest.mark.parametrize(
+    ('fields', 'text'),
+    [
+        (
+            {'execution': ExecutionMode.PRIMITIVES},
+            'corner_deviation is set, but with execution PRIM',
+        ),
+        ({'keep_open': True}, 'corner_deviation is set, but the points of a goal with keep_open'),
+        ({'corner_deviation': 1e-6}, 'corner_deviation is 1e-06 m, but must be 0'),
+        ({'corner_deviation': 0.2}, 'corner_deviation is 0.2 m, but must be 0'),
+        ({'corner_angle': 0.6}, 'corner_angle is 0.6 rad, but must be 0'),
+        (
+            {'segments': (Segment(blend_radius=0.01),) * 4},
+            r'segments\[0\]\.blend_radius is 0\.01 m, but corner_deviation rounds',
+        ),
+        (
+            {'segments': (Segment(type=SegmentType.JOINT),) * 4},
+            r'segments\[0\]\.type is JOINT, but only lines and arcs',
+        ),
+    ],
+)
+def test_what_excludes_rounded_corners_is_refused(cell, fields, text):
+    with pytest.raises(GoalRefused, match=text):
+        plan(square(cell, **{'corner_deviation': 1e-3} | fields), cell.state, cell.arm, OPTIONS)
+
+
+def test_times_are_refused(cell):
+    goal = square(cell, corner_deviation=1e-3)
+    points = tuple(replace(point, time=1.0 + k) for k, point in enumerate(goal.waypoints))
+    with pytest.raises(InvalidGoal, match='corner_deviation is set, but the goal has times'):
+        plan(replace(goal, waypoints=points), cell.state, cell.arm, OPTIONS)
+
+
+def test_an_unknown_calibration_is_refused(cell):
+    options = replace(OPTIONS, calibration_known=False)
+    with pytest.raises(GoalRefused, match='calibration of this robot is unknown'):
+        plan(square(cell, corner_deviation=1e-3), cell.state, cell.arm, options)

@@ -1,0 +1,98 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Rules about goals whose lines and arcs have rounded corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.geometry.arrays import Floats
+from ur_cartesian_driver.motion.goal.goal import (
+    DEFAULT_CORNER_ANGLE,
+    FreeAxis,
+    Segment,
+    SegmentType,
+)
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_rounded,
+    is_timed,
+    resolve_execution_mode,
+    segment_field,
+)
+
+_TYPES = (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS, SegmentType.CIRCULAR)
+
+
+def corner_bounds(goal: GoalTable) -> Floats:
+    """Return how far the path may be beside each point (n, 2) [m], [rad]; 0 = the arm stops."""
+    segments = goal.motions
+    deviation = np.where(
+        segments.corner_deviations > 0.0, segments.corner_deviations, goal.corner_deviation
+    )
+    angle = np.where(
+        segments.corner_angles > 0.0,
+        segments.corner_angles,
+        goal.corner_angle or DEFAULT_CORNER_ANGLE,
+    )
+    return np.stack([deviation, np.where(deviation > 0.0, angle, 0.0)], axis=1)
+
+
+def check_rounded(goal: GoalTable, options: PlanningOptions) -> None:
+    """Refuse what rounded corners exclude."""
+    if not is_rounded(goal):
+        return
+    mode = resolve_execution_mode(goal)
+    name = 'corner_deviation' if goal.corner_deviation else _first_corner(goal)
+    if not mode.traits.is_spline:
+        raise InvalidGoal(
+            name,
+            f'is set, but with execution {mode.name} the robot rounds corners by its own blends',
+            'set execution to SPLINE or SERVO, or use blend_radius',
+        )
+    if is_timed(goal):
+        raise InvalidGoal(
+            name,
+            'is set, but the goal has times; the speed along rounded corners follows from the '
+            'segments',
+            'set all times to 0, and velocity of the segments',
+        )
+    if goal.keep_open:
+        raise InvalidGoal(
+            name,
+            'is set, but the points of a goal with keep_open are not all known',
+            'send the whole path',
+        )
+    segments = goal.segments
+    wrong = ~np.isin(segments.types, _TYPES) | (segments.blend_radii > 0.0)
+    wrong |= segments.free_axes != FreeAxis.NONE
+    for i in rows_where(wrong)[:1]:
+        _refuse_segment(i, segments[i])
+
+
+def _first_corner(goal: GoalTable) -> str:
+    rows = rows_where(goal.segments.corner_deviations > 0.0)
+    return segment_field(rows[0], 'corner_deviation')
+
+
+def _refuse_segment(index: int, segment: Segment) -> None:
+    if segment.blend_radius > 0.0:
+        raise InvalidGoal(
+            segment_field(index, 'blend_radius'),
+            f'is {segment.blend_radius:g} m, but corner_deviation rounds the corners of this goal',
+            'set one of them to 0',
+        )
+    if segment.free_axis != FreeAxis.NONE:
+        raise InvalidGoal(
+            segment_field(index, 'free_axis'),
+            f'is {FreeAxis(segment.free_axis).name}, but orientations are not chosen along '
+            'rounded corners',
+            'set it to NONE, or use blends',
+        )
+    raise InvalidGoal(
+        segment_field(index, 'type'),
+        f'is {SegmentType(segment.type).name}, but only lines and arcs have rounded corners',
+        'use LINEAR or CIRCULAR, or a goal of its own for that motion',
+    )

@@ -1,0 +1,380 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From lines and arcs with rounded corners to joint spline pieces.
+
+Programmed path -> rounded path -> time law -> the tool over time, by knots at least
+:data:`MIN_PIECE_TIME` apart -> the arm along it and its joint polynomials, as for any spline
+(:mod:`~ur_cartesian_driver.planning.spline.spline_path`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.motion.errors import InvalidPosture, TooFast
+from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
+from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
+from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.geometry.pose_rows import (
+    angle_rows,
+    distance_rows,
+    keep_hemisphere,
+)
+from ur_cartesian_driver.motion.geometry.vectors import Joints, vector6
+from ur_cartesian_driver.motion.goal.goal_table import GoalTable
+from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan.plan import ReferencePath
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.goal_fields import point_field
+from ur_cartesian_driver.planning.request.rounded_rules import corner_bounds
+from ur_cartesian_driver.planning.rounded.programmed_path import (
+    programmed_sections,
+)
+from ur_cartesian_driver.planning.rounded.rounded_path import RoundedPath
+from ur_cartesian_driver.planning.rounded.section_law import SectionLaw, tool_rows, ToolLimits
+from ur_cartesian_driver.planning.spline.joint_polynomials import (
+    ANGLE_TOLERANCE_RADIUS,
+    fit_joint_polynomials,
+    JointPolynomials,
+)
+from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
+
+#: Shortest piece [s]: what the robot program and its sockets take for any time.
+MIN_PIECE_TIME = 0.02
+#: Pieces that the first try joins.
+_JOINED = 8
+#: What the pieces may add to the deviation of the path [m], and as a part of a corner's bound.
+PIECE_TOLERANCE = 1e-5
+_PIECE_PART = 0.2
+#: The part of that which the tool's own polynomials may take; the rest is the joints'.
+_TOOL_PART = 0.3
+#: How far the acceleration of pieces longer than the shortest may be off, as a part of its limit.
+_ACCELERATION_PART = 0.02
+#: The part of the jerk limit that the law aims at: its pieces have a little more.
+_JERK_PART = 0.97
+#: Corners need no larger width than the tool's travel in this time [s], or this length [m].
+_WIDTH_TIME = 0.25
+_SLOW_WIDTH = 0.001
+#: How often the law is slowed around pieces that are too coarse, and by how much at least.
+_TRIES = 6
+_SLOWER = 1.1
+#: Samples inside each piece that measure its accelerations, and how far these may be above.
+_SAMPLES_INSIDE = 5
+_CLOSE_ENOUGH = 1.017
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoundedMotion:
+    """A rounded path over time that passed all checks of the arm."""
+
+    laws: Sequence[SectionLaw]
+    limits: ToolLimits
+    kinematics: TcpKinematics
+    #: When each section begins [s].
+    begins: Floats
+    places: Places
+    path: SplinePath
+    polynomials: JointPolynomials
+    #: (n,) when each point of the goal is passed [s].
+    point_times: Floats
+
+    @cached_property
+    def reference(self) -> ReferencePath:
+        """The path of the tool, with the segments of the goal."""
+        path = self.path
+        poses = path.poses.copy()
+        keep_hemisphere(poses)
+        return ReferencePath(
+            poses=poses, point=path.points, time=path.times, fraction=path.fractions
+        )
+
+
+def plan_rounded_path(
+    goal: GoalTable,
+    targets: Floats,
+    start: Pose,
+    q_start: Joints,
+    kinematics: TcpKinematics,
+    options: PlanningOptions,
+    stops: frozenset[int],
+) -> RoundedMotion:
+    """
+    Return the motion along a goal's lines and arcs with rounded corners.
+
+    :param targets: (n, 7) its points in base.
+    :param start: the tool at the beginning in base, with the arm at ``q_start`` [rad], at rest.
+    :param stops: points at which the arm stops, beside those without corner_deviation.
+    :raises GoalRefused: the arm cannot follow.
+    """
+    bounds = corner_bounds(goal)
+    given = bounds[bounds[:, 0] > 0.0, 0]
+    tolerance = min(PIECE_TOLERANCE, options.spline_tolerance, _PIECE_PART * float(given.min()))
+    aimed = np.maximum(bounds - [tolerance, tolerance / ANGLE_TOLERANCE_RADIUS], 0.0)
+    sections = programmed_sections(goal, targets, start, aimed, stops)
+    limits = _tool_limits(goal, targets, start, options)
+    laws: list[SectionLaw] = []
+    q = q_start
+    for section in sections:
+        if len(section.polyline.s) < 2:
+            continue
+        own = limits.at(section.segments)
+        widest = max(_SLOW_WIDTH, _WIDTH_TIME * float(own.speeds.max()))
+        path = RoundedPath(section.polyline, widest)
+        laws.append(SectionLaw(section, path, own, kinematics, q, options))
+        if laws[-1].samples.q.shape[1]:
+            q = vector6(laws[-1].samples.q[-1].tolist())
+    for attempt in range(_TRIES + 1):
+        motion = _fit(laws, limits, q_start, kinematics, options, tolerance)
+        coarse = _coarse_times(motion, tolerance, options)
+        if not len(coarse):
+            _check_postures(motion, goal, targets, kinematics, options)
+            return motion
+        if attempt < _TRIES:
+            for law, begin in zip(laws, motion.begins.tolist(), strict=True):
+                law.slow_around(coarse - begin, _SLOWER)
+    point = int(motion.path.points[np.searchsorted(motion.path.times, coarse[0, 0])])
+    raise TooFast(
+        point_field(point),
+        f'lies on a path that the joints cannot follow within {1e3 * tolerance:.3f} mm by pieces '
+        f'of {1e3 * MIN_PIECE_TIME:g} ms, {coarse[0, 0]:.3f} s after its start',
+        'keep away from the singularity there, or ask for less speed',
+    )
+
+
+def _tool_limits(
+    goal: GoalTable, targets: Floats, start: Pose, options: PlanningOptions
+) -> ToolLimits:
+    """Return what the segments (n,) ask for, and the limits of the driver."""
+    before = np.concatenate([[start.row()], targets[:-1]])
+    turns_only = (distance_rows(before, targets) < 1e-6) & (
+        angle_rows(before[:, 3:], targets[:, 3:]) > 0.0
+    )
+    segments = goal.motions
+    twists = np.linalg.norm(goal.waypoints.twists[:, :3], axis=1)
+    speeds = np.where(twists > 0.0, twists, options.linear_velocity)
+    asked = segments.velocities > 0.0
+    speeds = np.where(asked & ~turns_only, segments.velocities, speeds)
+    if options.max_tool_speed > 0.0:
+        speeds = np.minimum(speeds, options.max_tool_speed)
+    rates = np.where(asked, segments.velocities, options.angular_velocity)
+    faster = segments.accelerations > 0.0
+    linear = np.where(faster & ~turns_only, segments.accelerations, options.linear_acceleration)
+    angular = np.where(faster, segments.accelerations, options.angular_acceleration)
+    return ToolLimits(
+        speeds=speeds,
+        turn_rates=np.where(turns_only, rates, inf),
+        accelerations=np.minimum(linear, options.max_linear_acceleration),
+        turn_accelerations=np.where(
+            turns_only,
+            np.minimum(angular, options.max_angular_acceleration),
+            options.max_angular_acceleration,
+        ),
+        jerk=_JERK_PART * options.max_linear_jerk,
+    )
+
+
+def _fit(
+    laws: Sequence[SectionLaw],
+    limits: ToolLimits,
+    q_start: Joints,
+    kinematics: TcpKinematics,
+    options: PlanningOptions,
+    tolerance: float,
+) -> RoundedMotion:
+    durations = np.array([law.duration for law in laws])
+    begins = np.cumsum(durations) - durations
+    knots = [_knots(law, _TOOL_PART * tolerance) for law in laws]
+    tool = [_tool_at(law, t) for law, t in zip(laws, knots, strict=True)]
+    # A section begins where the one before it ends.
+    join = [slice(1 if i else 0, None) for i in range(len(laws))]
+    spline = ToolSpline.through(
+        ToolPoints(
+            times=np.concatenate(
+                [(t + begin)[own] for t, begin, own in zip(knots, begins, join, strict=True)]
+            ),
+            **{
+                name: np.concatenate(
+                    [getattr(rows, name)[own] for rows, own in zip(tool, join, strict=True)]
+                )
+                for name in ('poses', 'twists', 'accelerations')
+            },
+            quintic=True,
+        )
+    )
+    places = Places(laws, begins)
+    path = solve_spline_path(
+        kinematics, spline, {}, q_start, options, first=0, rests=True, places=places
+    )
+    polynomials = fit_joint_polynomials(
+        kinematics,
+        path,
+        MotionRows(np.array([q_start]), np.zeros((1, 6)), np.zeros((1, 6))),
+        True,
+        (1.0 - _TOOL_PART) * tolerance,
+        min_time=MIN_PIECE_TIME,
+    )
+    return RoundedMotion(
+        laws=laws,
+        limits=limits,
+        kinematics=kinematics,
+        begins=begins,
+        places=places,
+        path=path,
+        polynomials=polynomials,
+        point_times=places.point_times(len(limits.speeds)),
+    )
+
+
+def _knots(law: SectionLaw, tolerance: float) -> Floats:
+    """Return the times between which quintics follow the tool, as few as possible."""
+    count = max(1, int(law.duration / MIN_PIECE_TIME))
+    step = law.duration / count
+    # The first piece is short, so that an output may follow it soon.
+    ends = np.unique(np.concatenate([[0, 1], np.arange(_JOINED, count, _JOINED), [count]]))
+    open_rows = np.arange(len(ends) - 1)
+    while len(open_rows):
+        sizes = np.diff(ends)[open_rows]
+        open_rows = open_rows[sizes > 1]
+        if not len(open_rows):
+            break
+        coarse = _deviations(law, step * ends, open_rows, tolerance) > 1.0
+        split = open_rows[coarse]
+        middle = (ends[split] + ends[split + 1]) // 2
+        ends = np.insert(ends, split + 1, middle)
+        moved = split + np.arange(len(split))
+        open_rows = np.sort(np.concatenate([moved, moved + 1]))
+    times: Floats = step * ends
+    times[-1] = law.duration
+    return times
+
+
+def _deviations(law: SectionLaw, times: Floats, rows: Indices, tolerance: float) -> Floats:
+    """
+    Return by how much quintics between times deviate from the law (r,), as parts of the bounds.
+
+    :param tolerance: of the position [m]; for turns, of the arc at ANGLE_TOLERANCE_RADIUS.
+    """
+    ends = np.unique(np.concatenate([rows, rows + 1]))
+    # Pieces between rows that are not asked for are made as well, and left out.
+    spline = ToolSpline.through(_tool_at(law, times[ends]))
+    part = np.arange(1, _JOINED) / _JOINED
+    t = (times[rows][:, None] + np.diff(times)[rows][:, None] * part).ravel()
+    exact = _tool_at(law, t)
+    number = np.repeat(np.searchsorted(ends, rows), len(part))
+    made = spline.rows(number, t - spline.times[number])
+    error = made.accelerations - exact.accelerations
+    linear, angular = law.acceleration_bounds(t)
+    off = np.maximum.reduce(
+        [
+            distance_rows(exact.poses, made.poses) / tolerance,
+            ANGLE_TOLERANCE_RADIUS * angle_rows(exact.poses[:, 3:], made.poses[:, 3:]) / tolerance,
+            np.linalg.norm(error[:, :3], axis=1) / (_ACCELERATION_PART * linear),
+            np.linalg.norm(error[:, 3:], axis=1) / (_ACCELERATION_PART * angular),
+        ]
+    )
+    largest: Floats = off.reshape(len(rows), -1).max(axis=1)
+    return largest
+
+
+def _tool_at(law: SectionLaw, t: Floats) -> ToolPoints:
+    """Return the tool at times since the section began (m,)."""
+    s, v, a = law.law.at(t)
+    rows = law.path.rows(s)
+    poses, w1, w2 = tool_rows(rows)
+    v, a = v[:, None], a[:, None]
+    first = np.concatenate([rows.d1[:, :3], w1], axis=1)
+    second = np.concatenate([rows.d2[:, :3], w2], axis=1)
+    return ToolPoints(
+        times=t,
+        poses=poses,
+        twists=first * v,
+        accelerations=first * a + second * v * v,
+        quintic=True,
+    )
+
+
+class Places:
+    """Finds the segments in which the tool is at a time."""
+
+    def __init__(self, laws: Sequence[SectionLaw], begins: Floats) -> None:
+        self._laws, self._begins = laws, begins
+
+    def __call__(self, times: Floats) -> tuple[Indices, Floats]:
+        """Return the segments (m,) and the fractions of them."""
+        number = np.clip(
+            np.searchsorted(self._begins, times, side='left') - 1, 0, len(self._laws) - 1
+        )
+        segments, fractions = np.empty(len(times), dtype=np.intp), np.empty(len(times))
+        for k in np.unique(number).tolist():
+            own = number == k
+            law = self._laws[k]
+            t = np.clip(times[own] - self._begins[k], 0.0, law.duration)
+            segments[own], fractions[own] = law.section.locate(law.law.at(t).s)
+        return segments, fractions
+
+    def point_times(self, points: int) -> Floats:
+        """Return when the points of the goal are passed (n,) [s]."""
+        times = np.zeros(points)
+        for law, begin in zip(self._laws, self._begins.tolist(), strict=True):
+            times[law.section.segments] = begin + law.law.times_of(law.section.ends)
+            times[law.section.segments[-1]] = begin + law.duration
+        return np.maximum.accumulate(times)
+
+
+def _coarse_times(motion: RoundedMotion, tolerance: float, options: PlanningOptions) -> Floats:
+    """Return begin and end (k, 2) of the pieces that do not follow the law closely [s]."""
+    pieces = motion.polynomials
+    bounds = (1.0 - _TOOL_PART) * tolerance * np.array([1.0, 1.0 / ANGLE_TOLERANCE_RADIUS])
+    coarse = (pieces.deviations > bounds).any(axis=1)
+    coarse |= _acceleration_excess(motion, options) > _CLOSE_ENOUGH
+    return np.stack([pieces.times[:-1][coarse], pieces.times[1:][coarse]], axis=1)
+
+
+def _acceleration_excess(motion: RoundedMotion, options: PlanningOptions) -> Floats:
+    """Return the accelerations inside pieces (n,), as parts of their limits."""
+    pieces, kinematics = motion.polynomials, motion.kinematics
+    part = np.arange(1, _SAMPLES_INSIDE + 1) / (_SAMPLES_INSIDE + 1)
+    t = (pieces.times[:-1, None] + np.diff(pieces.times)[:, None] * part).ravel()
+    joints = JointSpline.through(pieces.times, pieces.joints, quintic=True)
+    q, qd, qdd = joints.rows(t)
+    _, tool = tool_rates(kinematics.arm, kinematics.T_flange_tcp, q, qd, qdd)
+    segments, _ = motion.places(t)
+    excess = np.maximum.reduce(
+        [
+            np.linalg.norm(tool[:, :3], axis=1) / motion.limits.accelerations[segments],
+            np.linalg.norm(tool[:, 3:], axis=1) / motion.limits.turn_accelerations[segments],
+            np.abs(qdd).max(axis=1) / options.max_joint_acceleration,
+        ]
+    )
+    largest: Floats = excess.reshape(-1, _SAMPLES_INSIDE).max(axis=1)
+    return largest
+
+
+def _check_postures(
+    motion: RoundedMotion,
+    goal: GoalTable,
+    targets: Floats,
+    kinematics: TcpKinematics,
+    options: PlanningOptions,
+) -> None:
+    """Refuse a point at which the arm is not in the posture that it names."""
+    times = motion.path.times
+    for i, posture in sorted(goal.waypoints.postures.items()):
+        row = min(int(np.searchsorted(times, motion.point_times[i])), len(times) - 1)
+        q = vector6(motion.path.q[row].tolist())
+        if clause := kinematics.explain_missed_posture(
+            pose_from_row(targets[i]), posture, q, i, options.tf_prefix
+        ):
+            raise InvalidPosture(
+                f'{point_field(i, "posture")} cannot be reached along the rounded path: {clause}; '
+                'start in that configuration, or use PRIMITIVES with a JOINT segment.'
+            )

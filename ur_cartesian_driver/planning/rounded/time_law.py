@@ -1,0 +1,286 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fastest time law along a path from rest to rest.
+
+With y = ds/dt squared and u = d2s/dt2, a speed limit bounds y, and each acceleration limit bounds
+u between two functions of y: for a joint |q' u + q'' y| <= a, for the tool |x' u + x'' y| <= a.
+The largest speeds from which the arm can still slow down in time are found backwards from the end,
+then the arm accelerates forwards as fast as they allow (Pham and Pham, A new approach to
+time-optimal path parameterization based on reachability analysis, 2018).
+
+This law jumps from one acceleration to another. :class:`TimeLaw` is its moving average over a
+window of time, which bounds the jerk along the path. An average is never above the values in its
+window, so speed limits are kept if each is first lowered to the least one that the window reaches
+(:func:`lowered_over`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
+
+# Halvings that find the largest speed at a place at which any acceleration is allowed.
+_HALVINGS = 30
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LawLimits:
+    """The limits at m places of a path."""
+
+    #: (m,) of ds/dt
+    speed: Floats
+    #: (m, k) of joints: |first u + second y| <= bound
+    first: Floats
+    second: Floats
+    bound: Floats
+    #: (m, 3) vectors of the tool: |first u + second y| <= bound, one entry each.
+    vectors: tuple[tuple[Floats, Floats, Floats], ...]
+
+
+_Row: TypeAlias = tuple[list[tuple[float, float]], list[tuple[float, float, float]]]
+
+
+class _Bounds:
+    """Bounds of u by y: c - d y for joints, sqrt(r^2 - (n y)^2) - m y for vectors."""
+
+    def __init__(self, limits: LawLimits) -> None:
+        self.r: list[Floats] = []
+        self.m: list[Floats] = []
+        self.n: list[Floats] = []
+        for first, second, bound in limits.vectors:
+            square = np.maximum(np.einsum('ij,ij->i', first, first), _TINY**2)
+            along = np.einsum('ij,ij->i', first, second) / square
+            across = np.linalg.norm(second - along[:, None] * first, axis=1)
+            length = np.sqrt(square)
+            self.r.append(bound / length)
+            self.m.append(along)
+            self.n.append(across / length)
+        joints = self._joints_that_matter(limits)
+        first, second, bound = (
+            each[:, joints] for each in (limits.first, limits.second, limits.bound)
+        )
+        size = np.maximum(np.abs(first), _TINY)
+        self.c = bound / size
+        self.d = np.sign(first) * second / size
+
+    def _joints_that_matter(self, limits: LawLimits) -> Flags:
+        """Return which joints may reach their limits within those of the vectors."""
+        y = (limits.speed**2)[:, None]
+        largest = np.minimum.reduce(
+            [np.full(len(y), inf)]
+            + [r + np.abs(m) * y[:, 0] for r, m in zip(self.r, self.m, strict=True)]
+        )
+        reached = np.abs(limits.first) * largest[:, None] + np.abs(limits.second) * y
+        matter: Flags = ~(reached <= limits.bound).all(axis=0)
+        return matter
+
+    def take(self, rows: Indices) -> _Bounds:
+        """Return the bounds at some places."""
+        found = object.__new__(_Bounds)
+        found.c, found.d = self.c[rows], self.d[rows]
+        found.r, found.m, found.n = (
+            [each[rows] for each in one] for one in (self.r, self.m, self.n)
+        )
+        return found
+
+    def row(self, i: int) -> _Row:
+        """Return the numbers of one place: c, d of each joint, and r, m, n of each vector."""
+        joints = list(zip(self.c[i].tolist(), self.d[i].tolist(), strict=True))
+        return joints, [
+            (float(r[i]), float(m[i]), float(n[i]))
+            for r, m, n in zip(self.r, self.m, self.n, strict=True)
+        ]
+
+    def range(self, y: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the largest u at each place (m,); NaN where there is none."""
+        high = (self.c - self.d * y[:, None]).min(axis=1, initial=inf)
+        low = (-self.c - self.d * y[:, None]).max(axis=1, initial=-inf)
+        for r, m, n in zip(self.r, self.m, self.n, strict=True):
+            root = np.sqrt(np.where(n * y <= r, r * r - (n * y) ** 2, np.nan))
+            high, low = np.minimum(high, root - m * y), np.maximum(low, -root - m * y)
+        return low, high
+
+
+def fastest_law(s: Floats, limits: LawLimits) -> Floats:
+    """
+    Return the square of ds/dt at places (m,), 0 at both ends.
+
+    :param s: increasing.
+    """
+    bounds = _Bounds(limits)
+    y = _possible(bounds, limits.speed**2)
+    y[0] = y[-1] = 0.0
+    step = 2.0 * np.diff(s)
+    y = _slow_down(bounds, y, step)
+    return _speed_up(bounds, y, step)
+
+
+def _possible(bounds: _Bounds, y: Floats) -> Floats:
+    """Return the largest y (m,) up to those given at which some u is allowed."""
+    low, high = bounds.range(y)
+    rows = np.flatnonzero(~(low <= high))
+    if not len(rows):
+        return y
+    few = bounds.take(rows)
+    least, largest = np.zeros(len(rows)), y[rows]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (least + largest)
+        low, high = few.range(middle)
+        fits = low <= high
+        least, largest = np.where(fits, middle, least), np.where(fits, largest, middle)
+    found = y.copy()
+    found[rows] = least
+    return found
+
+
+def _slow_down(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
+    """Return the largest y from which the arm can slow down to the next."""
+    low, _ = bounds.range(y)
+    steep = np.flatnonzero(y[:-1] + step * low[:-1] > y[1:])
+    result: list[float] = y.tolist()
+    steps = step.tolist()
+    done = len(result)
+    for start in steep[::-1].tolist():
+        i = start
+        while 0 <= i < done:
+            lower = _largest_before(bounds.row(i), steps[i], result[i + 1])
+            if lower >= result[i]:
+                break
+            result[i] = lower
+            i -= 1
+        done = min(done, i + 1) if i < start else done
+    return np.array(result)
+
+
+def _speed_up(bounds: _Bounds, y: Floats, step: Floats) -> Floats:
+    """Return the law that speeds up as fast as possible."""
+    _, high = bounds.range(y)
+    steep = np.flatnonzero(y[:-1] + step * high[:-1] < y[1:])
+    result: list[float] = y.tolist()
+    steps = step.tolist()
+    last = len(result) - 1
+    done = -1
+    for start in steep.tolist():
+        i = start
+        if i <= done:
+            continue
+        while i < last:
+            reached = max(result[i] + steps[i] * _largest_u(bounds.row(i), result[i]), 0.0)
+            if reached >= result[i + 1]:
+                break
+            result[i + 1] = reached
+            i += 1
+        done = i - 1
+    return np.array(result)
+
+
+def _largest_u(row: _Row, y: float) -> float:
+    joints, vectors = row
+    high = min([c - d * y for c, d in joints], default=inf)
+    for r, m, n in vectors:
+        high = min(high, sqrt(max(r * r - n * n * y * y, 0.0)) - m * y)
+    return high
+
+
+def _largest_before(row: _Row, step: float, after: float) -> float:
+    """Return the largest y from which a step leads to ``after`` or less."""
+    joints, vectors = row
+    largest = inf
+    for c, d in joints:
+        rate = 1.0 - step * d
+        if rate > 0.0:
+            largest = min(largest, (after + step * c) / rate)
+    for r, m, n in vectors:
+        # (1 - step m) y - step sqrt(r^2 - n^2 y^2) <= after
+        a, b = 1.0 - step * m, step * n
+        square = a * a + b * b
+        root = square * step * step * r * r - b * b * after * after
+        if root >= 0.0 and square > 0.0:
+            largest = min(largest, (a * after + sqrt(root)) / square)
+    return max(largest, 0.0)
+
+
+class PathTimes(NamedTuple):
+    """Place on the path, its rate and second rate, at m times."""
+
+    s: Floats
+    v: Floats
+    a: Floats
+
+
+class TimeLaw:
+    """
+    The moving average of a law whose acceleration is constant between places. Immutable.
+
+    :param s: the places (m,), increasing.
+    :param y: the square of ds/dt there, 0 at both ends only.
+    :param window: over which it is averaged [s].
+    """
+
+    def __init__(self, s: Floats, y: Floats, window: float) -> None:
+        """Integrate."""
+        v, ds = np.sqrt(y), np.diff(s)
+        dt = 2.0 * ds / np.maximum(v[1:] + v[:-1], _TINY)
+        self.window = window
+        #: When each place is passed before the law is averaged [s].
+        self.times = np.concatenate([[0.0], np.cumsum(dt)])
+        self.duration = float(self.times[-1]) + window
+        self._s, self._v = s, v
+        self._a = np.append(np.diff(v) / dt, 0.0)
+        travel = dt * (s[:-1] + dt * (v[:-1] / 2.0 + dt * self._a[:-1] / 6.0))
+        self._integral = np.concatenate([[0.0], np.cumsum(travel)])
+
+    def _at(self, t: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the integral of s over time, s, and ds/dt before averaging, at any times."""
+        inside = np.clip(t, 0.0, self.times[-1])
+        row = np.clip(np.searchsorted(self.times, inside, side='right') - 1, 0, len(self._s) - 2)
+        h = inside - self.times[row]
+        s, v, a = self._s[row], self._v[row], self._a[row]
+        integral = self._integral[row] + h * (s + h * (v / 2.0 + h * a / 6.0))
+        beyond = t - inside
+        place = s + h * (v + h * a / 2.0)
+        return integral + beyond * place, place, np.where(beyond == 0.0, v + h * a, 0.0)
+
+    def at(self, t: Floats) -> PathTimes:
+        """Return the averaged law at times (m,) from 0 to the duration [s]."""
+        before, after = self._at(t - self.window), self._at(t)
+        s, v, a = ((b - a) / self.window for a, b in zip(before, after, strict=True))
+        return PathTimes(np.clip(s, self._s[0], self._s[-1]), v, a)
+
+    def times_of(self, s: Floats) -> Floats:
+        """Return when the averaged law passes places (m,) [s], to a microsecond."""
+        low = np.interp(s, self._s, self.times)
+        high = low + self.window
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            is_late = self.at(middle).s >= s
+            low, high = np.where(is_late, low, middle), np.where(is_late, middle, high)
+        found: Floats = 0.5 * (low + high)
+        return found
+
+
+def lowered_over(values: Floats, times: Floats, reach: float) -> Floats:
+    """
+    Return the least of the values (m,) within a reach of each time [s] before and after.
+
+    :param times: (m,) not decreasing [s].
+    """
+    low = np.searchsorted(times, times - reach, side='left')
+    high = np.searchsorted(times, times + reach, side='right')
+    # The least of a range is that of two ranges of 2^k which cover it.
+    result = np.empty_like(values)
+    level = np.floor(np.log2(high - low)).astype(np.intp)
+    table, size = values, 1
+    for k in range(int(level.max()) + 1):
+        rows = np.flatnonzero(level == k)
+        result[rows] = np.minimum(table[low[rows]], table[high[rows] - size])
+        table = np.minimum(table[: max(len(table) - size, 0)], table[size:])
+        size *= 2
+    return result
