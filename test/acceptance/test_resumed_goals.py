@@ -131,7 +131,14 @@ def spline_seam():
     )
 
 
-SEAMS = {'by speed': seam, 'by time': timed_seam, 'spline': spline_seam}
+def rounded_seam():
+    """Return the seam with rounded corners in place of the blends."""
+    goal = seam()
+    segments = tuple(replace(segment, blend_radius=0.0) for segment in goal.segments)
+    return replace(goal, segments=segments, corner_deviation=0.001)
+
+
+SEAMS = {'by speed': seam, 'by time': timed_seam, 'spline': spline_seam, 'rounded': rounded_seam}
 STOPS = ('cancel', 'protective_stop')
 
 

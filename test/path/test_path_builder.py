@@ -176,6 +176,44 @@ def test_settings_of_the_whole_path():
     )
 
 
+def test_corners_are_those_of_the_path_or_of_a_motion():
+    path = START.by(dx=0.1).by(dy=0.1, corner_deviation=mm(0.1), corner_angle=0.01).by(dx=0.1)
+    path = path.rounded(mm(0.2), deg(2))
+    goal = path.goal()
+    assert (goal.corner_deviation, goal.corner_angle) == (0.0002, deg(2))
+    assert [segment.corner_deviation for segment in goal.segments] == [0.0, 0.0001, 0.0]
+    assert [segment.corner_angle for segment in goal.segments] == [0.0, 0.01, 0.0]
+    assert path.rounded(0.0).goal().corner_deviation == 0.0
+    feed = START.at(corner_deviation=mm(0.1)).by(dx=0.1).at(corner_deviation=0.0).by(dy=0.1)
+    assert [segment.corner_deviation for segment in feed.goal().segments] == [0.0001, 0.0]
+
+
+def test_a_changed_path_has_its_corners():
+    leg = START.by(dx=0.1).by(dy=0.1, corner_deviation=mm(0.1)).by(dx=0.1).rounded(mm(0.2))
+    for path, expected in (
+        (leg.transformed(Pose((0.0, 0.0, 0.1))), [0.0, 0.0001, 0.0]),
+        (leg.offset(dz=0.1, of_tool=True), [0.0, 0.0001, 0.0]),
+        # A corner belongs to the point at which it is.
+        (leg.reversed(), [0.0001, 0.0, 0.0]),
+        (leg.then(Path(leg.end).by(dz=0.1)), [0.0, 0.0001, 0.0, 0.0]),
+        (leg.repeated(2, dz=0.01), [0.0, 0.0001, 0.0, 0.0, 0.0, 0.0001, 0.0]),
+        (Path.from_yaml(leg.to_yaml()), [0.0, 0.0001, 0.0]),
+    ):
+        goal = path.goal()
+        assert goal.corner_deviation == 0.0002
+        assert [segment.corner_deviation for segment in goal.segments] == expected
+    with pytest.raises(InvalidGoal, match='joins paths of different corner_deviation'):
+        leg.then(Path(leg.end).by(dz=0.1).rounded(mm(0.1)))
+
+
+def test_a_rounded_process_needs_no_blend():
+    path = START.at(speed=0.05).process((-0.5, 0.1, 0.5)).process((-0.4, 0.1, 0.5))
+    assert path.goal().segments[0].blend_radius == 0.002
+    assert path.rounded(mm(0.1)).goal().segments[0].blend_radius == 0.0
+    own = START.process((-0.5, 0.1, 0.5), corner_deviation=mm(0.1)).process((-0.4, 0.1, 0.5))
+    assert own.goal().segments[0].blend_radius == 0.0
+
+
 def test_frames_are_found_by_their_names():
     part = Pose((0.1, 0.2, 0.3), axis_angle(Z, 1.0))
     nozzle = Pose((0.0, 0.0, 0.1))
@@ -340,6 +378,20 @@ def test_a_weave_swings_evenly_along_a_line_and_an_arc():
         (
             lambda: START.by(dx=0.1).set(TORCH, True).reversed(),
             'reversed() has outputs, inputs, payloads or presses, which have no reverse',
+        ),
+        (
+            lambda: START.rounded(0.2),
+            'rounded(): deviation is 0.2 m, but must be 0 (corners as they are) or from 2e-05 to '
+            '0.1 m; mm() converts.',
+        ),
+        (
+            lambda: START.rounded(mm(0.2), 1.5),
+            'rounded(): angle is 1.5 rad, but must be 0 (0.02 rad) or from 0.001 to 0.5 rad; ',
+        ),
+        (lambda: START.rounded(TEXT), "rounded() has the deviation 'abc'; give a number."),
+        (
+            lambda: START.by(dx=0.1, corner_deviation=0.2),
+            'point 0 (line).corner_deviation is 0.2 m, but must be 0',
         ),
         (lambda: START.repeated(0), 'repeated() is asked for 0 times'),
         (lambda: START.by(dx=0.1).weave(0.01, 0.1), 'weave() needs a speed and a wavelength'),

@@ -128,10 +128,10 @@ def paths(draw, start=True, outputs=True, reversible=False):
     return path
 
 
-@given(paths(), st.booleans(), st.floats(-1.0, 5.0))
+@given(paths(), st.booleans(), st.floats(-1.0, 5.0), st.floats(2e-5, 0.1), st.floats(1e-3, 0.5))
 @few
-def test_a_path_survives_goal_message_and_file(path, keep_open, time):
-    path = path.tolerances(time=time).safe(digital(7), False, restore=True)
+def test_a_path_survives_goal_message_and_file(path, keep_open, time, corner, angle):
+    path = path.tolerances(time=time).safe(digital(7), False, restore=True).rounded(corner, angle)
     path = path.keep_open() if keep_open else path
     goal = path.goal()
     assert Path.from_goal(path._table()).goal() == goal

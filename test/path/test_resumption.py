@@ -12,6 +12,8 @@ from math import nan
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
@@ -33,12 +35,18 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.path import Path, PathPlace, resume
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.stop_prediction import state_at_rest
+from ur_cartesian_driver.sim.simulator_config import HOME
 
 LINEAR, JOINT, PROCESS = SegmentType.LINEAR, SegmentType.JOINT, SegmentType.PROCESS
 FLAT = (0.0, 0.0, 0.0, 1.0)
 #: Ten centimetres from point to point.
 CORNERS = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.1, 0.1)
 PINNED = Posture(names=('elbow_joint',), values=(1.0,))
+ARM = Arm(robot_model('ur5e'))
+STATE = state_at_rest(ARM, HOME)
+HERE = STATE.actual_tcp_pose
 
 
 def goal(*segments, times=(), **fields):
@@ -300,6 +308,18 @@ def test_a_place_on_the_rest_is_a_place_on_the_whole():
 def test_what_cannot_be_resumed_is_refused_with_a_sentence(of, place, numbers, text):
     with pytest.raises(InvalidGoal, match=text):
         resume(of, place, **numbers)
+
+
+@pytest.mark.parametrize('approach', [0.02, 0.0])
+@pytest.mark.parametrize('own', [False, True], ids=['of the goal', 'of a point'])
+def test_a_rounded_path_resumes_by_lines(own, approach):
+    path = Path(HERE).at(speed=0.1, acceleration=0.5).by(dy=0.05)
+    path = path.by(dx=0.05, corner_deviation=2e-4 if own else 0.0).by(dy=-0.05)
+    path = path if own else path.rounded(2e-4)
+    for place in (at(1, 0.5), at(2, 0.5)):
+        goal = path.resumed(place, overlap=0.01, approach=approach).goal()
+        assert {segment.type for segment in goal.segments} == {LINEAR}
+        assert plan(goal, STATE, ARM, PlanningOptions()).report[0].startswith('point 0: rounded')
 
 
 def test_a_path_resumes_as_a_path():

@@ -28,6 +28,8 @@ from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import (
+    CORNER_ANGLE,
+    CORNER_DEVIATION,
     Goal,
     OnPathTolerance,
     PathOffset,
@@ -47,7 +49,13 @@ from ur_cartesian_driver.path.path_motions import (
     MAX_COORDINATE_OF_BASE,
     mixed_spline,
 )
-from ur_cartesian_driver.path.path_numbers import amount, NANOSECONDS, unit_quaternion, vector
+from ur_cartesian_driver.path.path_numbers import (
+    amount,
+    any_number,
+    NANOSECONDS,
+    unit_quaternion,
+    vector,
+)
 from ur_cartesian_driver.path.path_points import (
     backwards,
     is_same,
@@ -130,6 +138,31 @@ class Path(PathWithEvents):
     def steady(self, min_fraction: float = 0.95) -> Path:
         """Demand a fraction (0 to 1) of the asked speed everywhere; a slower path is refused."""
         return self._with(_settings=replace(self._settings, min_speed_fraction=min_fraction))
+
+    def rounded(self, deviation: float, angle: float = 0.0) -> Path:
+        """
+        Round the corners of lines and arcs, so that the arm passes their points without a stop.
+
+        The planned path is nowhere farther from the lines and arcs than the deviation, and slows
+        down where it has to. A motion can have a corner of its own at its end:
+        ``line(..., corner_deviation=mm(0.1))``.
+
+        :param deviation: [m]; 0 = only motions with their own have rounded corners.
+        :param angle: how far the tool may be turned from its programmed orientation [rad]; 0 =
+            0.02.
+        :raises InvalidGoal: a number is out of its range.
+        """
+        for name, value, bounds, remedy in (
+            ('deviation', deviation, CORNER_DEVIATION, 'mm() converts'),
+            ('angle', angle, CORNER_ANGLE, 'deg() converts'),
+        ):
+            number = any_number('rounded()', name, value)
+            if not bounds.holds(number):
+                raise InvalidGoal(f'rounded(): {name}', bounds.refusal(number)[0], remedy)
+        settings = replace(
+            self._settings, corner_deviation=float(deviation), corner_angle=float(angle)
+        )
+        return self._with(_settings=settings)
 
     def path_offset(
         self,

@@ -43,9 +43,12 @@ def goal_of_points(
         point.duration + rest if point.duration else 0
         for point, rest in zip(points, rests, strict=False)
     )
+    is_rounded = settings.corner_deviation or any(
+        point.segment.corner_deviation for point in points
+    )
     segments = [
         replace(point.segment, blend_radius=_process_blend(points, i, start))
-        if point.auto_blend
+        if point.auto_blend and not is_rounded
         else point.segment
         for i, point in enumerate(points)
     ]

@@ -36,7 +36,12 @@ from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable
 from ur_cartesian_driver.motion.goal.known_frames import FRAMES_OF_TOOL
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
-from ur_cartesian_driver.planning.request.goal_fields import is_timed, resolve_execution_mode
+from ur_cartesian_driver.planning.request.goal_fields import (
+    is_rounded,
+    is_spline,
+    is_timed,
+    resolve_execution_mode,
+)
 from ur_cartesian_driver.planning.request.point_events.goal_rest import GoalRest, NO_FRACTION
 from ur_cartesian_driver.planning.request.point_events.registry import EVENT_KINDS
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
@@ -113,7 +118,9 @@ class _Resumption:
         _check(goal, place, overlap, approach)
         table = goal_table(replace(goal, T_base_frame=IDENTITY))
         self.timed, self.mode = is_timed(table), resolve_execution_mode(table)
-        self.spline = _Spline(table, start) if self.mode.traits.is_spline else None
+        self.spline = _Spline(table, start) if is_spline(table) else None
+        self.rounded = is_rounded(table)
+        self.moves_joints = self.spline is None and not self.rounded
         self.stopped = place.point + place.fraction
         self.begin = self._begin(place, overlap)
 
@@ -153,6 +160,8 @@ class _Resumption:
         rest = GoalRest(
             begin=self.begin, stopped=self.stopped, places=places, time_since=self._time_since
         )
+        if self.rounded and not self.goal.corner_deviation:
+            segments = self._with_a_corner(segments)
         left: dict[str, Any] = {
             kind.field: tuple(kind.left(kind.of(self.goal), rest)) for kind in EVENT_KINDS.values()
         }
@@ -169,6 +178,13 @@ class _Resumption:
             begin=_path_place(self.begin, len(self.points)),
             places=tuple(places),
         )
+
+    def _with_a_corner(self, segments: Sequence[Segment]) -> Sequence[Segment]:
+        """Return segments of which one has a corner; at the last point it changes nothing."""
+        if any(segment.corner_deviation for segment in segments):
+            return segments
+        largest = max(segment.corner_deviation for segment in self.segments)
+        return [*segments[:-1], replace(segments[-1], corner_deviation=largest)]
 
     # -- where to begin --------------------------------------------------------------------------
 
@@ -274,10 +290,10 @@ class _Resumption:
         if self.approach > 0.0:
             poses.insert(0, there @ Pose((0.0, 0.0, -self.approach)))
         kinds = [SegmentType.LINEAR] * len(poses)
-        if self.spline is None and (len(poses) > 1 or self.goal.min_speed_fraction):
+        if self.moves_joints and (len(poses) > 1 or self.goal.min_speed_fraction):
             kinds[0] = SegmentType.JOINT
-        if self.goal.min_speed_fraction and self.spline is None:
-            kinds[-1] = SegmentType.JOINT  # a stop between lines would miss min_speed_fraction
+        if self.moves_joints and self.goal.min_speed_fraction:
+            kinds[-1] = SegmentType.JOINT  # a rest between lines would miss min_speed_fraction
         cut = self.segments[k]
         free = Segment(free_axis=cut.free_axis, free_min=cut.free_min, free_max=cut.free_max)
         return (
