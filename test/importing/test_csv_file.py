@@ -61,7 +61,7 @@ def test_a_scanner_with_normals(tmp_path):
     )
     assert [r.text() for r in found.remarks] == [
         "line 3: column 'intensity': a path has no such quantity",
-        'the arm stops at 2 inner points: give a blend if it should not',
+        'the arm stops at 2 inner points: give a blend or a corner if it should not',
     ]
 
 

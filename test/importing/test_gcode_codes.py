@@ -31,6 +31,9 @@ EFFECTS: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
     # A quarter and a whole turn, 450 degrees in three arcs.
     'P': ('G2 X2 Y2 I1 P2', [HERE, (2.0 + 0.75**0.5, 1.5, 1)]),
     'F': ('G1 X3 F1200', [HERE, (3, 1, 1)]),
+    'G61': ('G61\nX3', [HERE, (3, 1, 1)]),
+    'G61.1': ('G61.1 X3', [HERE, (3, 1, 1)]),
+    'G64 P': ('G64 P0.1\nX3', [HERE, (3, 1, 1)]),
     'G17': ('G18\nG17 G2 X2 Y2 I1', [HERE, (2, 2, 1)]),
     'G18': ('G18 G2 X2 Z2 K1', [HERE, (2, 1, 2)]),
     'G19': ('G19 G2 Y2 Z2 J1', [HERE, (1, 2, 2)]),

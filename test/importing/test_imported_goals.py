@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of each format become goals that can be planned; two are carried out by the simulator."""
 
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
+from curve_distance import distances
 import numpy as np
 import pytest
 from robot_in_memory import RobotInMemory
@@ -86,6 +88,59 @@ def test_a_program_with_stops_is_planned(tmp_path, robot):
     segments = planned(goal, robot).segments
     assert len(segments) == len(goal.waypoints) + 3  # the wait, and two rests
     assert float(segments[3].duration) == pytest.approx(2.0, abs=1e-6)
+
+
+@pytest.mark.parametrize('name', ['a.csv', 'a.nc', 'a.yaml'])
+def test_the_corners_of_a_file_are_rounded(tmp_path, robot, name):
+    (tmp_path / name).write_text(FILES[name])
+    options = replace(options_for(name), blend=0.0, corner=1e-4)
+    goal = import_file(tmp_path / name, options).goal
+    assert goal.corner_deviation == 1e-4
+    assert not goal.segments.corner_deviations.any()
+    assert not goal.segments.blend_radii.any()
+    places = planned(goal, robot).reference.poses[:, :3]
+    off = distances(goal.waypoints.poses[:-1, :3], [places])
+    assert (off > 1e-6).all()
+    assert (off <= 1e-4).all()
+
+
+def test_only_lines_and_arcs_have_corners(tmp_path):
+    (tmp_path / 'a.script').write_text(FILES['a.script'])
+    with pytest.raises(BrokenFile) as caught:
+        import_file(tmp_path / 'a.script', ImportOptions(corner=1e-4))
+    assert str(caught.value) == (
+        'line 1: the motion is JOINT, and only lines and arcs have rounded corners; give a blend '
+        'in place of corner.'
+    )
+
+
+def test_a_corner_takes_the_place_of_blends_in_the_file(tmp_path):
+    (tmp_path / 'a.csv').write_text('x [mm],y [mm],z [mm],blend [mm]\n0,0,0,0\n9,0,0,2\n9,9,0,0\n')
+    found = import_file(tmp_path / 'a.csv', ImportOptions(corner=1e-4))
+    assert not found.goal.segments.blend_radii.any()
+    assert 'line 3: blend: its corner is rounded in its place' in said(found)
+
+
+def test_a_corner_takes_the_place_of_times(tmp_path):
+    (tmp_path / 'a.csv').write_text(TIMED)
+    found = import_file(tmp_path / 'a.csv', ImportOptions(corner=1e-4))
+    assert not found.goal.waypoints.times.any()
+    assert (
+        'the times of the points: a path with rounded corners has speeds in their place'
+        in said(found)
+    )
+
+
+def test_a_format_can_have_corners():
+    into = PathCollector()
+    for line, (x, corner) in enumerate(((0.0, None), (0.1, 2e-4), (0.2, 0.0), (0.3, None)), 1):
+        into.add(line, (x, 0.0, 0.0), corner=corner)
+    found = goal_of_path(into.path(), ImportOptions(), into.remarks)
+    assert found.goal.segments.corner_deviations.tolist() == [0.0, 2e-4, 0.0, 0.0]
+    assert 'the arm stops at 2 inner points: give a corner if it should not' in said(found)
+    found = goal_of_path(into.path(), ImportOptions(blend=0.01), into.remarks)
+    assert not found.goal.segments.corner_deviations.any()
+    assert 'lines 2-3: a corner: the option blend takes its place' in said(found)
 
 
 @pytest.mark.parametrize('name', ['a.nc', 'a.script'])
@@ -310,6 +365,24 @@ def test_a_long_goal_is_written_packed_and_read_exactly(tmp_path):
     assert (read.segments.blend_radii == direct.segments.blend_radii).all()
 
 
+def test_the_command_takes_a_corner_or_a_blend(tmp_path, capsys):
+    (tmp_path / 'a.nc').write_text(FILES['a.nc'].replace('G1 X60', 'G64 P0.1 G1 X60'))
+    goal = tmp_path / 'goal.yaml'
+    command = ['import', str(tmp_path / 'a.nc'), '-o', str(goal), '--corner', '0.05mm']
+    assert main(command) == 0
+    read = goal_from_fields(read_goal_file(goal))
+    assert read.corner_deviation == pytest.approx(5e-5)
+    assert read.segments.corner_deviations.tolist() == pytest.approx([0.0, 0.0, 1e-4, 1e-4, 1e-4])
+    assert main([*command, '--blend', '1mm']) == 1
+    assert 'blend and corner are two ways past a point; give one of them' in (
+        capsys.readouterr().err
+    )
+    assert main([*command[:-1], '0.01mm']) == 1
+    assert 'corner is 1e-05 m, but must be 0 (corners as they are) or from 2e-05 to 0.1 m' in (
+        capsys.readouterr().err
+    )
+
+
 def test_the_command_ends_with_one_sentence_for_a_broken_file(tmp_path, capsys):
     (tmp_path / 'a.csv').write_text('x,y,z\n')
     assert main(['import', str(tmp_path / 'a.csv')]) == 1
@@ -318,9 +391,10 @@ def test_the_command_ends_with_one_sentence_for_a_broken_file(tmp_path, capsys):
 
 @pytest.mark.parametrize('length', ['1', '1 km', 'mm', '-1mm'])
 def test_a_length_without_a_unit_is_refused(length, capsys):
-    with pytest.raises(SystemExit):
-        main(['import', 'a.csv', '--blend', length])
-    assert '--blend' in capsys.readouterr().err
+    for option in ('--blend', '--corner'):
+        with pytest.raises(SystemExit):
+            main(['import', 'a.csv', option, length])
+        assert option in capsys.readouterr().err
 
 
 def corners(points):

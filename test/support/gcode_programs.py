@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.geometry.arrays import Floats
 #: Words beside a code that is left out, where its own name is not enough.
 WORDS = {
     'G4': 'P2 X3',
-    'G64': 'P0.1 Q0.2',
+    'G64 Q': '0.2 P0.1',
     'G5.1 Q': '1',
     'G8 P': '1',
     'G187': 'P2',

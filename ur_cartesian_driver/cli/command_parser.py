@@ -420,6 +420,7 @@ def _add_shape(command: CommandParser) -> None:
     """Add the lengths by which an import changes the shape of a path."""
     for name, default, text in (
         ('blend', 0.0, 'at inner points, like 1mm'),
+        ('corner', 0.0, 'round corners, nowhere farther from the path than this, like 0.05mm'),
         (
             'simplify',
             0.0,

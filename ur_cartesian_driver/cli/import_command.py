@@ -63,6 +63,7 @@ def options_of(arguments: argparse.Namespace) -> ImportOptions:
         acceleration=arguments.acceleration,
         approach_time=arguments.approach_time,
         blend=arguments.blend,
+        corner=arguments.corner,
         simplify=arguments.simplify,
         tolerance=max(arguments.tolerance, 1e-6),
         lift=arguments.lift,

@@ -12,7 +12,7 @@ import re
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind
+from ur_cartesian_driver.motion.goal.goal import CORNER_DEVIATION, IOCommand, OutputKind
 from ur_cartesian_driver.motion.goal.output_names import output_fault, output_name
 
 #: Length units [m].
@@ -134,7 +134,10 @@ class ImportOptions:
     approach_time: float | None = None
     #: Blend radius [m] at inner points for which the file has none; smaller where lines are short.
     blend: float = 0.0
-    #: Largest distance [m] of the simplified path from the file's path; 0 = all points are kept.
+    #: How far the path may be beside the corners of lines and arcs [m] unless the file has it; 0 =
+    #: the arm stops there, or passes with a blend.
+    corner: float = 0.0
+    #: Largest distance of the simplified path from that of the file [m]; 0 = all points are kept.
     simplify: float = 0.0
     #: Largest distance [m] between a curve that arcs cannot represent and the lines in its place.
     tolerance: float = 5e-5
@@ -146,3 +149,14 @@ class ImportOptions:
     arm: Arm = field(default_factory=lambda: Arm(robot_model('ur5e')))
     #: The active TCP for which a file's joint positions are meant.
     T_flange_tcp: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        """
+        Refuse a corner that no goal can have.
+
+        :raises ValueError: it is out of its range, or a blend is given, too.
+        """
+        if not CORNER_DEVIATION.holds(self.corner):
+            raise ValueError(f'corner {CORNER_DEVIATION.refusal(self.corner)[0]}')
+        if self.corner and self.blend:
+            raise ValueError('blend and corner are two ways past a point; give one of them')

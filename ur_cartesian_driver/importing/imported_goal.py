@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
     normalized_rows,
     transform_rows,
 )
-from ur_cartesian_driver.motion.goal.goal import SegmentType
+from ur_cartesian_driver.motion.goal.goal import CORNER_DEVIATION, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import (
     GoalTable,
     rows_where,
@@ -49,6 +49,13 @@ _MIN_BLEND_TIME, _UNKNOWN_SPEED = 0.01, 0.25
 _MIN_BLEND = 1e-4
 #: Smallest height [m] of an arc: instead of a flatter arc the robot moves in a straight line.
 _MIN_ARC_HEIGHT = 1e-5
+#: The types of motions whose corners can be rounded.
+_ROUNDED_TYPES = (
+    SegmentType.AUTO,
+    SegmentType.LINEAR,
+    SegmentType.PROCESS,
+    SegmentType.CIRCULAR,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +75,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
     :raises BrokenFile: a point is too far away to be right, or lacks the normal that the options
         require, or has a normal of length 0.
     """
-    path = _scaled(path, options.scale)
+    path = _rounded(_scaled(path, options.scale), options, remarks)
     path = replace(path, quaternions=_orientations(path, options, remarks))
     path, rests = _without_repeated(path, remarks)
     path = with_times(path, rests, options, remarks)
@@ -97,10 +104,12 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
             if values.any():
                 remarks.add(0, f'the {what} of the points', 'their times are kept')
                 values[:] = 0.0
+    corner = _common_corner(path, options)
     segments = replace(
         SegmentRows.plain(len(path)),
         types=path.types,
         blend_radii=_blends(path, options, speeds, remarks),
+        corner_deviations=np.where(path.corners != corner, np.nan_to_num(path.corners), 0.0),
         dwells=np.nan_to_num(path.dwells),
         velocities=speeds,
         accelerations=accelerations,
@@ -120,6 +129,7 @@ def goal_of_path(path: ImportedPath, options: ImportOptions, remarks: ImportNote
         ),
         segments=segments,
         frame_id=options.frame or path.frame,
+        corner_deviation=corner,
         io_commands=path.outputs,
         input_waits=path.waits,
     )
@@ -133,6 +143,7 @@ def _scaled(path: ImportedPath, scale: float) -> ImportedPath:
             positions=path.positions * scale,
             vias=path.vias * scale,
             blends=path.blends * scale,
+            corners=path.corners * scale,
         )
     far = np.abs(path.positions).max(axis=1) > MAX_DISTANCE
     if far.any() or not np.isfinite(path.positions).all():
@@ -143,6 +154,46 @@ def _scaled(path: ImportedPath, scale: float) -> ImportedPath:
             'from the origin; check the unit, or give a scale',
         )
     return path
+
+
+def _rounded(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) -> ImportedPath:
+    """
+    Return the path with a corner at each point if it has rounded corners, else with none.
+
+    :raises BrokenFile: a motion that is no line or arc leads to a point.
+    """
+    corners, lines = path.corners.copy(), path.lines
+    if options.blend:
+        for row in rows_where(corners >= 0.0):
+            remarks.add(int(lines[row]), 'a corner', 'the option blend takes its place')
+        corners[:] = np.nan
+    least, most = CORNER_DEVIATION.low, CORNER_DEVIATION.high
+    rest = 'the option corner takes its place' if options.corner else 'the arm stops there'
+    for row in rows_where((corners > 0.0) & (corners < least)):
+        what = f'a corner of {1e3 * corners[row]:.3g} mm'
+        remarks.add(int(lines[row]), what, f'less than {1e3 * least:g} mm, {rest}')
+        corners[row] = np.nan
+    for row in rows_where(corners > most):
+        what = f'a corner of {1e3 * corners[row]:.4g} mm'
+        remarks.add(int(lines[row]), what, f'made smaller, {1e3 * most:g} mm')
+        corners[row] = most
+    corners = np.where(np.isnan(corners), options.corner, corners)
+    if not (corners > 0.0).any():
+        return replace(path, corners=np.full(len(path), np.nan))
+    for row in rows_where(~np.isin(path.types, _ROUNDED_TYPES))[:1]:
+        raise BrokenFile(
+            int(lines[row]),
+            f'the motion is {SegmentType(path.types[row]).name}, and only lines and arcs have '
+            'rounded corners; give a blend in place of corner',
+        )
+    for row in rows_where(path.blends > 0.0):
+        remarks.add(int(lines[row]), 'blend', 'its corner is rounded in its place')
+    return replace(path, corners=corners)
+
+
+def _common_corner(path: ImportedPath, options: ImportOptions) -> float:
+    """Return the corner of the goal [m], from which points can differ, but not to a stop."""
+    return options.corner if (path.corners > 0.0).all() else 0.0
 
 
 def _position(values: Floats) -> str:
@@ -311,7 +362,10 @@ def _lifted(path: ImportedPath, options: ImportOptions, remarks: ImportNotes) ->
             name: getattr(path, name)[order]
             for name in ('types', 'travels', 'lifts', 'arc_modes', 'vias', 'normals')
         },
-        **{name: getattr(path, name)[order] for name in ('speeds', 'accelerations', 'blends')},
+        **{
+            name: getattr(path, name)[order]
+            for name in ('speeds', 'accelerations', 'blends', 'corners')
+        },
         times=np.full(len(order), np.nan),
         dwells=np.where(np.isin(np.arange(len(order)), last), path.dwells[order], np.nan),
         lines=np.where(raised, 0, path.lines[order]),
@@ -344,7 +398,12 @@ def _accelerations(path: ImportedPath, options: ImportOptions) -> Floats:
 def _blends(
     path: ImportedPath, options: ImportOptions, speeds: Floats, remarks: ImportNotes
 ) -> Floats:
-    """Return blend radii (n,) [m] that fit between the points; 0 = the arm stops at the point."""
+    """Return blend radii (n,) that fit between the points [m]; 0 = none fits, the arm stops."""
+    if path.is_rounded:
+        if stops := int((path.corners[:-1] == 0.0).sum()):
+            why = 'the file says so' if options.corner else 'give a corner if it should not'
+            remarks.add(0, f'the arm stops at {stops} inner points', why)
+        return np.zeros(len(path))
     radii = np.where(np.isnan(path.blends), options.blend, path.blends)
     radii[path.rests] = 0.0
     radii[-1] = 0.0
@@ -366,5 +425,6 @@ def _blends(
         remarks.add(int(path.lines[row]), 'blend', 'none fits, the arm stops there')
     stops = int((fits[:-1] == 0.0).sum())
     if stops and not options.blend and np.isnan(path.blends).any():
-        remarks.add(0, f'the arm stops at {stops} inner points', 'give a blend if it should not')
+        why = 'the file says so' if options.corner else 'give a blend or a corner if it should not'
+        remarks.add(0, f'the arm stops at {stops} inner points', why)
     return fits

@@ -32,6 +32,7 @@ _OPTIONAL = {
     'speeds': 1,
     'accelerations': 1,
     'blends': 1,
+    'corners': 1,
     'times': 1,
     'dwells': 1,
 }
@@ -144,6 +145,8 @@ class ImportedPath:
     speeds: Floats
     accelerations: Floats
     blends: Floats
+    #: How far the path may be beside the corner at the point; 0 = the arm stops there.
+    corners: Floats
     times: Floats
     #: (n,) time for which the arm rests at the row's point.
     dwells: Floats
@@ -163,6 +166,11 @@ class ImportedPath:
         found = self.dwells > 0.0
         found[[wait.waypoint for wait in self.waits]] = True
         return found
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether the path may be beside a corner."""
+        return bool((self.corners > 0.0).any())
 
     def take(self, rows: Int64s) -> ImportedPath:
         """Return some rows, in rising order; outputs of other rows move to the kept row before."""
@@ -225,6 +233,7 @@ class PathCollector:
         speed: float | None = None,
         acceleration: float | None = None,
         blend: float | None = None,
+        corner: float | None = None,
         time: float | None = None,
         dwell: float | None = None,
     ) -> None:
@@ -239,6 +248,7 @@ class PathCollector:
             ('speeds', speed),
             ('accelerations', acceleration),
             ('blends', blend),
+            ('corners', corner),
             ('times', time),
             ('dwells', dwell),
         ):

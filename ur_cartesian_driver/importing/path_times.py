@@ -45,6 +45,8 @@ def with_times(
         why = 'a speed is given'
     elif options.simplify:
         why = 'simplify merges points, whose times would no longer fit'
+    elif path.is_rounded:
+        why = 'a path with rounded corners has speeds in their place'
     elif wrong:
         line = int(path.lines[wrong[0] + 1])
         why = f'they do not rise at {f"line {line}" if line else f"point {wrong[0] + 1}"}'

@@ -10,8 +10,8 @@ with the left-out points, and with the place of each short line that is nearest 
 centre. Along the old path the angle about that centre only grows, so every place of the arc has a
 place of the old path beside it.
 
-A point stays if it has an output, a posture or a rest, if the speed or acceleration changes there,
-or if the tool turns unevenly.
+A point stays if it has an output, a posture, another speed or another corner, or if the tool
+turns unevenly there.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def _ends_of_runs(path: ImportedPath) -> list[int]:
     lines = np.isin(path.types, (SegmentType.AUTO, SegmentType.LINEAR)) & ~path.lifts
     stays |= ~lines
     stays[:-1] |= ~lines[1:]
-    for column in (path.speeds, path.accelerations, path.travels.astype(float)):
+    for column in (path.speeds, path.accelerations, path.corners, path.travels.astype(float)):
         same = (column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1]))
         stays[:-1] |= ~same
     for row in (*path.postures, *(output.waypoint for output in path.outputs)):

@@ -76,6 +76,8 @@ _HOME = 'the place of the machine to which it goes is not known'
 _NO_TOOLS = 'tools are not changed'
 _NO_EXTRUDER = 'there is no extruder'
 _IN_TCP = 'the length of the tool is in the active TCP'
+#: The group of the codes that say whether corners may be rounded.
+PATH_CONTROL = 'path control'
 NO_OUTPUT = 'no output is given for it'
 _PRINTER = 'a command of a printer'
 _CYCLE = 'a cycle; let the CAM write single moves'
@@ -91,12 +93,19 @@ _MOTION = (
     _left_out(
         'motion', 'its P is seconds on some controls, milliseconds on others', 'G4', words='PSXUF'
     ),
+    _honoured('motion', '', 'G61', 'G61.1', group=PATH_CONTROL),
+    _honoured('motion', '', 'G64 P', words='PQ', group=PATH_CONTROL),
     _left_out(
         'motion',
-        'the blend says where the tool stops',
-        *('G9', 'G61', 'G61.1', 'G64'),
+        'without P it bounds nothing; the option corner does',
+        'G64',
         words='PQ',
+        group=PATH_CONTROL,
     ),
+    _left_out(
+        'motion', 'the option simplify merges points', 'G64 Q', words='PQ', group=PATH_CONTROL
+    ),
+    _left_out('motion', 'the options blend and corner say where the tool stops', 'G9', words='PQ'),
     _left_out('motion', 'the robot looks ahead by itself', 'G5.1 Q', 'G8 P', 'G187', words='EPQR'),
     _left_out('motion', _NO_AXIS, 'A', 'B', 'C', 'U', 'V'),
     _left_out('motion', _NO_EXTRUDER, 'E'),

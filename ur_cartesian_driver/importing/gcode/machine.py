@@ -13,7 +13,14 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 import re
 
-from ur_cartesian_driver.importing.gcode.codes import Code, code_on_line, CODES, NO_OUTPUT, Stage
+from ur_cartesian_driver.importing.gcode.codes import (
+    Code,
+    code_on_line,
+    CODES,
+    NO_OUTPUT,
+    PATH_CONTROL,
+    Stage,
+)
 from ur_cartesian_driver.importing.gcode.coordinates import AXES, Coordinates
 from ur_cartesian_driver.importing.gcode.subprograms import LineSequence
 from ur_cartesian_driver.importing.gcode.switching import CodeOutputs
@@ -33,6 +40,8 @@ _CONDITION_END = re.compile(r'\s*M623\b', re.I)
 _UNITS = {'G20': LENGTH_UNITS['in'], 'G21': LENGTH_UNITS['mm']}
 #: The codes of the work offsets; G10 numbers them from 1.
 _FRAMES = ('G54', 'G55', 'G56', 'G57', 'G58', 'G59', 'G59.1', 'G59.2', 'G59.3')
+#: Codes that have a P on other controls only than those with G64 P.
+_LEAVE_P = frozenset((*_FRAMES, 'M0', 'M1', 'M2', 'M6', 'M30', 'M60'))
 
 _Words = dict[str, float]
 
@@ -42,7 +51,7 @@ class GcodeMachine:
 
     def __init__(self, lines: Sequence[str], options: ImportOptions, into: PathCollector) -> None:
         """Begin at the first line."""
-        self._lines, self._into = lines, into
+        self._lines, self._options, self._into = lines, options, into
         self._sequence = LineSequence(lines)
         self._outputs = CodeOutputs(options.outputs, into)
         self._path = Toolpath(options, into)
@@ -116,13 +125,16 @@ class GcodeMachine:
             self._do(codes[0], rows[0], words, bare)
             return
         self._check_codes(codes, rows, words)
-        own = [
-            {letter: words.pop(letter) for letter in row.words if letter in words} for row in rows
-        ]
+        own: list[_Words] = [{} for _ in rows]
+        # G64 takes its P and Q before others, but acts after the unit of its line.
+        for i in sorted(range(len(rows)), key=lambda i: rows[i].group != PATH_CONTROL):
+            own[i] = {letter: words.pop(letter) for letter in rows[i].words if letter in words}
         self._check_words(codes, rows, own, words, bare)
         self._has_begun |= codes[0][0] in 'GM'
         spindle = any(row.group == 'spindle' for row in rows)
-        todo = list(zip(codes, rows, own, strict=True))
+        todo = sorted(
+            zip(codes, rows, own, strict=True), key=lambda each: each[1].group == PATH_CONTROL
+        )
         for stage in Stage:
             if stage is Stage.OUTPUT:
                 self._take_words(words, beside_spindle=spindle)
@@ -170,6 +182,8 @@ class GcodeMachine:
         has_motion = not _MOTIONS.isdisjoint(codes)
         shared = _OF_MOTION if not {'G2', 'G3'}.isdisjoint(codes) else {*AXES}
         for code, row, values in zip(codes, rows, own, strict=True):
+            if row.group == PATH_CONTROL:
+                self._check_path_control(code, values, codes, rows)
             if has_motion and not row.moves_away and not shared.isdisjoint(values):
                 raise self._fail(f'{code} and a motion cannot share {min(shared & {*values})}')
             others = set(words) - ((_OF_MOTION | {'F', 'T'}) if has_motion else {'T'})
@@ -183,6 +197,19 @@ class GcodeMachine:
                 raise self._fail(
                     f'{min(others)} could belong to {code} or not; give {code} a line of its own'
                 )
+
+    def _check_path_control(
+        self, code: str, own: _Words, codes: Sequence[str], rows: Sequence[Code]
+    ) -> None:
+        """Refuse a P or Q of G64 that is no tolerance, or that another code could mean."""
+        for letter, value in own.items():
+            if value < 0.0:
+                raise self._fail(f'{code} {letter}{value:g} is no tolerance')
+            for other, row in zip(codes, rows, strict=True):
+                if other != code and letter in row.words and other not in _LEAVE_P:
+                    raise self._fail(
+                        f'{letter} could belong to {code} or {other}; give it a line of its own'
+                    )
 
     def _do(self, code: str, row: Code, own: _Words, bare: str) -> None:
         """Carry out a code with its own words."""
@@ -257,6 +284,23 @@ class GcodeMachine:
 
     def _set_diameter(self, code: str, _: _Words) -> None:
         self._path.share_of_x = 0.5 if code == 'G7' else 1.0
+
+    def _set_path_control(self, code: str, own: _Words) -> None:
+        """Set how far corners may be rounded (G64 P), or that the tool stops there (G61)."""
+        if self._options.blend:
+            self._omit(code, 'the option blend says where the tool stops')
+            return
+        if 'Q' in own:
+            self._omit('G64 Q', CODES['G64 Q'].reason)
+        # As in LinuxCNC, P0 is the same as no P.
+        tolerance = own.get('P') or None
+        self._path.set_corner(tolerance if code == 'G64' else 0.0)
+        if code != 'G64':
+            return
+        if tolerance is None and not self._options.corner:
+            self._omit('G64', CODES['G64'].reason)
+        elif tolerance is not None and self._path.unit is None:
+            self._omit('G64 before G20 and G21', 'its P is in the unit that follows')
 
     def _set_feed_mode(self, code: str, _: _Words) -> None:
         self._feed_per_turn = code == 'G99'
@@ -350,6 +394,7 @@ _DO: Mapping[str, _Action] = {
         ('G20 G21', GcodeMachine._set_unit),
         ('G90 G91 G90.1 G91.1', GcodeMachine._set_distance),
         ('G7 G8', GcodeMachine._set_diameter),
+        ('G61 G61.1 G64', GcodeMachine._set_path_control),
         ('G94 G98 G99', GcodeMachine._set_feed_mode),
         ('G96 G97', GcodeMachine._set_spindle_mode),
         ('G54 G55 G56 G57 G58 G59 G54.1 G59.1 G59.2 G59.3 G154', GcodeMachine._set_frame),
@@ -364,4 +409,9 @@ _DO: Mapping[str, _Action] = {
         ('O', GcodeMachine._number),
     )
     for name in names.split()
-} | {name: GcodeMachine._set_table for name in ('G10 L2', 'G10 L20')}
+} | {
+    'G10 L2': GcodeMachine._set_table,
+    'G10 L20': GcodeMachine._set_table,
+    'G64 P': GcodeMachine._set_path_control,
+    'G64 Q': GcodeMachine._set_path_control,
+}

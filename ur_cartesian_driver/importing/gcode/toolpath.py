@@ -35,6 +35,10 @@ class Toolpath:
         #: Factor on X: 0.5 if X is a diameter (G7), 1 if it is a radius (G8); None = not given.
         self.share_of_x: float | None = None
         self._has_begun = False
+        #: How far the tool may be beside a corner, and the unit of that [m]; for a corner, 0 = it
+        #: stops there, None = as the options say; for the unit, None = the first one of the file.
+        self._corner: float | None = None
+        self._corner_unit: float | None = None
 
     def length(self, line: int) -> float:
         """Return the unit of lengths [m]."""
@@ -51,6 +55,22 @@ class Toolpath:
             for axis, name in enumerate(AXES)
             if name in words
         }
+
+    def set_corner(self, number: float | None) -> None:
+        """
+        Set how far the tool may be beside the corners that follow.
+
+        :param number: in the unit of lengths; 0 = it stops there, None = as the options say.
+        """
+        self._corner, self._corner_unit = number, self.unit
+
+    def _corner_at(self, line: int) -> float | None:
+        """Return how far the tool may be beside the corner at the end of a motion [m]."""
+        if not self._corner:
+            return self._corner
+        if self._corner_unit is None:
+            self._corner_unit = self.length(line)
+        return self._corner * self._corner_unit
 
     def move(self, line: int, words: Mapping[str, float]) -> None:
         """
@@ -77,7 +97,7 @@ class Toolpath:
             is_known = where.start_is_known(known_before)
             if is_known and not self._has_begun:
                 where.record(0)
-                self._into.add(line, start, travel=True)
+                self._into.add(line, start, travel=True, corner=self._corner_at(line))
             self._has_begun = True
             if is_arc:
                 self._arc(line, start if is_known else None, words)
@@ -109,6 +129,7 @@ class Toolpath:
             lift=lift,
             via=via,
             speed=None if is_travel else self.feed,
+            corner=self._corner_at(line),
         )
 
     def _arc(self, line: int, start: Sequence[float] | None, words: Mapping[str, float]) -> None:
