@@ -22,7 +22,7 @@ from processes import Child, node, simulator
 from ros_client import goal_message, TimedClient
 from wire_tap import Mark, marks_until_first_point, wire_tap
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 TIMEOUT = 120.0
 #: How long the goal moves before it is cancelled [s].

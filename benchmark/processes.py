@@ -23,7 +23,7 @@ import sys
 import time
 from typing import Any, TypeAlias
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 HOST = '127.0.0.1'

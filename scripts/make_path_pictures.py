@@ -24,7 +24,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, rotate
 from ur_cartesian_driver.motion.goal.joint_goal import JointGoal, JointPoint
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.path import mm, PathPlace
 from ur_cartesian_driver.path import Path as ToolPath
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions

@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, OutputKind, SegmentType
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTolerance,

@@ -18,7 +18,7 @@ import socket
 import pytest
 from tracked_files import tracked_files
 
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

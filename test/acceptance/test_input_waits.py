@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Segment,
     Waypoint,
 )
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

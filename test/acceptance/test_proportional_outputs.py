@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, ProportionalOutput, Segment, Waypoint
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import COMPUTED
 

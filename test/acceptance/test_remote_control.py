@@ -8,7 +8,7 @@ from waiting import wait_for
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.services.service_calls import SendProgramCall
 
 pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.exhaustive]

@@ -9,7 +9,7 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.state.robot_state import RobotMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.exhaustive]

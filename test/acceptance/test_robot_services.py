@@ -14,7 +14,7 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.state.io_signals import AnalogDomain
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.program.render import wrap_in_program
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.services import service_dispatcher

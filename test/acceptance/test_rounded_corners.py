@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow, pytest.mark.both_arms]

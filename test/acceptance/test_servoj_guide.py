@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataReceived,
     HandshakeDone,

@@ -13,7 +13,7 @@ from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.geometry.vectors import vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES

@@ -12,7 +12,7 @@ import pytest
 from waiting import wait_for
 
 from ur_cartesian_driver.cli import check_robot, main
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
 from ur_cartesian_driver.robot.check.experiment_runner import run_experiment
 from ur_cartesian_driver.robot.check.experiments import EXPERIMENTS

@@ -8,7 +8,7 @@ import pytest
 from synthetic_recording import only_file, outputs, packet, record
 
 from ur_cartesian_driver.cli import main
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 
 def busy(i):

@@ -24,7 +24,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.sim.simulator_config import HOME
 

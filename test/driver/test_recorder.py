@@ -46,7 +46,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 # ---- contents of a file -------------------------------------------------------------------------

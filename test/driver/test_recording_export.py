@@ -20,7 +20,7 @@ from ur_cartesian_driver.driver.recordings import message_definitions
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.importing import import_file
 from ur_cartesian_driver.motion.geometry.pose import Pose, rotate
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 NODE = '/ur_cartesian_driver'
 

@@ -12,7 +12,7 @@ import pytest
 
 from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RobotStatus,

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotat
 from ur_cartesian_driver.motion.geometry.vectors import scale6, subtract6, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.motion import MotionGenerator
 

@@ -24,7 +24,7 @@ from ur_cartesian_driver.execution.points.append_feeder import (
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 SPEED, STEP = 0.1, 0.1

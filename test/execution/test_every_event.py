@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -40,7 +40,7 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import StaleOffset
 from ur_cartesian_driver.motion.plan.offset_band import NO_OFFSET, OffsetBand, OffsetFeedback
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.registers import OFFSET_INPUTS
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 

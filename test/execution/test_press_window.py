@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: A quarter turn about x: the z axis of the tool is -y of the base.
 LYING = quaternion_from_rotation_vector((1.5707963267948966, 0.0, 0.0))

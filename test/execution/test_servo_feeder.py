@@ -36,7 +36,7 @@ from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import Spline
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
 TARGET = Pose((0.6, 0.0, 0.2))
 AT_REST = RobotState(

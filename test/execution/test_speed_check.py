@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, Tr
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import ZERO6
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 #: 0.1 m in 1 s, then a turn of 1 rad about z in 2 s, its quaternion with the other sign.

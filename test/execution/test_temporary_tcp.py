@@ -14,7 +14,7 @@ from ur_cartesian_driver.execution.goal.temporary_tcp import (
     TemporaryTcp,
 )
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 OWN, NOZZLE, THEIRS = (Pose((0.0, 0.0, z)) for z in (0.1, 0.2, 0.3))
 REST, MOVING = (0.0,) * 6, (0.1,) + (0.0,) * 5

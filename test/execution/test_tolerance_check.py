@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
 from ur_cartesian_driver.motion.geometry.vectors import subtract, vector3, ZERO6
 from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.motion.goal.joint_goal import JointErrorBounds, JointTolerances
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))
 WANTED = Pose((0.4, -0.2, 0.3), DOWN)

@@ -13,7 +13,7 @@ from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.motion.goal.goal import Goal, OutputKind, Segment, Waypoint
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 VALVE = SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=1, value=1.0)

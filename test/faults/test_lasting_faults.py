@@ -11,7 +11,7 @@ from robot_cell import CYCLE, run_cell
 from ur_cartesian_driver.execution.monitoring.standstill import STANDSTILL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.goal import IOCommand, OutputKind, Tolerance
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.primary_client import SILENCE_TIMEOUT

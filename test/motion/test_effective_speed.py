@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed, RISE_AFTER_PAUSE
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 PLAYING, PAUSED, RESUMING = RuntimeState.PLAYING, RuntimeState.PAUSED, RuntimeState.RESUMING
 CYCLE = 0.002

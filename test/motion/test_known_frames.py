@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.goal.known_frames import (
     StaticFrame,
     T_TOOL0_FLANGE,
 )
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 T_BASE_FLANGE = Pose((0.4, 0.1, 0.5), quaternion_from_rotation_vector((1.0, 2.0, 0.5)))
 T_FLANGE_TCP = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.state.rigid_body import (
     shift_reference_point,
     twist_at,
 )
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 FRAME = Pose((0.1, -0.2, 0.3), quaternion_from_rotation_vector((0.3, 0.2, -0.5)))
 H = 1e-4

@@ -12,7 +12,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.goal.goal import Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class Cell:

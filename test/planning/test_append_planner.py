@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.plan.primitive import SwitchOutput
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

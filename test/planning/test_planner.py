@@ -48,7 +48,7 @@ from ur_cartesian_driver.motion.plan.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.preview import table
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS

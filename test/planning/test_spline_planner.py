@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal, Posture, Segment, Waypoin
 from ur_cartesian_driver.motion.goal.goal_table import goal_table
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.primitive import Spline
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline

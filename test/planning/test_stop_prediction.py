@@ -7,7 +7,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.sim.motion.servo_motions import JointStopMotion
 

@@ -8,7 +8,7 @@ import contextlib
 import pytest
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -3,7 +3,7 @@
 from math import inf
 
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -9,7 +9,7 @@ import logging
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import LinkCallbacks, RobotLink

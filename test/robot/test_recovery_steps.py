@@ -6,7 +6,7 @@ from itertools import product
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -7,7 +7,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RuntimeState,
     SafetyMode,

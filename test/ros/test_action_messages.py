@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, pose_error
 from ur_cartesian_driver.motion.goal.known_frames import Frames
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.ros.message_fields import duration_message, seconds
 from ur_cartesian_driver.ros.messages.action_messages import (

@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.state.robot_state import RobotMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.srv import (

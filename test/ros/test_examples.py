@@ -12,7 +12,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import check, plan
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal

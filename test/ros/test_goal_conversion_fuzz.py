@@ -23,7 +23,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.ros.client import load_goal

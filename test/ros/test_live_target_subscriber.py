@@ -17,7 +17,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames, StaticFrame
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoActivity, ServoReport
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.ros.live.live_target_subscriber import (

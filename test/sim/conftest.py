@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from robot_ports import FREE
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig

@@ -16,7 +16,7 @@ import pytest
 from tracked_files import tracked_files
 
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim.builtins import controller_builtins
 from ur_cartesian_driver.sim.programs.timed_function_guard import refuse_timed_functions
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent

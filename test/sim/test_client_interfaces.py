@@ -13,7 +13,7 @@ import time
 import pytest
 from robot_ports import FREE
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     PrimaryDecoder,
     RobotStateFrame,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.dashboard import COMMAND_SPECS
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardSession

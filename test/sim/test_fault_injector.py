@@ -10,7 +10,7 @@ import pytest
 from rtde_requests import setup_outputs, START, VERSION_2
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim import assemble, MemorySockets, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 from ur_cartesian_driver.sim.faults.fault_values import (

@@ -12,7 +12,7 @@ import struct
 import pytest
 from rtde_requests import setup_outputs, START, VERSION_2
 
-from ur_cartesian_driver.motion.state.robot_state import SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import SafetyMode
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_values import (
     GarbageFault,

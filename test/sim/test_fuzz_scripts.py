@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 from tracked_files import tracked_files
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim.builtins import controller_builtins
 
 HERE = Path(__file__).parent

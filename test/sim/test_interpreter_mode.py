@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim.interfaces.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.programs.interpreter_mode import MAX_QUEUED_STATEMENTS
 from ur_cartesian_driver.sim.simulated_robot import SimulatedRobot

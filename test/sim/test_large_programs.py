@@ -13,7 +13,7 @@ import pytest
 from robot_ports import FREE
 from waiting import wait_for
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.programs.script_upload import MAX_UPLOAD_SIZE
 

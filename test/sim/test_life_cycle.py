@@ -6,7 +6,7 @@ from math import dist
 
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: Delay of a program's first motion by its slow start [s].

@@ -14,7 +14,7 @@ from robot_ports import FREE, HOST, Primary, Wire
 from rtde_requests import setup_outputs, START, VERSION_2
 from waiting import wait_for
 
-from ur_cartesian_driver.motion.state.robot_state import SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     TextMessage,
 )

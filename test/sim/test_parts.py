@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim.clock import RealClock
 from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter

@@ -10,7 +10,7 @@ import pytest
 from robot_ports import FREE, Primary, Wire
 from waiting import wait_for
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ErrorCodeMessage,
     KeyMessage,

@@ -11,7 +11,7 @@ import pytest
 from robot_ports import FREE, HOST
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.state.robot_state import RobotMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.controller_assembly import assemble
 from ur_cartesian_driver.sim.interfaces.robot_api_session import RobotApiSession

@@ -7,7 +7,7 @@ from dataclasses import replace
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.prelude_file import read_prelude

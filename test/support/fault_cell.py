@@ -10,7 +10,7 @@ from virtual_network import HOST
 
 from ur_cartesian_driver.driver.ipc.channel import CallRobot
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState

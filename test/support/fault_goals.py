@@ -42,7 +42,7 @@ from ur_cartesian_driver.motion.goal.goal import (
     Tolerance,
     Waypoint,
 )
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.planning import plan
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints

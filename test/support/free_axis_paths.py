@@ -22,7 +22,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.geometry.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.goal.goal import FreeAxis, Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.preflight.clearance import Clearance
 from ur_cartesian_driver.planning.preflight.tightest_margins import (

@@ -15,7 +15,7 @@ import numpy as np
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.protocol.program.reverse import keepalive, trajectory, TrajectoryAction

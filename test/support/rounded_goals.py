@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.goal.goal import Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.sim.calibration import random_calibration

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.state.io_signals import (
     DigitalChannels,
     Signals,
 )
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 DONE = Outcome(code=ErrorCode.SUCCESSFUL, text='Done.', report=('a line',))
 START = 100.0

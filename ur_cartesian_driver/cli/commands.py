@@ -19,7 +19,7 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import PathPlace
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim.command_line.console import SIGNAL_STATUS

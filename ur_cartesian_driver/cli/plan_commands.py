@@ -30,7 +30,7 @@ from ur_cartesian_driver.motion.geometry.workspace import parse_planes, Plane
 from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.plan.slow_stretch import speed_advice
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.stop_prediction import state_at_rest
 from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream

@@ -61,7 +61,7 @@ from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.motion.plan.plan import Plan
 from ur_cartesian_driver.motion.state.io_signals import Signals
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.path import Path
 from ur_cartesian_driver.planning import plan, plan_joint_goal, PlanningOptions

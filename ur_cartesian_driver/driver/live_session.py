@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.goal.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal.goal import Goal, SafeOutput, Waypoint
 from ur_cartesian_driver.motion.goal.output_names import parse_safe_outputs
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 #: How far the square of a quaternion's length may be from 1.

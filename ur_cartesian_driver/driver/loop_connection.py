@@ -19,7 +19,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
 )
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop import loop_host as host
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Pause before a lost robot loop is replaced [s]: what ended it may end the next loop too.
 RESTART_PAUSE = 0.5

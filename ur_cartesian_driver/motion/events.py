@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.motion.goal.goal import SafeOutput
 from ur_cartesian_driver.motion.plan.offset_band import OffsetFeedback
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 
 

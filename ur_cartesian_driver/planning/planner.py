@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.goal.goal import Goal
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.plan.slow_stretch import SlowStretch
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.free_rotations import as_named, choose_rotations
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import NoRotation
 from ur_cartesian_driver.planning.min_speed import (

@@ -18,7 +18,7 @@ from dataclasses import replace
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.geometry.vectors import add_scaled6, Joints, subtract6, ZERO6
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Largest deviation of a joint from its set-point that is ascribed to friction [rad]: 0.2 to 0.4
 #: mrad were recorded.

@@ -14,7 +14,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.arrays import Floats
 from ur_cartesian_driver.motion.geometry.workspace import Plane
 from ur_cartesian_driver.motion.plan.plan import Plan
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.preview.motion_page import scene_of_plan, serve, Server
 
 #: The least length of an edge in the trail of the TCP [m], and the largest number of edges.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, UTC
 from math import nan
 
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

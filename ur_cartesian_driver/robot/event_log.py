@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Protocol
 
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Age up to which entries may explain why a goal or connection ended [s]; older ones are left out.
 MAX_AGE = 3.0

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.geometry.vectors import vector6
 from ur_cartesian_driver.motion.state.io_signals import Signals
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age, StaleStates
 from ur_cartesian_driver.program import PROGRAM_NAME
 from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData

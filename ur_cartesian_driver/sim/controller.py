@@ -19,7 +19,7 @@ from typing import Protocol
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import add, dot, Vector3, Vector6
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotStatus,
     RuntimeState,

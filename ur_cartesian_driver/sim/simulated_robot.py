@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.controller_assembly import assemble

@@ -22,7 +22,7 @@ from ur_cartesian_driver.driver.recordings.recording_format import (
     PART_SUFFIX,
 )
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 #: Largest number of packets in a picture.
 MAX_ROWS = 6000

@@ -20,7 +20,7 @@ from typing import Any
 
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import Vector6
-from ur_cartesian_driver.motion.state.robot_state import RobotState, STATE_TABLE
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, STATE_TABLE
 
 _COUNTER = struct.Struct('<Q')
 #: The number of values in the field types with more than one value.

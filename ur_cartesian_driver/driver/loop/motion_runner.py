@@ -71,7 +71,7 @@ from ur_cartesian_driver.motion.events import (
 )
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.state.io_signals import Signals
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.rtde.register_connection import (

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import inf
 
 from ur_cartesian_driver.driver.ipc.state_memory import StateMemory
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class NewestState:

@@ -10,7 +10,7 @@ import logging
 from ur_cartesian_driver.driver.ipc.channel import TemporaryTcpRestored
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.robot.link import RobotLink
 
 

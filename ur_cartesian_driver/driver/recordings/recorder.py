@@ -32,7 +32,7 @@ from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.state.io_signals import Signals
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.planning.options import PlanningOptions

@@ -23,7 +23,7 @@ import zipfile
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 
 #: Version of the format; increased when a member of the file changes its meaning.
 FORMAT = 1

@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.geometry.vectors import Vector3
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 T = TypeVar('T')
 

@@ -54,7 +54,7 @@ from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.motion import events
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal.goal import DEFAULT_GOAL_TIME_TOLERANCE
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import explain_age
 
 #: The events that carry a packet of the robot's registers.

@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
 #: The largest distance [m] and angle [rad] of the arm from the start of the plan, and of the
 #: controller's target from a place where the arm has waited.

@@ -58,7 +58,7 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -19,7 +19,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
 )
 from ur_cartesian_driver.motion.events import OutputsSecured
 from ur_cartesian_driver.motion.goal.goal import OutputKind, SafeOutput
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.program.script_command import SafeOutputsAction
 
 _PAUSED = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})

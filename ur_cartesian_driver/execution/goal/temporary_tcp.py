@@ -14,7 +14,7 @@ from math import inf
 
 from ur_cartesian_driver.execution.goal.goal_transitions import is_at_rest
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: The largest distance [m] and angle [rad] of a reported TCP from the one that was sent: values
 #: on the wire have a resolution of 1e-6.

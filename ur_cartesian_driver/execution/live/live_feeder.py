@@ -16,7 +16,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.live.live_targets import LiveTargets
 from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
 from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: The ``max_plan_deviation`` of a session: no limit, because there is no plan to deviate from.
 ANY_DEVIATION = (0.0, 0.0)

@@ -15,7 +15,7 @@ from ur_cartesian_driver.execution.monitoring.tolerance_check import excess_clau
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.geometry.vectors import subtract6, Vector6, ZERO6
 from ur_cartesian_driver.motion.goal.joint_goal import JointErrorBounds, JointTolerances
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class JointToleranceCheck:

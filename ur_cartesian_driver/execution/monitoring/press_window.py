@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.geometry.pose import (
     rotation_vector_from_quaternion,
 )
 from ur_cartesian_driver.motion.geometry.vectors import add, subtract, Vector3, vector3, Vector6
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: How much the tracker's time may differ from the time of a point where the arm stands still [s].
 POINT_TIME_TOLERANCE = 0.01

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ur_cartesian_driver.motion.plan.plan import ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
 #: How long the target may stand still in the middle of a goal while nothing holds it [s].
 STANDSTILL_TIMEOUT = 2.0

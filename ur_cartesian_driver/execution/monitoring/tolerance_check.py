@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.goal.goal import Tolerance
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 _AXES = ('x', 'y', 'z')
 _UNKNOWN: Vector6 = (nan,) * 6

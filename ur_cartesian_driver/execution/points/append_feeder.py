@@ -29,7 +29,7 @@ from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.execution.goal.outcome_codes import Meaning
 from ur_cartesian_driver.execution.points.point_feeder import PointFeeder
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 #: How long a motion that consists only of its ending waits for more points before it begins [s]:

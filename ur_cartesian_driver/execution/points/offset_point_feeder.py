@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.plan.offset_band import (
     OffsetBand,
     OffsetFeedback,
 )
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: By how much our first sequence number exceeds the last one that the robot has read: more than
 #: the count of numbers that a lost client may have written and the robot has not read.

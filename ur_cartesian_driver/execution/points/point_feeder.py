@@ -10,7 +10,7 @@ from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.goal_transitions import GoalState
 from ur_cartesian_driver.execution.points.send_window import SendWindow
 from ur_cartesian_driver.motion.events import Event
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 

@@ -29,7 +29,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import (
 from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.motion.events import Event, ServoReceived
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 class AppendServoFeeder(ServoFeeder, Appendable):

@@ -41,7 +41,7 @@ from ur_cartesian_driver.motion.geometry.vectors import (
 )
 from ur_cartesian_driver.motion.plan.approach import approach_speed, ARRIVAL_TOLERANCE
 from ur_cartesian_driver.motion.plan.offset_band import AppliedOffset, NO_OFFSET, OffsetBand
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 #: Length of the steps, in the time of the motion, in which the offset moves [s].
 STEP = MIN_STEP

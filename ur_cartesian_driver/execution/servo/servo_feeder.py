@@ -46,7 +46,7 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSt
 from ur_cartesian_driver.execution.servo.wait_for_arm import WaitForArm
 from ur_cartesian_driver.motion.events import Event, ServoReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.geometry.vectors import subtract6
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.servo_report import UNKNOWN6
 
 #: A robot program that has read one of our sequence numbers within this time does not hang, even

@@ -9,7 +9,7 @@ from ur_cartesian_driver.execution.goal.goal_commands import GoalCommand, LogWar
 from ur_cartesian_driver.execution.goal.goal_monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.outcome_codes import Fault, GoalSignal
 from ur_cartesian_driver.execution.servo.servo_stream import ServoStream
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 
 
 class WaitForArm(Stallable, Ageing, Reporting):

@@ -26,7 +26,7 @@ from typing import Protocol, TypeVar
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, normalize, Pose
 from ur_cartesian_driver.motion.goal.goal import Goal
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 G = TypeVar('G', bound=Goal)
 

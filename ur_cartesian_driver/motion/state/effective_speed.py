@@ -12,7 +12,7 @@ controller reports a scaling of 1 before the arm has sped up from rest.
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 
 #: How fast the effective speed rises after a pause, as in the manufacturer's ROS 2 driver [1/s].
 RISE_AFTER_PAUSE = 5.0

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY, Pose, rotate
 from ur_cartesian_driver.motion.geometry.vectors import add, cross, Vector3, Vector6
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 
 
 def twist_at(twist: Vector6, offset: Vector3) -> Vector6:

@@ -32,7 +32,7 @@ from ur_cartesian_driver.motion.goal.goal_table import goal_table, GoalTable, Wa
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline, SAME_TIME
 from ur_cartesian_driver.motion.plan.plan import Plan, PlannedRows, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.plan.primitive import OutputRecord, SpeedLaw, Spline, SwitchOutput
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.append.appendable_goal import (
     AppendableGoal,
     AppendedPoints,

@@ -40,7 +40,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import (
 from ur_cartesian_driver.motion.geometry.vectors import cross, dot, Vector3, vector6
 from ur_cartesian_driver.motion.goal.goal import ArcMode, FreeAxis, Posture, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, SegmentRows
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.free_axis.rotation_lattice import (
     Layer,
     MAX_AXIS_DEVIATION,

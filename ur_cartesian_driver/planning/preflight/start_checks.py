@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidPosture, RobotNotReady
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.goal import Posture
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field

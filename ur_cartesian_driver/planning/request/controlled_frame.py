@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.geometry.pose_rows import compose_rows, cross_ro
 from ur_cartesian_driver.motion.goal.goal import ArcMode, SegmentType
 from ur_cartesian_driver.motion.goal.goal_table import GoalTable, rows_where
 from ur_cartesian_driver.motion.state.rigid_body import shift_reference_point
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.goal.joint_goal import JointGoal
 from ur_cartesian_driver.motion.plan.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan.move_rows import SplineRows
 from ur_cartesian_driver.motion.plan.plan import LateLines, Plan, PlannedRows, ReferencePath
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.samples import counted
 from ur_cartesian_driver.planning.options import PlanningOptions

@@ -44,7 +44,7 @@ from typing import cast, ClassVar, TypeAlias
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.geometry.vectors import Vector6, ZERO6
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.body_layout import (
     Body,
     BodyLayout,

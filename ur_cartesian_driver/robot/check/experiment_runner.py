@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.motion.geometry.arrays import Floats
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_command,
     PrimaryCommand,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.program.registers import OFFSET_INPUTS, SERVO_INPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import max_frequency, RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RobotState, RobotStatus
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, RobotStatus
 from ur_cartesian_driver.robot.connection_status import ConnectionStatus, has_ended
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link_settings import LinkSettings

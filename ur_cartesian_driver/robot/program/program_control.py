@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction

@@ -7,7 +7,7 @@ from __future__ import annotations
 import asyncio
 from math import inf
 
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.protocol.program.registers import PROGRAM_VERSION
 from ur_cartesian_driver.robot.connection_status import has_ended, is_paused
 from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets

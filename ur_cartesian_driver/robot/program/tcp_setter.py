@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.program.secondary_program import tcp_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.program import script_command

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import asyncio
 
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 
 

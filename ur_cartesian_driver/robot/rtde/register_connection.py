@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.events import Event, OffsetReceived, ServoReceiv
 from ur_cartesian_driver.motion.geometry.vectors import vector3
 from ur_cartesian_driver.motion.plan.offset_band import OffsetFeedback
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.motion.state.servo_report import ServoFeedback
 from ur_cartesian_driver.protocol.program.registers import (
     OFFSET_INPUTS,

@@ -3,7 +3,7 @@
 """
 Decodes the RTDE packets of the robot state.
 
-:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` declares the outputs and the
+:class:`~ur_cartesian_driver.motion.state.rtde_state.RobotState` declares the outputs and the
 fields that they become; nothing of this is repeated here. Work that is the same for every packet
 is done once: 500 packets arrive in a second, and a CANCEL may have to wait while one is decoded.
 """
@@ -19,7 +19,7 @@ from typing import Any
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.geometry.pose import Pose
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

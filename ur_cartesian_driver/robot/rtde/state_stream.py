@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 from ur_cartesian_driver.motion.state.effective_speed import EffectiveSpeed
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.motion.state.state_age import STALE_TIMEOUT, StateAge
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues

@@ -14,7 +14,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
 
-from ur_cartesian_driver.motion.state.robot_state import (
+from ur_cartesian_driver.motion.state.rtde_state import (
     RobotMode,
     RobotState,
     RuntimeState,

@@ -16,7 +16,7 @@ from math import dist, isnan
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.geometry.pose import angle_between, normalize, Pose
-from ur_cartesian_driver.motion.state.robot_state import RobotState, RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink

@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoa
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.geometry.pose import Pose
 from ur_cartesian_driver.motion.goal.known_frames import ArmSnapshot, Frames
-from ur_cartesian_driver.motion.state.robot_state import SafetyStatus
+from ur_cartesian_driver.motion.state.rtde_state import SafetyStatus
 from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds, pose_from_message
 

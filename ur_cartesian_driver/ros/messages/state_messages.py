@@ -4,7 +4,7 @@
 Messages of the state topics.
 
 The fields of ``DriverStatus`` are filled by name, so that a new field of
-:class:`~ur_cartesian_driver.motion.state.robot_state.RobotState` needs no line here.
+:class:`~ur_cartesian_driver.motion.state.rtde_state.RobotState` needs no line here.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.goal.known_frames import (
     TOOL0,
 )
 from ur_cartesian_driver.motion.state.io_signals import AnalogChannel, Signals
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RobotState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.motion.state.servo_report import ServoReport
 from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage

@@ -32,7 +32,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.link_shapes import LinkFrames
 from ur_cartesian_driver.kinematics.robot_description import robot_description
 from ur_cartesian_driver.motion.state.io_signals import Signals
-from ur_cartesian_driver.motion.state.robot_state import RobotState
+from ur_cartesian_driver.motion.state.rtde_state import RobotState
 from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,

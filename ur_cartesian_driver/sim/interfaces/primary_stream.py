@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from ur_cartesian_driver.motion.state.robot_state import RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotStatus, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     encode_message,
     encode_state,

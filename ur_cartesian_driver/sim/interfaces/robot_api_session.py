@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
 from ur_cartesian_driver.sim.state.controller_state import Popup

@@ -19,7 +19,7 @@ from typing import Any
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.geometry.pose import IDENTITY
 from ur_cartesian_driver.motion.geometry.vectors import add, add6, scale, Vector3, Vector6, ZERO6
-from ur_cartesian_driver.motion.state.robot_state import RobotMode
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.kinematics.point_motion import (
     flange_point,

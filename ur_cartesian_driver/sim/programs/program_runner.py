@@ -23,7 +23,7 @@ import logging
 from random import Random
 from typing import NamedTuple, Protocol, TypeVar
 
-from ur_cartesian_driver.motion.state.robot_state import RuntimeState
+from ur_cartesian_driver.motion.state.rtde_state import RuntimeState
 from ur_cartesian_driver.sim.programs.timed_function_guard import Builtins, refuse_timed_functions
 from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
 from ur_cartesian_driver.urscript import (

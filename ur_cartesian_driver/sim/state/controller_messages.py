@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from ur_cartesian_driver.motion.state.robot_state import SafetyMode
+from ur_cartesian_driver.motion.state.rtde_state import SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ErrorCodeMessage,
     KeyMessage,

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from enum import Enum
 from types import MappingProxyType
 
-from ur_cartesian_driver.motion.state.robot_state import RobotMode, SafetyMode, SafetyStatus
+from ur_cartesian_driver.motion.state.rtde_state import RobotMode, SafetyMode, SafetyStatus
 
 
 class SafetyEvent(Enum):
