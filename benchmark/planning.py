@@ -22,6 +22,8 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Blend radius [m]; two blends fit between points that are 5 mm apart.
 RADIUS = 0.002
+#: How far rounded corners may be beside the path [m].
+DEVIATION = 0.0002
 #: Time between timed points, and to the first one [s].
 PERIOD = 0.1
 LEAD = 3.0
@@ -45,6 +47,8 @@ def run(quick: bool) -> Iterator[Figure]:
         for arm in arms if points <= 10_000 else ():
             goal = _timed(paths.goal(points))
             yield from _figures(f'{points:,} timed points with twists, {arm}', goal, arms[arm])
+            goal = replace(paths.goal(points), corner_deviation=DEVIATION)
+            yield from _figures(f'{points:,} points with rounded corners, {arm}', goal, arms[arm])
 
 
 def _figures(name: str, goal: Goal, arm: Arm, repeat: int = 5) -> Iterator[Figure]:

@@ -66,7 +66,7 @@ _WIDTH_TIME = 0.25
 _SLOW_WIDTH = 0.001
 #: How often the law is slowed around pieces that are too coarse, and by how much at least.
 _TRIES = 6
-_SLOWER = 1.1
+_SLOWER = 1.5
 #: Samples inside each piece that measure its accelerations, and how far these may be above.
 _SAMPLES_INSIDE = 5
 _CLOSE_ENOUGH = 1.017

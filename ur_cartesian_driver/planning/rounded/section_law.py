@@ -50,8 +50,10 @@ _AIM = 0.985
 _ROUNDS = 8
 _MORE, _EXTRA = 1.5, 1.01
 CLOSE = 1.01
-#: Distance of the times at which the law is measured [s].
-_MEASURED_EVERY = 0.004
+#: Samples while the window of the average passes a place at which limits change.
+_AROUND = 13
+#: Times before and after a sample between which its jerk is measured [s].
+_JERK_STEP = 0.002
 _TINY = 1e-12
 _NEARLY = 1e-10
 
@@ -254,11 +256,20 @@ class SectionLaw:
             self._tightened *= np.where(wide > CLOSE, wide**_MORE * _EXTRA, 1.0)
         return law
 
+    def _measured_times(self, law: TimeLaw) -> Floats:
+        """Return times near which each place is passed, closer together where limits change."""
+        tool = self._tool
+        changes = np.flatnonzero(
+            (np.diff(tool.accelerations) != 0.0) | (np.diff(tool.turn_accelerations) != 0.0)
+        )
+        passed = np.interp(self.section.ends[changes], self.samples.s, law.times)
+        around = passed[:, None] + self.window * np.linspace(0.0, 1.5, _AROUND)
+        return np.sort(np.concatenate([law.sampled_times, around.ravel()]))
+
     def excess(self, law: TimeLaw) -> Floats:
         """Return the largest measured value at each place, as a part of its limit (m,)."""
         samples, tool, options = self.samples, self._tool, self._options
-        count = int(np.ceil(law.duration / _MEASURED_EVERY)) + 1
-        t = np.linspace(0.0, law.duration, count)
+        t = self._measured_times(law)
         s, v, a = law.at(t)
         at = np.clip(np.searchsorted(samples.s, s, side='right') - 1, 0, len(samples.s) - 2)
         part = ((s - samples.s[at]) / (samples.s[at + 1] - samples.s[at]))[:, None]
@@ -270,7 +281,9 @@ class SectionLaw:
 
         v, a = v[:, None], a[:, None]
         x1, x2 = rows(samples.x1), rows(samples.x2)
-        jerk = np.gradient(a[:, 0], t)[:, None]
+        _, _, before = law.at(t - _JERK_STEP)
+        _, _, after = law.at(t + _JERK_STEP)
+        jerk = ((after - before) / (2.0 * _JERK_STEP))[:, None]
         values = [
             np.linalg.norm(x1 * a + x2 * v * v, axis=1) / tool.accelerations[row],
             np.linalg.norm(rows(samples.w1) * a + rows(samples.w2) * v * v, axis=1)

@@ -28,6 +28,9 @@ from ur_cartesian_driver.motion.geometry.arrays import Flags, Floats, Indices
 # Halvings that find the largest speed at a place at which any acceleration is allowed.
 _HALVINGS = 30
 _TINY = 1e-12
+# Newton's method finds times of places, unless the law nearly rests there [1/s].
+_NEWTON_STEPS = 4
+_NO_SPEED = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -254,15 +257,23 @@ class TimeLaw:
         s, v, a = ((b - a) / self.window for a, b in zip(before, after, strict=True))
         return PathTimes(np.clip(s, self._s[0], self._s[-1]), v, a)
 
+    @property
+    def sampled_times(self) -> Floats:
+        """Times (2 m - 1,) near which the averaged law passes places, and between them [s]."""
+        passed = self.times + 0.5 * self.window
+        return np.sort(np.concatenate([passed, 0.5 * (passed[1:] + passed[:-1])]))
+
     def times_of(self, s: Floats) -> Floats:
-        """Return when the averaged law passes places (m,) [s], to a microsecond."""
+        """Return when the averaged law passes places (m,) [s]."""
         low = np.interp(s, self._s, self.times)
         high = low + self.window
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            is_late = self.at(middle).s >= s
-            low, high = np.where(is_late, low, middle), np.where(is_late, middle, high)
-        found: Floats = 0.5 * (low + high)
+        known = np.concatenate([[0.0], self.sampled_times, [self.duration]])
+        t = np.clip(np.interp(s, self.at(known).s, known), low, high)
+        for _ in range(_NEWTON_STEPS):
+            place, v, _ = self.at(t)
+            step = np.where(v > _NO_SPEED, (s - place) / np.maximum(v, _NO_SPEED), 0.0)
+            t = np.clip(t + step, low, high)
+        found: Floats = t
         return found
 
 
