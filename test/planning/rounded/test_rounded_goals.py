@@ -233,6 +233,32 @@ def test_what_excludes_rounded_corners_is_refused(cell, fields, text):
         plan(square(cell, **{'corner_deviation': 1e-3} | fields), cell.state, cell.arm, OPTIONS)
 
 
+@pytest.mark.parametrize('count', [1, 3])
+def test_a_path_that_leads_nowhere_is_refused(cell, count):
+    goal = Goal(waypoints=(cell.point(),) * count, corner_deviation=1e-3)
+    with pytest.raises(InvalidGoal, match='are all where the arm is'):
+        plan(goal, cell.state, cell.arm, OPTIONS)
+
+
+@pytest.mark.parametrize('deviation', [2e-5, 1e-3, 0.1])
+@pytest.mark.parametrize(
+    'places',
+    [
+        [1e-7],
+        [1e-6, 2e-6],
+        [1e-5 * k for k in range(1, 50)],
+        [0.05, 0.0],
+        [0.05, 0.0, 0.05, 0.0],
+        [0.1, 0.1 + 1e-9, 0.0],
+    ],
+)
+def test_paths_of_any_size_and_reversals_are_planned(cell, places, deviation):
+    goal = Goal(waypoints=tuple(cell.point(x) for x in places), corner_deviation=deviation)
+    found = plan(goal, cell.state, cell.arm, OPTIONS)
+    end = cell.arm.forward(found.rows.joints[-1].tolist()) @ cell.T_flange_tcp
+    assert end.distance_to(goal.waypoints[-1].pose) < 1e-6
+
+
 def test_times_are_refused(cell):
     goal = square(cell, corner_deviation=1e-3)
     points = tuple(replace(point, time=1.0 + k) for k, point in enumerate(goal.waypoints))

@@ -18,7 +18,7 @@ from math import inf
 import numpy as np
 
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
-from ur_cartesian_driver.motion.errors import InvalidPosture, TooFast
+from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidPosture, TooFast
 from ur_cartesian_driver.motion.geometry.arrays import Floats, Indices
 from ur_cartesian_driver.motion.geometry.polynomials import MotionRows
 from ur_cartesian_driver.motion.geometry.pose import Pose, pose_from_row
@@ -132,6 +132,12 @@ def plan_rounded_path(
         laws.append(SectionLaw(section, path, own, kinematics, q, options))
         if laws[-1].samples.q.shape[1]:
             q = vector6(laws[-1].samples.q[-1].tolist())
+    if not laws:
+        raise InvalidGoal(
+            'trajectory.points',
+            'are all where the arm is, so there is no path whose corners could be rounded',
+            'add a point elsewhere, or set corner_deviation to 0',
+        )
     for attempt in range(_TRIES + 1):
         motion = _fit(laws, limits, q_start, kinematics, options, tolerance)
         coarse = _coarse_times(motion, tolerance, options)

@@ -45,10 +45,11 @@ _SPACING = 0.002
 _MIN_WINDOW = 0.02
 #: The part of the limits of acceleration that the law aims at, for what averaging adds.
 _AIM = 0.985
-#: How often limits are tightened, by how much more than needed (a power and a factor), and what
-#: is close enough.
+#: How often limits are tightened; the power of the excess by which they are, a smaller one where
+#: the excess is far from 1, because jerk grows with a higher power of the speed; an extra factor;
+#: and the excess that is close enough.
 _ROUNDS = 8
-_MORE, _EXTRA = 1.5, 1.01
+_FAR, _LESS, _MORE, _EXTRA = 2.0, 0.6, 1.5, 1.01
 CLOSE = 1.01
 #: Samples while the window of the average passes a place at which limits change.
 _AROUND = 13
@@ -200,7 +201,7 @@ class SectionLaw:
         :param times: (k, 2) begin and end, since the beginning [s].
         :param factor: by which accelerations have to fall there.
         """
-        before = len(times) and self.law.times
+        before = self.law.times
         inside = np.zeros(len(self.samples.s), dtype=np.bool_)
         for begin, end in times.tolist():
             inside |= (before >= begin - 2.0 * self.window) & (before <= end + self.window)
@@ -253,7 +254,8 @@ class SectionLaw:
             if excess.max() <= CLOSE:
                 break
             wide = -lowered_over(-excess, law.times, self.window)
-            self._tightened *= np.where(wide > CLOSE, wide**_MORE * _EXTRA, 1.0)
+            more = np.where(wide > _FAR, wide**_LESS, wide**_MORE)
+            self._tightened *= np.where(wide > CLOSE, more * _EXTRA, 1.0)
         return law
 
     def _measured_times(self, law: TimeLaw) -> Floats:
